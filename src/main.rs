@@ -6,11 +6,13 @@ mod command;
 
 use std::process::ExitCode;
 
+use ballast::service::config::Config;
 use clap::{Parser, Subcommand};
 use command::{
     advise, audit, backtest, backup, bench, check, coverage, demo, evaluate, frontier, healthcheck, keys, loadtest,
     reproduce, serve,
 };
+use tokio::runtime::Builder;
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -85,7 +87,9 @@ fn end_where_nobody_reads() {
 
 fn main() -> ExitCode {
     end_where_nobody_reads();
-    let runtime = match tokio::runtime::Runtime::new() {
+    let blocking_threads = Config::new("").blocking_threads();
+    let runtime = Builder::new_multi_thread().enable_all().max_blocking_threads(blocking_threads).build();
+    let runtime = match runtime {
         Ok(runtime) => runtime,
         Err(error) => {
             eprintln!("ballast: starting the runtime: {error}");

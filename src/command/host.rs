@@ -64,6 +64,8 @@ impl Host {
 
     /// Drains it and waits for its end.
     pub async fn stop(self) {
-        self.running.stop().await;
+        if let Err(error) = self.running.stop().await {
+            tracing::error!(error = &error as &dyn std::error::Error, "the store failed at the end");
+        }
     }
 }

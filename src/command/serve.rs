@@ -156,6 +156,8 @@ impl From<RoleName> for Role {
     }
 }
 
+/// What the process ends with where its store failed: an input or output error, by `sysexits.h`.
+const STORE_FAILED: i32 = 74;
 /// What the process ends with where a second signal cuts its drain short: that of a process ended by SIGTERM.
 const ASKED_TWICE: i32 = 143;
 
@@ -216,7 +218,10 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     }
     // Nobody has to read it: the log says it too.
     let _ = std::io::stdout().write_all(told.as_bytes());
-    running.ended().await;
+    if let Err(error) = running.ended().await {
+        tracing::error!(error = &error as &dyn std::error::Error, "the store failed; exiting");
+        std::process::exit(STORE_FAILED);
+    }
     traces.end().await;
     Ok(())
 }

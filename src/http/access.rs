@@ -23,7 +23,7 @@ use serde::de::DeserializeOwned;
 
 use super::bodies::Bodies;
 use super::conversation::LocalAddress;
-use super::extract::{AfterBody, BodyLimit, Parameters};
+use super::extract::{AfterBody, BodyLimit, LargeBody, Parameters};
 use super::hosts::{self, Hosts};
 use super::problem::{Problem, ProblemKind};
 use crate::service::Service;
@@ -124,6 +124,10 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
     };
     if let Some(call) = &call {
         request.extensions_mut().insert(call.clone());
+    }
+    if let (Some(call), Some(_)) = (&call, &room) {
+        let (decoding, tenant) = (gate.service.decoding.clone(), call.tenant.clone());
+        request.extensions_mut().insert(LargeBody { decoding, tenant });
     }
     DefaultBodyLimit::max(limit).apply(&mut request);
     request.extensions_mut().insert(BodyLimit(limit));

@@ -49,11 +49,11 @@ pub enum AdviseAnswer {
 pub async fn advise(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
-    JsonBytes(bytes): JsonBytes,
+    body: JsonBytes,
 ) -> Result<Response, Problem> {
     let started = Instant::now();
     let (sessions, tenant) = (&service.sessions, &caller.tenant);
-    let (answer, mode) = match question(&bytes)? {
+    let (answer, mode) = match body.decoded(question).await? {
         AdviseQuestion::Asset(asked) => {
             (sessions.advise(tenant, asked).await?.map(|advised| AdviseAnswer::Asset(advised.into())), "advise")
         }

@@ -31,9 +31,10 @@ pub async fn backtest(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     headers: HeaderMap,
-    JsonBytes(bytes): JsonBytes,
+    body: JsonBytes,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.jobs.backtest(&caller, question(&bytes)?, idempotency_key(&headers)?).await?))
+    let asked = body.decoded(question).await?;
+    Ok(accepted(service.jobs.backtest(&caller, asked, idempotency_key(&headers)?).await?))
 }
 
 /// What tells whether a request names assets.

@@ -11,22 +11,50 @@ use serde::de::DeserializeOwned;
 use super::decode;
 use super::problem::{Problem, ProblemKind};
 use crate::service::allowance::HeavyTurn;
+use crate::service::bounded::Bounded;
 use crate::service::error::ServiceError;
+use crate::store::Tenant;
 
 /// A JSON body that is an object.
 pub struct JsonBody<T>(pub T);
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
+impl<S: Send + Sync, T: DeserializeOwned + Send + 'static> FromRequest<S> for JsonBody<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        let JsonBytes(bytes) = JsonBytes::from_request(request, state).await?;
-        decode::object(&bytes).map(JsonBody)
+        JsonBytes::from_request(request, state).await?.decoded(decode::object).await.map(JsonBody)
     }
 }
 
-/// The bytes of a body declared to be JSON, not yet parsed.
-pub struct JsonBytes(pub Bytes);
+/// The bytes of a body declared to be JSON, not yet decoded.
+pub struct JsonBytes {
+    bytes: Bytes,
+    large: Option<LargeBody>,
+}
+
+/// The turns that a large body is decoded in, and whose body it is, as the gate tells its extractors.
+#[derive(Clone)]
+pub struct LargeBody {
+    pub decoding: Bounded,
+    pub tenant: Tenant,
+}
+
+impl JsonBytes {
+    /// Decodes the body: a large one in a turn, on a thread that may block, so that the calls of others go on meanwhile.
+    ///
+    /// # Errors
+    /// Those of `decode`; no turn came in time.
+    pub async fn decoded<T: Send + 'static>(
+        self,
+        decode: impl FnOnce(&[u8]) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let JsonBytes { bytes, large } = self;
+        match large {
+            None => decode(&bytes),
+            Some(LargeBody { decoding, tenant }) => decoding.run(&tenant, move || decode(&bytes)).await?,
+        }
+    }
+}
 
 /// The turn of a heavy call, to be begun once its body is read.
 #[derive(Clone)]
@@ -46,6 +74,7 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
         let size = declared.and_then(|length| length.parse::<u64>().ok()).map(|length| format!("{length} bytes"));
         let limit = request.extensions().get::<BodyLimit>().map_or(0, |limit| limit.0);
         let turn = request.extensions().get::<AfterBody>().cloned();
+        let large = request.extensions().get::<LargeBody>().cloned();
         let bytes = Bytes::from_request(request, state).await.map_err(|rejection| {
             let size = size.unwrap_or_else(|| "a stream".to_owned());
             match rejection.status() {
@@ -63,7 +92,7 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
         if let Some(AfterBody(turn)) = turn {
             turn.begin().await.map_err(ServiceError::from)?;
         }
-        Ok(JsonBytes(bytes))
+        Ok(JsonBytes { bytes, large })
     }
 }
 
@@ -119,5 +148,33 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
             )
         })?;
         Ok(Id(id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use axum::body::Body;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::service::bounded::Size;
+
+    /// A body that is large, or is not, beside as many as are decoded at a time.
+    async fn decoded(is_large: bool) -> Result<Value, Problem> {
+        let decoding = Bounded::new("decode", Size { first: 0, long: 0 }, Duration::from_millis(1));
+        let request = Request::builder().header(header::CONTENT_TYPE, "application/json");
+        let mut request = request.body(Body::from(r#"{"problem": 1}"#)).unwrap();
+        if is_large {
+            request.extensions_mut().insert(LargeBody { decoding, tenant: Tenant::default() });
+        }
+        JsonBody::<Value>::from_request(request, &()).await.map(|JsonBody(value)| value)
+    }
+
+    #[tokio::test]
+    async fn a_large_body_is_decoded_in_its_turn_and_a_small_one_at_once() {
+        assert_eq!(decoded(false).await.unwrap()["problem"], 1);
+        assert_eq!(decoded(true).await.unwrap_err().status, 503);
     }
 }

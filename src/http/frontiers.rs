@@ -32,9 +32,9 @@ pub async fn frontier(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     headers: HeaderMap,
-    JsonBytes(bytes): JsonBytes,
+    body: JsonBytes,
 ) -> Result<Response, Problem> {
-    let request = request(&bytes)?;
+    let request = body.decoded(request).await?;
     Ok(accepted(service.jobs.frontier(&caller, request, idempotency_key(&headers)?).await?))
 }
 

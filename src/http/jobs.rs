@@ -72,15 +72,12 @@ pub async fn train(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     headers: HeaderMap,
-    JsonBytes(bytes): JsonBytes,
+    body: JsonBytes,
 ) -> Result<Response, Problem> {
     let key = idempotency_key(&headers)?;
-    let (specification, labels) = match said(&bytes) {
-        Some(SaidOfProblem { assets: Some(_), .. }) => {
-            let asked = decode::object::<TrainAssets>(&bytes)?;
-            asked.specified(&service.sessions, &caller.tenant).await?
-        }
-        _ => decode::object::<Train>(&bytes)?.specified(),
+    let (specification, labels) = match body.decoded(question).await? {
+        TrainQuestion::Assets(asked) => asked.specified(&service.sessions, &caller.tenant).await?,
+        TrainQuestion::Asset(asked) => asked.specified(),
     };
     Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
 }
@@ -88,10 +85,17 @@ pub async fn train(
 /// A training of a policy for one asset, or for several, which `problem.assets` names.
 #[derive(Debug, ToSchema)]
 #[serde(untagged)]
-#[expect(dead_code, reason = "a body is read as the one that it is: this describes both")]
 pub enum TrainQuestion {
     Asset(Box<Train>),
     Assets(Box<TrainAssets>),
+}
+
+/// The request, decoded as the one that it is, so that a fault is reported under its own field.
+fn question(bytes: &[u8]) -> Result<TrainQuestion, Problem> {
+    match said(bytes) {
+        Some(SaidOfProblem { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
+        _ => decode::object(bytes).map(TrainQuestion::Asset),
+    }
 }
 
 /// A training of a policy for several assets.

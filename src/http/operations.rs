@@ -68,7 +68,7 @@ pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Pr
     service.record_store().await?;
     let (jobs, sessions) = service.counts().await?;
     service.record_memory();
-    let text = telemetry::exposition(jobs, sessions, service.sessions.waiting(), &service.keys.figures());
+    let text = telemetry::exposition(jobs, sessions, service.waiting(), &service.keys.figures());
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())
 }
 

@@ -18,7 +18,9 @@ use crate::service::Service;
 use crate::service::drift::DriftLevel;
 use crate::service::overview::Listed;
 use crate::store::LONGEST_TAG;
-use crate::store::{Care, CareCounts, Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery};
+use crate::store::{
+    Care, CareCounts, Counted, Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery,
+};
 
 /// Letters of what is searched for: more than any name has.
 const LONGEST_SEARCH: usize = 100;
@@ -33,6 +35,14 @@ pub struct Asked {
     sort: Option<String>,
     limit: Option<String>,
     after: Option<String>,
+    count: Option<Count>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum Count {
+    Total,
+    Care,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
@@ -171,9 +181,9 @@ pub struct SessionPage {
     /// Sessions of this page that are not what was written: nothing of them is shown, and a call for one gets 500 until an
     /// operator has restored it.
     pub damaged: Vec<String>,
-    /// Sessions that match, on all pages together.
-    pub total: usize,
-    /// Who needs care among those that `search` and `tag` find, in whatever `state`; null on later pages.
+    /// Sessions that match, on all pages together; null unless `count` asks for it.
+    pub total: Option<usize>,
+    /// Who needs care among those that `search` and `tag` find, in whatever `state`; null unless `count` asks for it.
     pub care: Option<CareCount>,
     /// Give it as `after` for the next page; null on the last.
     pub next: Option<String>,
@@ -186,7 +196,8 @@ pub struct SessionPage {
            ("state" = inline(Option<Is>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
            ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
            ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
-           ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`.")),
+           ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`."),
+           ("count" = inline(Option<Count>), Query, description = "`total`: how many match; `care`: that, and how many need care. Each reads every session that matches, so ask for it once, with the first page.")),
     responses(
         (status = 200, description = "A page of sessions.", body = SessionPage),
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
@@ -196,7 +207,7 @@ pub async fn list(
     Parameters(asked): Parameters<Asked>,
 ) -> Result<Json<SessionPage>, Problem> {
     let asked = asked.read()?;
-    let found = service.sessions.list(&caller.tenant, asked.clone()).await?;
+    let found = service.sessions.list(&caller, asked.clone()).await?;
     let next = found.last.as_ref().map(|place| cursor(&asked, place));
     let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
     let (damaged, care) = (found.damaged, found.care.map(CareCount::from));
@@ -237,8 +248,13 @@ impl Asked {
             Is::Alarm => SessionIs::Needing(Some(Care::Alarm)),
             Is::Ending => SessionIs::Needing(Some(Care::Ending)),
         });
+        let counted = self.count.map_or(Counted::Nothing, |count| match count {
+            Count::Total => Counted::Total,
+            Count::Care => Counted::Care,
+        });
         let search = self.search.filter(|search| !search.is_empty());
-        let asked = SessionQuery { search, tag: self.tag, is, order, descending, limit, ..SessionQuery::default() };
+        let asked =
+            SessionQuery { search, tag: self.tag, is, order, descending, limit, counted, ..SessionQuery::default() };
         let after = self.after.map(|text| {
             let rule = "must be the `next` of the page before, of the same sort";
             place(&asked, &text).ok_or_else(|| refused("after", &text, rule))

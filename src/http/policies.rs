@@ -16,7 +16,6 @@ use super::problem::Problem;
 use super::wire;
 use crate::control::policy::Policy;
 use crate::service::Service;
-use crate::service::error::ServiceError;
 
 /// List policies, newest first.
 #[utoipa::path(get, path = "/policies", tag = "policies",
@@ -84,11 +83,9 @@ pub async fn export(
 pub async fn import(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
-    JsonBytes(document): JsonBytes,
+    body: JsonBytes,
 ) -> Result<Response, Problem> {
-    // A document may hold 64 MB: too much to parse between two requests.
-    let decoded = tokio::task::spawn_blocking(move || decode::object::<Policy>(&document));
-    let policy = service.policies.import(&caller, decoded.await.map_err(ServiceError::internal)??).await?;
+    let policy = service.policies.import(&caller, body.decoded(decode::object::<Policy>).await?).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
 }

@@ -101,9 +101,9 @@ pub struct ElementAnswered {
 pub async fn observe(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
-    JsonBytes(bytes): JsonBytes,
+    body: JsonBytes,
 ) -> Result<Response, Problem> {
-    match decode::json(&bytes)? {
+    match body.decoded(decode::json).await? {
         Reports::One(report) => Ok(as_recorded(service.sessions.report(&caller, *report, &caller.turn).await?)),
         Reports::Many(reports) => {
             let reported = service.sessions.report_all(&caller, reports).await?;

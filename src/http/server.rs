@@ -21,6 +21,7 @@ use crate::service::clock::Clock;
 use crate::service::config::Config;
 use crate::service::error::ServiceError;
 use crate::service::shutdown::Shutdown;
+use crate::store::StoreError;
 
 /// A client that has not sent its head by then is cut off.
 const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
@@ -62,22 +63,35 @@ pub struct Running {
     pub operations: Option<SocketAddr>,
     /// `http` or `https`.
     pub scheme: &'static str,
-    shutdown: Shutdown,
+    service: Arc<Service>,
     task: JoinHandle<()>,
 }
 
 impl Running {
     /// Waits until the server has ended by its own shutdown signal: drained, job requeued, store closed.
-    pub async fn ended(self) {
-        if let Err(error) = self.task.await {
-            tracing::error!(%error, "the server ended by a panic");
+    ///
+    /// # Errors
+    /// The store failed past recovery, and the process must end at once.
+    pub async fn ended(self) -> Result<(), StoreError> {
+        tokio::select! {
+            biased;
+            ended = self.task => {
+                if let Err(error) = ended {
+                    tracing::error!(%error, "the server ended by a panic");
+                }
+                Ok(())
+            }
+            error = self.service.store_failed() => Err(error),
         }
     }
 
     /// Asks the server to end, and waits for it.
-    pub async fn stop(self) {
-        self.shutdown.begin();
-        self.ended().await;
+    ///
+    /// # Errors
+    /// The store failed past recovery.
+    pub async fn stop(self) -> Result<(), StoreError> {
+        self.service.shutdown.begin();
+        self.ended().await
     }
 }
 
@@ -118,8 +132,8 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError
     let front = manners(router::application(service.clone(), &config), bounds(&config), &config, &encryption);
     let back = manners(router::for_operators(service.clone(), &config), OPERATORS_BOUNDS, &config, &encryption);
     let doors = Doors { front: (door, front), back: back_door.map(|door| (door, back)), certificate };
-    let task = tokio::spawn(doors.run(service, config.drain));
-    Ok(Running { address, operations, scheme, shutdown, task })
+    let task = tokio::spawn(doors.run(service.clone(), config.drain));
+    Ok(Running { address, operations, scheme, service, task })
 }
 
 /// A connection that has asked so often, or is so old, is closed with the next answer: what balances callers over

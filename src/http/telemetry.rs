@@ -77,7 +77,7 @@ pub fn may_log() -> bool {
 }
 
 /// The metrics page, with the counts of the store as they are now.
-pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize); 2], keys: &[KeyFigures]) -> String {
+pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize); 3], keys: &[KeyFigures]) -> String {
     let by_state = [
         ("queued", jobs.queued),
         ("running", jobs.running),

@@ -78,7 +78,9 @@ impl Default for Limits {
 pub struct Allowance {
     buckets: [Bucket; 3],
     heavy: [Arc<Semaphore>; 2],
+    heavy_of_one: usize,
     streams: Arc<Semaphore>,
+    lists: Arc<Semaphore>,
     streams_of_one: usize,
     stream_age: Duration,
     epoch: Instant,
@@ -119,7 +121,9 @@ impl Allowance {
         Allowance {
             buckets: limits.rates.map(Bucket::new),
             heavy: [Arc::new(Semaphore::new(limits.heavy_of_one)), limits.heavy.clone()],
+            heavy_of_one: limits.heavy_of_one,
             streams: Arc::new(Semaphore::new(limits.streams_of_one)),
+            lists: Arc::new(Semaphore::new(1)),
             streams_of_one: limits.streams_of_one,
             stream_age: limits.stream_age,
             epoch: Instant::now(),
@@ -143,6 +147,16 @@ impl Allowance {
         let place = self.streams.clone().try_acquire_owned();
         let place = place.map_err(|_| Refused::TooManyStreams { most: self.streams_of_one })?;
         Ok(StreamPlace { _place: place, until: Instant::now() + self.stream_age })
+    }
+
+    /// The place of the one list of sessions that the tenant has read at a time.
+    pub(super) fn lists(&self) -> Arc<Semaphore> {
+        self.lists.clone()
+    }
+
+    /// Heavy calls of the tenant that may be under way at a time.
+    pub fn heavy_of_one(&self) -> usize {
+        self.heavy_of_one
     }
 
     /// Places for a heavy call, the tenant's own first; `None` where all are taken.

@@ -1,6 +1,6 @@
 //! Work that requests cause, bounded and taken in turn over tenants.
 //!
-//! A piece of work begins in one of the first places and has it for [`MOMENT`] at most. What takes longer goes on in one of the
+//! A piece of work begins in one of the first places, of which a tenant has half at most, and has it for [`MOMENT`]. What takes longer goes on in one of the
 //! places for long work, of which there are fewer than processors, and gives it up to the next one each [`SHIFT`]. So whoever asks
 //! something short waits for moments of others, however long their questions are, and long questions share what is left.
 //! Whoever finds no place waits in the queue of the tenant, and a place that becomes free goes to the tenants in turn.
@@ -28,24 +28,24 @@ const MOMENT: Duration = Duration::from_millis(100);
 /// How long a piece has a place for long work while others wait for one.
 const SHIFT: Duration = Duration::from_millis(250);
 /// Long pieces that may wait for such a place, each on a thread of its own.
-const LONG_WAITING: usize = 32;
+pub(super) const LONG_WAITING: usize = 32;
 /// Those of one tenant.
 const LONG_WAITING_OF_ONE: usize = 8;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
-pub(super) struct Bounded {
+pub struct Bounded {
     /// What the work is, in traces and metrics.
     pub name: &'static str,
-    /// Pieces that may begin at a time.
-    pub first: usize,
+    /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
+    pub of_one: usize,
     lines: Arc<[Mutex<Line>; 2]>,
     wait: Duration,
 }
 
 /// How many pieces of work may be under way.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Size {
+pub struct Size {
     /// In their first moment.
     pub first: usize,
     /// After it.
@@ -61,7 +61,12 @@ enum Kind {
 
 /// Places of one kind, and who waits for them.
 struct Line {
+    /// Places that nobody has; while there are any, all who wait have as many as one tenant may.
     free: usize,
+    /// Places that one tenant may have.
+    of_one: usize,
+    /// Places that each tenant has; none of them 0.
+    running: HashMap<Tenant, usize>,
     /// Tenants that wait, whose turn is next first; each has a queue.
     ring: VecDeque<Tenant>,
     queues: HashMap<Tenant, VecDeque<oneshot::Sender<Place>>>,
@@ -71,6 +76,7 @@ struct Line {
 struct Place {
     bounded: Bounded,
     kind: Kind,
+    tenant: Tenant,
 }
 
 /// A piece of work under way.
@@ -86,19 +92,36 @@ struct Piece {
 }
 
 impl Bounded {
-    pub(super) fn new(name: &'static str, Size { first, long }: Size, wait: Duration) -> Self {
-        let line = |free| Mutex::new(Line { free, ring: VecDeque::new(), queues: HashMap::new() });
-        Bounded { name, first, lines: Arc::new([line(first), line(long)]), wait }
+    pub fn new(name: &'static str, Size { first, long }: Size, wait: Duration) -> Self {
+        let line = |free, of_one| {
+            let (running, queues) = (HashMap::new(), HashMap::new());
+            Mutex::new(Line { free, of_one, running, ring: VecDeque::new(), queues })
+        };
+        let of_one = first.div_ceil(2);
+        Bounded { name, of_one, lines: Arc::new([line(first, of_one), line(long, long)]), wait }
     }
 
     /// Runs `work` on a thread that may block. It ends early where the future is dropped.
     ///
     /// # Errors
     /// [`ServiceError::Busy`] where no place became free in time; a panic of `work`.
-    pub(super) async fn run<T: Send + 'static>(
+    pub async fn run<T: Send + 'static>(
         &self,
         tenant: &Tenant,
         work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        self.run_and_prepare(tenant, move || (work(), || ())).await
+    }
+
+    /// Runs `work` as [`Self::run`] does. It returns the answer and a preparation for later calls, which runs in the same
+    /// place once the caller has the answer.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub async fn run_and_prepare<T: Send + 'static, P: FnOnce()>(
+        &self,
+        tenant: &Tenant,
+        work: impl FnOnce() -> (T, P) + Send + 'static,
     ) -> Result<T, ServiceError> {
         let place = self.first_place(tenant).instrument(spans::of_turn()).await?;
         let (here, caller) = watch::channel(());
@@ -109,26 +132,37 @@ impl Bounded {
             is_refused: AtomicBool::new(false),
             place: Mutex::new(Some((place, Instant::now()))),
         });
-        let working = tokio::task::spawn_blocking(move || interruption::watched(piece, work));
-        let done = working.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)?;
+        let (done, answer) = oneshot::channel();
+        tokio::task::spawn_blocking(move || {
+            // Nobody receives the answer if the caller went away.
+            match interruption::watched(piece.clone(), work) {
+                Ok((answer, prepare)) => {
+                    let _ = done.send(Ok(answer));
+                    prepare();
+                }
+                Err(stopped) => drop(done.send(Err(stopped))),
+            }
+            drop(piece);
+        });
+        let answer = answer.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)?;
         drop(here);
-        done.map_err(|Stopped| ServiceError::Busy)
+        answer.map_err(|Stopped| ServiceError::Busy)
     }
 
     /// Pieces that wait for a place.
-    pub(super) fn waiting(&self) -> usize {
+    pub fn waiting(&self) -> usize {
         [Kind::First, Kind::Long].map(|kind| self.line(kind).waiting()).into_iter().sum()
     }
 
     async fn first_place(&self, tenant: &Tenant) -> Result<Place, ServiceError> {
         let asked = self.line(Kind::First).ask(tenant);
-        let Some(granted) = asked else { return Ok(self.place(Kind::First)) };
+        let Some(granted) = asked else { return Ok(self.place(Kind::First, tenant.clone())) };
         let granted = tokio::time::timeout(self.wait, granted).await;
         granted.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)
     }
 
-    fn place(&self, kind: Kind) -> Place {
-        Place { bounded: self.clone(), kind }
+    fn place(&self, kind: Kind, tenant: Tenant) -> Place {
+        Place { bounded: self.clone(), kind, tenant }
     }
 
     fn line(&self, kind: Kind) -> MutexGuard<'_, Line> {
@@ -139,10 +173,10 @@ impl Bounded {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let next = self.bounded.line(self.kind).give_back();
-        if let Some(waiting) = next {
+        let next = self.bounded.line(self.kind).give_back(&self.tenant);
+        if let Some((tenant, waiting)) = next {
             // Whoever stopped waiting in this instant drops it, and so hands it on.
-            drop(waiting.send(self.bounded.place(self.kind)));
+            drop(waiting.send(self.bounded.place(self.kind, tenant)));
         }
     }
 }
@@ -174,7 +208,7 @@ impl Watcher for Piece {
         };
         *held = None;
         let place = match granted {
-            None => Some(self.bounded.place(Kind::Long)),
+            None => Some(self.bounded.place(Kind::Long, self.tenant.clone())),
             Some(granted) => self.wait_for(granted),
         };
         *held = place.map(|place| (place, Instant::now()));
@@ -195,10 +229,19 @@ impl Piece {
 }
 
 impl Line {
-    /// Takes a place where there is one, and nobody has waited longer for it: `None`. Else waits for it.
+    fn may(&self, tenant: &Tenant) -> bool {
+        self.free > 0 && self.running.get(tenant).copied().unwrap_or_default() < self.of_one
+    }
+
+    fn take(&mut self, tenant: &Tenant) {
+        self.free -= 1;
+        *self.running.entry(tenant.clone()).or_default() += 1;
+    }
+
+    /// Takes a place if there is one for the tenant: `None`. Else waits for it.
     fn ask(&mut self, tenant: &Tenant) -> Option<oneshot::Receiver<Place>> {
-        if self.free > 0 && self.ring.is_empty() {
-            self.free -= 1;
+        if self.may(tenant) {
+            self.take(tenant);
             return None;
         }
         let (waiting, granted) = oneshot::channel();
@@ -210,22 +253,34 @@ impl Line {
         Some(granted)
     }
 
-    /// Whoever has the place that became free next; the tenant goes to the end of the ring.
-    fn give_back(&mut self) -> Option<oneshot::Sender<Place>> {
-        while let Some(tenant) = self.ring.pop_front() {
+    /// Whoever has the place of the tenant next, who goes to the end of the ring.
+    fn give_back(&mut self, tenant: &Tenant) -> Option<(Tenant, oneshot::Sender<Place>)> {
+        self.free += 1;
+        if let Some(running) = self.running.get_mut(tenant) {
+            *running -= 1;
+            if *running == 0 {
+                self.running.remove(tenant);
+            }
+        }
+        for _ in 0..self.ring.len() {
+            let tenant = self.ring.pop_front()?;
+            if !self.may(&tenant) {
+                self.ring.push_back(tenant);
+                continue;
+            }
             let Some(queue) = self.queues.get_mut(&tenant) else { continue };
             queue.retain(|waiting| !waiting.is_closed());
             let first = queue.pop_front();
             if queue.is_empty() {
                 self.queues.remove(&tenant);
             } else {
-                self.ring.push_back(tenant);
+                self.ring.push_back(tenant.clone());
             }
-            if first.is_some() {
-                return first;
+            if let Some(first) = first {
+                self.take(&tenant);
+                return Some((tenant, first));
             }
         }
-        self.free += 1;
         None
     }
 
@@ -284,12 +339,13 @@ mod tests {
         (passed, tokio::spawn(async move { bounded.run(&of, work).await }))
     }
 
-    fn free(bounded: &Bounded) -> [usize; 2] {
-        [Kind::First, Kind::Long].map(|kind| {
+    /// Waits until every place is free: of so many of each kind.
+    async fn all_free(bounded: &Bounded, places: [usize; 2]) {
+        let is_free = |(kind, places): (Kind, usize)| {
             let line = bounded.line(kind);
-            assert!(line.ring.is_empty() && line.queues.is_empty());
-            line.free
-        })
+            line.free == places && line.ring.is_empty() && line.queues.is_empty() && line.running.is_empty()
+        };
+        until(|| [Kind::First, Kind::Long].into_iter().zip(places).all(is_free)).await;
     }
 
     async fn until(mut reached: impl FnMut() -> bool) {
@@ -309,7 +365,7 @@ mod tests {
         first.release.send(()).unwrap();
         assert!(first.done.await.unwrap().unwrap());
         assert_eq!(bounded.run(&tenant("north"), || 7).await.unwrap(), 7);
-        assert_eq!(free(&bounded), [1, 1]);
+        all_free(&bounded, [1, 1]).await;
     }
 
     #[tokio::test]
@@ -340,6 +396,21 @@ mod tests {
         assert_eq!(order, ["north 0", "north 1", "south 0", "north 2", "south 1", "north 3", "north 4"]);
     }
 
+    #[tokio::test]
+    async fn one_tenant_leaves_half_of_the_places() {
+        let bounded = bounded(2, 1);
+        let (begun, begins) = mpsc::channel();
+        let held = [0, 1].map(|number| hold(&bounded, "north", &begun, &number.to_string()));
+        until(|| bounded.waiting() == 1).await;
+        assert_eq!(bounded.run(&tenant("south"), || 7).await.unwrap(), 7);
+        assert_eq!((begins.try_iter().count(), bounded.waiting()), (1, 1));
+        held.iter().for_each(|held| held.release.send(()).unwrap());
+        for held in held {
+            assert!(held.done.await.unwrap().unwrap());
+        }
+        all_free(&bounded, [2, 1]).await;
+    }
+
     /// The first moment over, long pieces share one place, and what begins meanwhile begins at once.
     #[tokio::test]
     async fn long_work_leaves_its_place_and_takes_turns() {
@@ -357,8 +428,7 @@ mod tests {
             done.abort();
             assert!(done.await.unwrap_err().is_cancelled());
         }
-        until(|| bounded.lines.iter().all(|line| line.lock().unwrap().free == 1)).await;
-        assert_eq!(free(&bounded), [1, 1]);
+        all_free(&bounded, [1, 1]).await;
     }
 
     #[tokio::test]
@@ -370,7 +440,7 @@ mod tests {
         assert!(matches!(all.swap_remove(first).await.unwrap(), Err(ServiceError::Busy)));
         assert!(busy(&bounded, "south", 500).1.await.unwrap().is_ok());
         all.iter().for_each(tokio::task::JoinHandle::abort);
-        until(|| bounded.lines.iter().all(|line| line.lock().unwrap().free == 1)).await;
+        all_free(&bounded, [1, 1]).await;
     }
 
     #[tokio::test]
@@ -400,6 +470,6 @@ mod tests {
         first.release.send(()).unwrap();
         last.release.send(()).unwrap();
         assert!(first.done.await.unwrap().unwrap() && last.done.await.unwrap().unwrap());
-        assert_eq!(free(&bounded), [1, 1]);
+        all_free(&bounded, [1, 1]).await;
     }
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::allowance::Limits;
+use super::bounded::LONG_WAITING;
 use super::memory::MemoryLimit;
 use crate::store::{PostgresUrl, Quotas};
 
@@ -96,7 +97,9 @@ pub struct Config {
     pub resolve_limit: usize,
     /// Allocations and observations begun at a time; more wait.
     pub advice_limit: usize,
-    /// Either of them at a time of those that take long.
+    /// Large bodies decoded at a time; more wait.
+    pub decode_limit: usize,
+    /// Any of these at a time of those that take long.
     pub long_limit: usize,
     /// A request that has waited this long for its turn is told to come back.
     pub turn_wait: Duration,
@@ -109,7 +112,17 @@ pub struct Config {
 /// A day, by the clock.
 pub const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 
+/// Threads that block outside the turns of tenants: two that read policies, those for files, names of hosts and the trainer.
+const OTHER_BLOCKING_THREADS: usize = 8;
+
 impl Config {
+    /// The most threads that work may block: one for each place of each turn and for each piece of long work that waits, so
+    /// that no work that has its turn waits for a thread, and a few more. Decoding is never long. A thread costs some megabytes of what its work allocated.
+    pub fn blocking_threads(&self) -> usize {
+        let begun = self.advice_limit + self.resolve_limit + self.decode_limit;
+        begun + 2 * (self.long_limit + LONG_WAITING) + OTHER_BLOCKING_THREADS
+    }
+
     /// The defaults over a folder: loopback, every core for training.
     pub fn new(data: impl Into<PathBuf>) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -133,8 +146,9 @@ impl Config {
             connections_of_address: None,
             body_limit_bytes: 64 << 20,
             request_timeout: Duration::from_secs(30),
-            resolve_limit: cores,
+            resolve_limit: 2 * cores,
             advice_limit: 2 * cores,
+            decode_limit: cores.div_ceil(2),
             // The other processors are for what begins.
             long_limit: cores.div_ceil(2),
             turn_wait: Duration::from_secs(2),

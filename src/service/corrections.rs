@@ -10,6 +10,7 @@ use super::plan::Stretch;
 use super::report::{Correct, LONGEST_REASON, MOST_CORRECTIONS, Report};
 use super::standing::Standing;
 use crate::control::error::FieldError;
+use crate::control::request::text::check_text;
 
 /// What a correction makes of a session.
 pub(super) struct PutRight {
@@ -33,10 +34,9 @@ impl Correct {
             let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
             return Err(FieldError::new("correction", self.correction, rule));
         }
-        let letters = self.reason.chars().count();
-        if self.reason.trim().is_empty() || letters > LONGEST_REASON || self.reason.contains(char::is_control) {
-            let rule = format!("must say in 1 to {LONGEST_REASON} letters why, without control characters");
-            return Err(FieldError::new("reason", format!("{letters} letters"), rule));
+        check_text("reason", &self.reason, 1..=LONGEST_REASON, &[])?;
+        if self.reason.trim().is_empty() {
+            return Err(FieldError::new("reason", format!("{:?}", self.reason), "must say why, and is blank"));
         }
         if self.change == Change::Remove && self.report() != Report::default() {
             return Err(FieldError::new("change", "remove", "must come without a report: the period is taken out"));

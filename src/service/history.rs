@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use super::allowance::HeavyTurn;
 use super::answer::{Corrected, Observed};
 use super::assets::{Composed, ObservedAssets};
-use super::content::read;
+use super::content::{answer, content};
 use super::error::ServiceError;
 use super::known::KnownReturns;
 use super::memory::Large;
@@ -134,23 +134,23 @@ impl Sessions {
         turn: &HeavyTurn,
     ) -> Result<Large<History>, ServiceError> {
         let Large { value: facts, room } = self.facts(tenant, session).await?;
+        let periods = Periods::of(&facts)?;
         let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
         for entry in &facts.entries {
             match entry.kind {
                 EntryKind::Observation => {}
                 EntryKind::Correction => corrections.push(Correction {
-                    correction: read(&entry.content_json)?,
-                    told: read(&entry.answer_json)?,
+                    correction: content(entry, periods.names())?,
+                    told: answer(entry, periods.names())?,
                     corrected_ms: entry.created_ms,
                 }),
                 EntryKind::Renewal => renewals.push(Renewal {
-                    told: read(&entry.answer_json)?,
-                    window: read::<Renew>(&entry.content_json)?.window,
+                    told: answer(entry, periods.names())?,
+                    window: content::<Renew>(entry, periods.names())?.window,
                     renewed_ms: entry.created_ms,
                 }),
             }
         }
-        let periods = Periods::of(&facts)?;
         let first = periods.first_changed();
         let changed = match first < periods.all.len() {
             true => {
@@ -163,7 +163,7 @@ impl Sessions {
         let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
         let (first, start) =
             (self.policies.advisor(tenant, &facts.row.policy).await?, periods.at_start(terms.learning));
-        let measured = tokio::task::spawn_blocking(move || first.radius(&start)).await;
+        let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
         let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
         let value = History {
@@ -172,7 +172,7 @@ impl Sessions {
             terms,
             initial_wealth,
             initial_holding,
-            initial_radius: measured.map_err(ServiceError::internal)?,
+            initial_radius,
             history: KnownReturns::of(history, assets.as_ref().map(Vec::len)),
             assets,
             composed,
@@ -237,8 +237,8 @@ fn observations(
         let entry = &facts.entries[period.entry];
         let (now, inserted) = if index >= first { changed.next() } else { None }.unzip();
         let (told, reported) = match inserted.flatten() {
-            Some(observed) => (observed, read::<Correct>(&entry.content_json)?.report()),
-            None => (read::<Observed>(&entry.answer_json)?, read(&entry.content_json)?),
+            Some(observed) => (observed, content::<Correct>(entry, periods.names())?.report()),
+            None => (answer::<Observed>(entry, periods.names())?, content(entry, periods.names())?),
         };
         let (told, corrections) = (Observed { period: index + 1, ..told }, period.corrections.clone());
         Ok(Observation { told, reported, observed_ms: entry.created_ms, corrections, now })

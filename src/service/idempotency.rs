@@ -1,16 +1,13 @@
 //! Idempotency keys as users send them.
 
 use crate::control::error::FieldError;
+use crate::control::request::text::check_text;
 
-/// Longest idempotency key taken, in bytes.
+/// Letters of an idempotency key.
 const KEY_LENGTH: usize = 255;
 
 /// # Errors
-/// The key is empty or too long.
+/// The key is empty, too long or has a control character.
 pub(super) fn check(key: &str) -> Result<(), FieldError> {
-    if (1..=KEY_LENGTH).contains(&key.len()) {
-        return Ok(());
-    }
-    let value = format!("{} bytes", key.len());
-    Err(FieldError::new("Idempotency-Key", value, format!("must hold 1 to {KEY_LENGTH} characters")))
+    check_text("Idempotency-Key", key, 1..=KEY_LENGTH, &[])
 }

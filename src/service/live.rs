@@ -261,14 +261,12 @@ pub(super) async fn measured(
         }
         false => means.advising,
     };
-    let measuring = advisor.clone();
+    let advisor = advisor.clone();
     let measure = move || {
-        standing.compose(&measuring, step);
-        (measuring.uncertainty(&standing.state), standing)
+        standing.compose(&advisor, step);
+        let (uncertainty, reached) = (advisor.uncertainty(&standing.state), standing.state.clone());
+        // The first session to get this far: the next advice finds its common random numbers simulated.
+        ((standing, uncertainty), move || advisor.prepare(step, &reached))
     };
-    let (uncertainty, standing) = turns.run(tenant, measure).await?;
-    // The first session to get this far: the next advice finds its common random numbers simulated.
-    let (advisor, reached) = (advisor.clone(), standing.state.clone());
-    tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
-    Ok((standing, uncertainty))
+    turns.run_and_prepare(tenant, measure).await
 }

@@ -11,7 +11,7 @@ pub mod allowance;
 pub mod answer;
 pub mod assets;
 pub mod audit;
-mod bounded;
+pub mod bounded;
 pub mod change;
 pub mod clock;
 pub mod config;
@@ -58,6 +58,7 @@ mod standing;
 mod sync;
 mod timekeeper;
 mod trainer;
+mod turns;
 mod upkeep;
 pub mod what_if;
 pub mod what_if_assets;
@@ -65,6 +66,7 @@ pub mod what_if_assets;
 use std::sync::Arc;
 
 use audit::Audit;
+use bounded::{Bounded, Size};
 use clock::Clock;
 use config::{Config, Role, StoreLocation};
 use error::ServiceError;
@@ -81,11 +83,13 @@ use trainer::Trainer;
 
 use crate::control::error::FieldError;
 use crate::control::request::evaluation::EvaluationRequest;
-use crate::store::{JobCounts, Store};
+use crate::store::{JobCounts, Store, StoreError};
 
 /// The use cases over one store.
 pub struct Service {
     pub audit: Audit,
+    /// Where large bodies are decoded.
+    pub decoding: Bounded,
     pub jobs: Jobs,
     pub keys: Arc<Keys>,
     pub names: Names,
@@ -100,7 +104,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// Opens the store, starts the trainer where the role has one, and ends the process should the store ever fail past recovery.
+    /// Opens the store, starts the trainer where the role has one.
     ///
     /// # Errors
     /// The role does not fit the store, others reach the address and nobody would be asked for a key, the store cannot be opened, or the training thread cannot be started.
@@ -116,7 +120,6 @@ impl Service {
             StoreLocation::Postgres(url) => Store::connect(url).await?,
         };
         let store = store.with_quotas(config.quotas);
-        exit_on_fatal(store.clone());
         let time = Arc::new(Timekeeper::new(store.clone(), clock));
         // The first look, before anything is dated.
         time.time_to_delete_by().await?;
@@ -136,7 +139,9 @@ impl Service {
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
-        let policies = Arc::new(Policies::new(store.clone(), memory.clone()));
+        let size = Size { first: config.decode_limit, long: config.long_limit };
+        let decoding = Bounded::new("decode", size, config.turn_wait);
+        let policies = Arc::new(Policies::new(store.clone(), memory.clone(), decoding.clone()));
         let (due, told) = tokio::sync::mpsc::channel(renewer::TOLD);
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), &memory, due);
         let (renewing, queueing) = (sessions.clone(), jobs.clone());
@@ -150,6 +155,7 @@ impl Service {
         let names = Names::new(store.clone());
         Ok(Arc::new(Service {
             audit,
+            decoding,
             jobs,
             keys,
             names,
@@ -188,6 +194,12 @@ impl Service {
         self.jobs.evaluate(caller, request, key).await
     }
 
+    /// Resolves should the store fail past recovery. After a failed fsync or an I/O error memory and disk may disagree, so the process
+    /// must end: only a restart finds the truth.
+    pub async fn store_failed(&self) -> StoreError {
+        self.store.until_fatal().await
+    }
+
     /// Whether the store answers and the service is not draining.
     ///
     /// # Errors
@@ -210,6 +222,12 @@ impl Service {
     /// The store does not answer.
     pub async fn counts(&self) -> Result<(JobCounts, u64), ServiceError> {
         Ok((self.store.count_jobs_by_state().await?, self.store.count_sessions().await?))
+    }
+
+    /// Requests that wait for their turn to be advised, to have a step solved, and to have their body decoded.
+    pub fn waiting(&self) -> [(&'static str, usize); 3] {
+        let Sessions { advising, resolving, .. } = &self.sessions;
+        [advising, resolving, &self.decoding].map(|turns| (turns.name, turns.waiting()))
     }
 
     /// Tells the recorder what takes memory now.
@@ -244,14 +262,4 @@ fn refuse_lost_keys(store: &Store, config: &Config) -> Result<(), ServiceError> 
         None if config.require_keys => Err(ServiceError::KeysRequired),
         None => Ok(()),
     }
-}
-
-/// After a failed fsync or an I/O error memory and disk may disagree: only a restart finds the truth.
-fn exit_on_fatal(store: Store) {
-    const EXIT_STORE_FAILED: i32 = 74;
-    tokio::spawn(async move {
-        let error = store.until_fatal().await;
-        tracing::error!(error = &error as &dyn std::error::Error, "the store failed; exiting");
-        std::process::exit(EXIT_STORE_FAILED);
-    });
 }

@@ -8,10 +8,11 @@ use super::content::read;
 use super::drift::DriftLevel;
 use super::due::{first_day, next_day};
 use super::error::ServiceError;
+use super::keys::Caller;
 use super::metrics;
 use super::sessions::Sessions;
 use crate::store::{
-    Care, CareCounts, SessionList, SessionPlace, SessionQuery, SessionSummary, StoreError, Tenant, Today,
+    Care, CareCounts, Counted, SessionList, SessionPlace, SessionQuery, SessionSummary, StoreError, Today,
 };
 
 /// A session of a list, and where it stands by its last entry.
@@ -34,30 +35,34 @@ pub struct Overview {
     pub damaged: Vec<String>,
     /// The place of the last row, sound or not, if the page is full.
     pub last: Option<SessionPlace>,
-    pub total: usize,
-    /// Of those that match in whatever state, on the first page.
+    /// Where it was asked for.
+    pub total: Option<usize>,
+    /// Of those that match in whatever state, where it was asked for.
     pub care: Option<CareCounts>,
 }
 
 impl Sessions {
-    /// Sessions of a tenant as they are asked for.
+    /// Sessions of the caller's tenant as they are asked for, one statement after the other in its turn.
     ///
     /// # Errors
-    /// The store does not answer.
-    pub async fn list(&self, tenant: &Tenant, asked: SessionQuery) -> Result<Overview, ServiceError> {
+    /// The store does not answer; no turn came in time.
+    pub async fn list(&self, caller: &Caller, asked: SessionQuery) -> Result<Overview, ServiceError> {
+        let (_turn, tenant) = (self.listing.of(&caller.allowance).await?, &caller.tenant);
         let now_ms = self.clock.now_milliseconds();
         let today = day_of(now_ms);
         let calendars = self.store.calendars(tenant).await?;
         let first_days = calendars.into_iter().filter_map(|periods| first_day(today?, periods)).collect();
         let asked = SessionQuery { today: Today { first_days }, ..asked };
-        let counted = async {
-            match asked.after {
-                None => self.store.care(tenant, &asked).await.map(Some),
-                Some(_) => Ok(None),
-            }
+        let sessions = self.store.sessions(tenant, &asked).await?;
+        let total = match asked.counted {
+            Counted::Nothing => None,
+            Counted::Total | Counted::Care => Some(self.store.total(tenant, &asked).await?),
         };
-        let (SessionList { sessions, damaged, last, total }, care) =
-            tokio::try_join!(self.store.sessions(tenant, &asked), counted)?;
+        let care = match asked.counted {
+            Counted::Care => Some(self.store.care(tenant, &asked).await?),
+            Counted::Nothing | Counted::Total => None,
+        };
+        let SessionList { sessions, damaged, last } = sessions;
         let damaged = damaged.into_iter().map(|(session, what)| {
             let error = StoreError::Corrupt { what };
             metrics::count_failure(&error);

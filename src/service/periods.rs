@@ -10,7 +10,7 @@ use super::acknowledged::Acknowledged;
 use super::answer::Corrected;
 use super::assets::{Assets, Composed, PlannedAssets};
 use super::change::Change;
-use super::content::read;
+use super::content::{answer, content};
 use super::error::ServiceError;
 use super::plan::{Plan, Renew, Renewed, Stretch};
 use super::record::{Record, Seen};
@@ -110,29 +110,35 @@ impl Periods {
             history,
             composed: BTreeMap::new(),
         };
+        let names = plan.names();
         for (index, entry) in entries.iter().enumerate() {
             match entry.kind {
                 EntryKind::Observation => periods.all.push(Period {
-                    report: read(&entry.content_json)?,
-                    acknowledged: Some(read(&entry.answer_json)?),
+                    report: content(entry, names)?,
+                    acknowledged: Some(answer(entry, names)?),
                     stands: true,
                     entry: index,
                     corrections: Vec::new(),
                 }),
                 EntryKind::Correction => {
-                    periods.correct(&read(&entry.content_json)?, index)?;
-                    let told = read::<Corrected>(&entry.answer_json)?.assets;
+                    periods.correct(&content(entry, names)?, index)?;
+                    let told = answer::<Corrected>(entry, names)?.assets;
                     periods.tell(told);
                 }
                 EntryKind::Renewal => {
-                    let renew: Renew = read(&entry.content_json)?;
-                    let Renewed { terms, assets, .. } = read(&entry.answer_json)?;
+                    let renew: Renew = content(entry, names)?;
+                    let Renewed { terms, assets, .. } = answer(entry, names)?;
                     periods.tell(assets);
                     periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
         }
         Ok(periods)
+    }
+
+    /// Names of the assets where there are several; none of one.
+    pub(super) fn names(&self) -> &[String] {
+        self.start.names()
     }
 
     /// What an entry told of several assets that is no period.

@@ -177,6 +177,11 @@ impl Plan {
         json(self)
     }
 
+    /// Names of the assets where there are several; none of one.
+    pub(super) fn names(&self) -> &[String] {
+        self.assets.as_ref().map_or(&[][..], |assets| &assets.names)
+    }
+
     /// Of a session as it was opened.
     pub(super) fn of(row: &SessionRow) -> Result<Self, ServiceError> {
         read(&row.plan_json)

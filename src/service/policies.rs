@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::Semaphore;
 
+use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::memory::{Large, Memory};
@@ -25,12 +26,14 @@ pub struct Policies {
     memory: Memory,
     kept: Kept,
     preparing: Semaphore,
+    /// Where imported documents are checked.
+    decoding: Bounded,
 }
 
 impl Policies {
-    pub(super) fn new(store: Store, memory: Memory) -> Self {
+    pub(super) fn new(store: Store, memory: Memory, decoding: Bounded) -> Self {
         let kept = memory.kept();
-        Policies { store, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME) }
+        Policies { store, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME), decoding }
     }
 
     async fn get(&self, tenant: &Tenant, policy: &str) -> Result<PolicyRow, ServiceError> {
@@ -117,12 +120,12 @@ impl Policies {
     /// The document is not a usable policy, or one that takes more memory than can be kept ready.
     pub async fn import(&self, caller: &Caller, document: Policy) -> Result<String, ServiceError> {
         let memory = self.memory.clone();
-        let checked = tokio::task::spawn_blocking(move || {
+        let check = move || {
             let policy = document.checked()?;
             memory.keeps(&estimate::advising_by(&policy))?;
             policy.to_json().map_err(ServiceError::internal)
-        });
-        let json = checked.await.map_err(ServiceError::internal)??;
+        };
+        let json = self.decoding.run(&caller.tenant, check).await??;
         let policy = content_hash(&json);
         let actor = caller.actor();
         let imported_ms = actor.at_ms;

@@ -4,11 +4,12 @@
 //! is not, and is decided anew on what is there now: observations and corrections of all processes have one order.
 
 use jiff::Timestamp;
+use serde::Serialize;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
-use super::answer::Corrected;
-use super::content::json;
+use super::answer::{Corrected, Observed};
+use super::content::{self, Packed, json};
 use super::corrections::PutRight;
 use super::drift::{self, DriftLevel};
 use super::error::ServiceError;
@@ -16,7 +17,7 @@ use super::keys::Caller;
 use super::live::{Live, measured};
 use super::memory::Large;
 use super::periods::Periods;
-use super::plan::Plan;
+use super::plan::{Plan, Renewed};
 use super::report::{Correct, Observe};
 use super::sessions::{Name, Sessions};
 use super::slots::Held;
@@ -34,23 +35,26 @@ impl Sessions {
     pub async fn observe(&self, tenant: &Tenant, observe: &Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
         let (session, period) = (&observe.session, numbered("period", observe.period)?);
         let report = observe.report();
-        let content = json(&report)?;
         let mut held = self.hold(tenant, session).await;
         loop {
             let live = held.current(&self.rows(tenant, session)).await?;
             if period <= live.observed {
-                return self.repeat(session, EntryKind::Observation, period, &content).await;
+                let names = live.standing.names();
+                return self.repeat(session, (EntryKind::Observation, period), &report, names).await;
             }
             live.expects(period)?;
             let means = self.means(tenant, live, turn).await?;
             let (standing, answer) = live.after(observe, &report, (&means, self.clock.today())).await?;
+            let Packed { content_json, answer_json, numbers, sent } =
+                Packed::of(&report, &answer, live.standing.names())?;
             let new = EntryRow {
                 session: session.clone(),
                 entry: live.seen.entries() + 1,
                 kind: EntryKind::Observation,
                 number: period,
-                content_json: content.clone(),
-                answer_json: json(&answer)?,
+                content_json,
+                answer_json,
+                numbers,
                 created_ms: self.clock.now_milliseconds(),
                 key: observe.reported_by.to_string(),
             };
@@ -67,8 +71,8 @@ impl Sessions {
                 radius: Some(answer.uncertainty.radius),
                 advice: None,
             };
-            if let Some(answer_json) = self.append(&self.store, &mut held, new, next, levels).await? {
-                return Ok(answer_json);
+            if self.append(&self.store, &mut held, new, next, levels).await? {
+                return Ok(sent);
             }
         }
     }
@@ -88,22 +92,21 @@ impl Sessions {
     ) -> Result<String, ServiceError> {
         let number = numbered("correction", correct.correction)?;
         correct.check()?;
-        let (tenant, content) = (&caller.tenant, json(correct)?);
+        let tenant = &caller.tenant;
         let mut held = self.hold(tenant, session).await;
         loop {
             let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
             let mut periods = Periods::of(&facts)?;
             if is_repeat(EntryKind::Correction, number, periods.corrections)? {
-                return self.repeat(session, EntryKind::Correction, number, &content).await;
+                return self.repeat(session, (EntryKind::Correction, number), correct, periods.names()).await;
             }
             let (renewals, current) = (periods.renewals(), periods.current().clone());
             let advisor = self.policies.advisor(tenant, &current.policy).await?;
             current.follows(correct.period, advisor.specification().problem.framework)?;
             current.check_change(correct, periods.all.len())?;
             let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
-            let put_right = move || periods.put_right(&putting, entry, today);
             let PutRight { before, standing, observed, log_return, wealth_change } =
-                self.advising.run(tenant, put_right).await??;
+                self.advising.run(tenant, move || periods.put_right(&putting, entry, today)).await??;
             let step = current.step_from(observed, Plan::of(&facts.row)?.renew, renewals);
             let (standing, uncertainty) = measured(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
             let answer = Corrected {
@@ -121,13 +124,15 @@ impl Sessions {
                 uncertainty,
             };
             let levels = (before.bet.level(), answer.drift.level);
+            let Packed { content_json, answer_json, numbers, sent } = Packed::of(correct, &answer, standing.names())?;
             let new = EntryRow {
                 session: session.to_owned(),
                 entry: facts.seen.entries() + 1,
                 kind: EntryKind::Correction,
                 number,
-                content_json: content.clone(),
-                answer_json: json(&answer)?,
+                content_json,
+                answer_json,
+                numbers,
                 created_ms: self.clock.now_milliseconds(),
                 key: caller.key().to_string(),
             };
@@ -143,23 +148,22 @@ impl Sessions {
                 radius: Some(answer.uncertainty.radius),
                 advice: None,
             };
-            let store = self.store.by(caller.actor());
-            if let Some(answer_json) = self.append(&store, &mut held, new, next, levels).await? {
-                return Ok(answer_json);
+            if self.append(&self.store.by(caller.actor()), &mut held, new, next, levels).await? {
+                return Ok(sent);
             }
         }
     }
 
-    /// The first answer to what was recorded already.
+    /// The first answer to what was recorded already of a session of the assets `names`.
     pub(super) async fn repeat(
         &self,
         session: &str,
-        kind: EntryKind,
-        number: usize,
-        content: &str,
+        (kind, number): (EntryKind, usize),
+        content: &(impl Serialize + Sync),
+        names: &[String],
     ) -> Result<String, ServiceError> {
         match self.store.entry(session, kind, number).await? {
-            Some(row) if row.content_json == content => Ok(row.answer_json),
+            Some(row) if content::records(&row, content, names)? => sent(row, names),
             Some(row) if kind == EntryKind::Renewal => Err(ServiceError::RenewedAlready {
                 number,
                 by: if row.key.is_empty() { "the service".to_owned() } else { format!("the key {}", row.key) },
@@ -170,8 +174,8 @@ impl Sessions {
         }
     }
 
-    /// Appends the entry that leads to `next` from one level of drift to another, and gives its answer; `None` where another process wrote meanwhile. Memory is
-    /// empty while it is under way, so that it never runs ahead of the disk.
+    /// Appends the entry that leads to `next` from one level of drift to another; false where another process wrote meanwhile.
+    /// Memory is empty while it is under way, so that it never runs ahead of the disk.
     async fn append(
         &self,
         store: &Store,
@@ -179,18 +183,17 @@ impl Sessions {
         new: EntryRow,
         next: Live,
         levels: (DriftLevel, DriftLevel),
-    ) -> Result<Option<String>, ServiceError> {
+    ) -> Result<bool, ServiceError> {
         held.clear();
-        let answer_json = new.answer_json.clone();
         let due = next.is_due().then(|| (next.row.tenant.clone(), next.row.session.clone()));
         let appended = store.append(new).instrument(spans::of_write("append an entry")).await?;
-        let answer = self.settled(held, appended, answer_json, next)?;
-        if answer.is_some() {
+        let is_appended = self.settled(held, appended, next)?;
+        if is_appended {
             drift::count(levels.0, levels.1);
             // Where too many are to be renewed already, a round finds it.
             due.map(|name| self.due.try_send(name));
         }
-        Ok(answer)
+        Ok(is_appended)
     }
 
     /// As [`Self::append`], of an entry that the store has decided on.
@@ -198,19 +201,28 @@ impl Sessions {
         &self,
         held: &mut Held<Name, Live>,
         appended: Append,
-        answer_json: String,
         next: Live,
-    ) -> Result<Option<String>, ServiceError> {
+    ) -> Result<bool, ServiceError> {
         match appended {
             Append::Appended => {
                 self.weigh(&next);
                 held.put(next);
-                Ok(Some(answer_json))
+                Ok(true)
             }
-            Append::NotNext => Ok(None),
+            Append::NotNext => Ok(false),
             Append::NoSession => Err(ServiceError::unknown("session", &next.row.session)),
             Append::NoPolicy => Err(ServiceError::unknown("policy", &next.current.policy)),
         }
+    }
+}
+
+/// The answer of an entry as it was sent.
+fn sent(row: EntryRow, names: &[String]) -> Result<String, ServiceError> {
+    match row.kind {
+        _ if names.is_empty() => Ok(row.answer_json),
+        EntryKind::Observation => json(&content::answer::<Observed>(&row, names)?),
+        EntryKind::Correction => json(&content::answer::<Corrected>(&row, names)?),
+        EntryKind::Renewal => json(&content::answer::<Renewed>(&row, names)?),
     }
 }
 

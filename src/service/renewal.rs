@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
-use super::content::json;
+use super::content::Packed;
 use super::error::ServiceError;
 use super::live::{Live, measured};
 use super::memory::Large;
@@ -39,28 +39,27 @@ impl Sessions {
     ) -> Result<String, ServiceError> {
         let number = numbered("renewal", renew.renewal)?;
         check_window("window", renew.window)?;
-        let content = json(renew)?;
         let mut held = self.hold(tenant, session).await;
         loop {
             let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
             let periods = Periods::of(&facts)?;
             if is_repeat(EntryKind::Renewal, number, periods.renewals())? {
-                return self.repeat(session, EntryKind::Renewal, number, &content).await;
+                return self.repeat(session, (EntryKind::Renewal, number), renew, periods.names()).await;
             }
             if number > MOST_RENEWALS {
                 let rule = format!("must be at most {MOST_RENEWALS}: open a session on the record as it is now");
                 return Err(FieldError::new("renewal", number, rule).into());
             }
-            let Decided { new, onto, next } = self.decided((tenant, turn), &by, facts, periods, renew).await?;
-            let (store, answer_json) = (self.store.by(by.clone()), new.answer_json.clone());
+            let Decided { new, sent, onto, next } = self.decided((tenant, turn), &by, facts, periods, renew).await?;
+            let store = self.store.by(by.clone());
             held.clear();
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
-            if let Some(answer_json) = self.settled(&mut held, appended, answer_json, next)? {
+            if self.settled(&mut held, appended, next)? {
                 if turn.is_some() {
                     // By a caller: what the session requested is requested no more.
                     let _ = self.due.try_send((tenant.clone(), session.to_owned()));
                 }
-                return Ok(answer_json);
+                return Ok(sent);
             }
         }
     }
@@ -103,13 +102,15 @@ impl Sessions {
             assets: standing.assets.as_ref().map(|assets| assets.composed()),
             uncertainty,
         };
+        let Packed { content_json, answer_json, numbers, sent } = Packed::of(renew, &answer, standing.names())?;
         let new = EntryRow {
             session: facts.row.session.clone(),
             entry: facts.seen.entries() + 1,
             kind: EntryKind::Renewal,
             number: renew.renewal,
-            content_json: json(renew)?,
-            answer_json: json(&answer)?,
+            content_json,
+            answer_json,
+            numbers,
             created_ms: self.clock.now_milliseconds(),
             key: by.key.to_string(),
         };
@@ -127,13 +128,15 @@ impl Sessions {
             radius,
             advice: None,
         };
-        Ok(Decided { new, onto, next })
+        Ok(Decided { new, sent, onto, next })
     }
 }
 
 /// A renewal to append, and where it leads.
 struct Decided {
     new: EntryRow,
+    /// The answer as it is sent.
+    sent: String,
     onto: Onto,
     next: Live,
 }

@@ -56,7 +56,8 @@ impl Sessions {
     /// The list is empty or too long, or names a session twice; nothing is recorded then.
     pub async fn report_all(&self, caller: &Caller, reports: Vec<Observe>) -> Result<Vec<Reported>, ServiceError> {
         check(&reports)?;
-        let lane = Arc::new(Semaphore::new(self.resolving.first));
+        // As many at a time as can begin, and no more than the tenant's heavy calls may be.
+        let lane = Arc::new(Semaphore::new(self.resolving.of_one.min(caller.allowance.heavy_of_one())));
         let doubts = self.peer_doubts(caller, &reports).await;
         let elements = reports.into_iter().zip(doubts).enumerate().map(|(index, (report, peer_doubts))| {
             let report = Observe { peer_doubts, ..report };

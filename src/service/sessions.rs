@@ -32,6 +32,7 @@ use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
 use super::standing::Standing;
+use super::turns::Turns;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
@@ -46,6 +47,10 @@ const PROMPT_ENTRIES: usize = 520;
 const RETURNS_AN_ENTRY: usize = 2000;
 /// Entries are held as rows and as what is read from them.
 const FORMS_OF_ENTRIES: usize = 2;
+
+/// Lists of sessions that read at a time: fewer than the store has connections for lists, so that those of jobs, policies and
+/// labels, which read what they show, always find one.
+const LISTS: usize = 2;
 
 /// Whose session it is, and its name.
 pub(super) type Name = (Tenant, String);
@@ -130,6 +135,7 @@ pub struct Sessions {
     pub(super) due: Sender<Name>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,
+    pub(super) listing: Turns,
 }
 
 impl Sessions {
@@ -144,10 +150,11 @@ impl Sessions {
         let size = |first| Size { first, long: config.long_limit };
         let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
         let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
+        let listing = Turns::new(LISTS, config.turn_wait);
         // Two generations are kept.
         let weight = memory.for_sessions() / 2;
         let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
-        Sessions { store, clock, policies, memory: memory.clone(), slots, due, advising, resolving }
+        Sessions { store, clock, policies, memory: memory.clone(), slots, due, advising, resolving, listing }
     }
 
     /// Opens a session. The same key and start again give the same session as it was opened.
@@ -186,6 +193,7 @@ impl Sessions {
             horizon: plan.terms.horizon,
             plan_json: plan.json()?,
             due: renew.map(|renew| renew.every),
+            assets: assets.as_ref().map_or(0, |assets| assets.names.len()),
             created_ms: self.clock.now_milliseconds(),
         };
         let new = self.store.about_to_open(&row);
@@ -204,11 +212,10 @@ impl Sessions {
             CreateSession::NoPolicy => return Err(ServiceError::unknown("policy", &row.policy)),
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
-        let standing = Standing::at(&row.session, state, assets);
         let current = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         let live = Live {
+            standing: Standing::at(&row.session, state, assets),
             row: Arc::new(row),
-            standing,
             observed: 0,
             corrections: 0,
             renewals: 0,
@@ -253,11 +260,6 @@ impl Sessions {
     pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
         let mut held = self.hold(tenant, session).await;
         held.current(&self.rows(tenant, session)).await.cloned()
-    }
-
-    /// Requests that wait for their turn to be advised, and to have a step solved.
-    pub fn waiting(&self) -> [(&'static str, usize); 2] {
-        [&self.advising, &self.resolving].map(|turns| (turns.name, turns.waiting()))
     }
 
     /// # Errors

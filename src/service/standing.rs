@@ -92,6 +92,11 @@ impl Standing {
         Ok(Standing { state, assets, price, days, bet, seen, session: self.session.clone() })
     }
 
+    /// Names of the assets where there are several; none of one.
+    pub(super) fn names(&self) -> &[String] {
+        self.assets.as_ref().map_or(&[][..], |assets| &assets.names)
+    }
+
     /// What `report` tells of the coming period.
     ///
     /// # Errors

@@ -244,8 +244,8 @@ impl Chain {
         }
         // Held from here on, so that no two begin the same chain or have one place.
         let hold = query(
-            "INSERT INTO audit_total (only, chains, seal) VALUES (1, 0, $1)
-             ON CONFLICT (only) DO UPDATE SET chains = audit_total.chains RETURNING chains",
+            "INSERT INTO audit_total (row_id, chains, seal) VALUES (1, 0, $1)
+             ON CONFLICT (row_id) DO UPDATE SET chains = audit_total.chains RETURNING chains",
         );
         let held = connection.row(hold.bind(total_seal(0).finish())).await?;
         let place = 1 + held.map_or(Ok(0), |row| row.get::<i64>("chains"))?;

@@ -17,7 +17,7 @@ use super::error::{Cause, Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
 use super::query::{Connection, Query, Row, query};
-use super::quotas::{ENTRY_BYTES, ROW_BYTES};
+use super::quotas::{ASSET_BYTES, ENTRY_BYTES, ROW_BYTES};
 use super::sessions::SessionRow;
 use super::{PostgresUrl, entries, leases, migrations, policies, postgres, sqlite};
 
@@ -25,7 +25,8 @@ const DOING: &str = "checking the store";
 /// Rows of jobs, policies or sessions read at a time.
 const PAGE: i64 = 256;
 
-/// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an entry $2.
+/// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an entry $2 and for
+/// each of several assets $3.
 pub(super) const TOTALS: &str = "
     WITH parts (tenant, sessions, bytes) AS (
         SELECT tenant, 0, $1 FROM jobs
@@ -36,7 +37,8 @@ pub(super) const TOTALS: &str = "
             FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
         UNION ALL SELECT tenant, 0, octet_length(name) + octet_length(notes) + octet_length(tags)
             + octet_length(folded_name) + octet_length(folded_tags) FROM labels
-        UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + room * $2 FROM sessions
+        UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + octet_length(plan_json)
+            + room * ($2 + assets * $3) FROM sessions
     ), sums (tenant, sessions, bytes) AS (SELECT tenant, sum(sessions), sum(bytes) FROM parts GROUP BY tenant)
     SELECT coalesce(usage.tenant, sums.tenant) AS tenant, usage.sessions, CAST(sums.sessions AS BIGINT) AS counted,
            usage.bytes AS kept, CAST(sums.bytes AS BIGINT) AS summed
@@ -293,7 +295,7 @@ impl Inspection {
 
     /// What quotas go by: the totals of each tenant against its rows.
     async fn totals(&mut self) -> Result<usize, Failure> {
-        let totals = self.read(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES)).await?;
+        let totals = self.read(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES).bind(ASSET_BYTES)).await?;
         for row in &totals {
             let [kept, summed]: [Option<i64>; 2] = [row.get("kept")?, row.get("summed")?];
             let [sessions, counted]: [Option<i64>; 2] = [row.get("sessions")?, row.get("counted")?];

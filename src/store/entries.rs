@@ -14,7 +14,7 @@ use super::error::Failure;
 use super::head::Head;
 use super::postgres::Database;
 use super::query::{Connection, Query, Row, query};
-use super::quotas::{self, ENTRY_BYTES, Quotas, Usage};
+use super::quotas::{self, Quotas, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError};
 
@@ -40,6 +40,8 @@ pub struct EntryRow {
     /// What was reported: the same content under the same number is a repeat.
     pub content_json: String,
     pub answer_json: String,
+    /// Numbers that either of them names by their place.
+    pub numbers: Vec<u8>,
     pub created_ms: i64,
     /// The name of the key that reported it; empty where none was asked for.
     pub key: String,
@@ -124,16 +126,6 @@ impl Store {
     pub async fn entries(&self, session: &str) -> Result<Option<Vec<EntryRow>>, StoreError> {
         self.read("reading entries", all_of(session), |rows| numbered(session, rows)).await
     }
-
-    /// The newest observations of a session, newest first, as the audit shows them; none where it is no session.
-    pub(super) async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
-        let newest = query(
-            "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
-             WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
-        );
-        let decode = |rows: &[Row]| rows.iter().map(EntryRow::told).collect();
-        self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
-    }
 }
 
 pub(super) fn all_of(session: &str) -> Query {
@@ -200,7 +192,7 @@ async fn append_with_room(
     let (append, tenant) = append_next(connection, &new).await?;
     if append == Append::Appended {
         let outcome = format!("{} {} recorded", new.kind.counted(), new.number);
-        take_room(connection, &tenant, &new.session, 1, by, (Deed::Correct, &outcome)).await?;
+        take_room(connection, &tenant, &new.session, new.room(), by, (Deed::Correct, &outcome)).await?;
     }
     Ok(append)
 }
@@ -214,14 +206,14 @@ pub(super) async fn take_room(
     (quotas, actor): (Quotas, Actor),
     (deed, outcome): (Deed, &str),
 ) -> Result<(), Failure> {
-    let widen = query("UPDATE sessions SET room = room + $1 WHERE session = $2");
-    connection.execute(widen.bind(room).bind(session)).await?;
-    quotas::take(connection, tenant, Usage::of_bytes(room.saturating_mul(ENTRY_BYTES)), quotas).await?;
+    let widen = query("UPDATE sessions SET room = room + $1 WHERE session = $2 RETURNING assets");
+    let assets = connection.row(widen.bind(room).bind(session)).await?.map_or(Ok(0), |row| row.get("assets"))?;
+    quotas::take(connection, tenant, Usage::of_entries(room, assets), quotas).await?;
     audit_chain::record(connection, (quotas, &actor), tenant, deed, session, outcome).await
 }
 
-const NAMES: &str = "session, entry, kind, number, content_json, answer_json, created_ms, access_key, seal";
-const COLUMNS: usize = 9;
+const NAMES: &str = "session, entry, kind, number, content_json, answer_json, numbers, created_ms, access_key, seal";
+const COLUMNS: usize = 10;
 /// The entry after the last that `new.session` has.
 const NEXT: &str = "(SELECT coalesce(max(entry), 0) + 1 FROM entries WHERE entries.session = new.session)";
 
@@ -281,6 +273,7 @@ fn bind_row(insert: Query, new: &EntryRow) -> Query {
         .bind(to_sql(new.number))
         .bind(new.content_json.as_str())
         .bind(new.answer_json.as_str())
+        .bind(new.numbers.clone())
         .bind(new.created_ms)
         .bind(new.key.as_str())
         .bind(new.seal().finish())
@@ -292,6 +285,12 @@ impl EntryRow {
         Head { entries: self.entry, seal: self.seal().finish() }
     }
 
+    /// Entries that it is counted as: a correction may have a long reason.
+    fn room(&self) -> i64 {
+        let lengths = [self.content_json.len(), self.answer_json.len(), self.session.len(), self.key.len()];
+        1 + (quotas::SEALED_BYTES + to_sql(lengths.into_iter().sum())) / quotas::ENTRY_BYTES
+    }
+
     fn seal(&self) -> Seal {
         Seal::of("entry")
             .text(&self.session)
@@ -300,12 +299,13 @@ impl EntryRow {
             .integer(to_sql(self.number))
             .text(&self.content_json)
             .text(&self.answer_json)
+            .bytes(&self.numbers)
             .integer(self.created_ms)
             .text(&self.key)
     }
 
     /// An observation as the audit shows it, its own seal verified.
-    fn told(row: &Row) -> Result<AuditRow, Failure> {
+    pub(super) fn told(row: &Row) -> Result<AuditRow, Failure> {
         let observation = EntryRow::from_row(row)?;
         Ok(AuditRow {
             sequence: 0,
@@ -329,6 +329,7 @@ impl EntryRow {
             number: from_sql(row.get("number")?)?,
             content_json: row.get("content_json")?,
             answer_json: row.get("answer_json")?,
+            numbers: row.get("numbers")?,
             created_ms: row.get("created_ms")?,
             key: row.get("access_key")?,
         };

@@ -25,8 +25,8 @@ impl Store {
         self.write("storing a heartbeat", move |mut connection| {
             async move {
                 let beat = query(
-                    "INSERT INTO heartbeat (only, at_ms) VALUES (1, $1)
-                     ON CONFLICT (only) DO UPDATE SET at_ms = excluded.at_ms",
+                    "INSERT INTO heartbeat (row_id, at_ms) VALUES (1, $1)
+                     ON CONFLICT (row_id) DO UPDATE SET at_ms = excluded.at_ms",
                 );
                 connection.execute(beat.bind(at_ms)).await.map(drop)
             }

@@ -18,6 +18,7 @@ use super::quotas::{self, Usage};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 use crate::control::error::FieldError;
+use crate::control::request::text::check_text;
 
 /// Letters of a name, of notes and of a tag.
 pub const LONGEST_NAME: usize = 100;
@@ -67,10 +68,10 @@ impl Relabel {
     /// The first field that breaks its rule.
     pub fn check(&self) -> Result<(), FieldError> {
         if let Some(name) = &self.name {
-            text("name", name, 0..=LONGEST_NAME, char::is_control)?;
+            check_text("name", name, 0..=LONGEST_NAME, &[])?;
         }
         if let Some(notes) = &self.notes {
-            text("notes", notes, 0..=LONGEST_NOTES, |letter| letter.is_control() && letter != '\n')?;
+            check_text("notes", notes, 0..=LONGEST_NOTES, &['\n'])?;
         }
         let tags = self.tags.as_deref().unwrap_or_default();
         if tags.len() > MOST_TAGS {
@@ -80,7 +81,7 @@ impl Relabel {
         let mut seen = HashSet::new();
         for (index, tag) in tags.iter().enumerate() {
             let field = format!("tags[{index}]");
-            text(&field, tag, 1..=LONGEST_TAG, char::is_control)?;
+            check_text(&field, tag, 1..=LONGEST_TAG, &[])?;
             if !seen.insert(tag) {
                 return Err(FieldError::new(field, tag, "must be another than those before it"));
             }
@@ -92,21 +93,6 @@ impl Relabel {
     pub fn is_empty(&self) -> bool {
         *self == Relabel::default()
     }
-}
-
-fn text(
-    field: &str,
-    value: &str,
-    lengths: std::ops::RangeInclusive<usize>,
-    is_refused: fn(char) -> bool,
-) -> Result<(), FieldError> {
-    let letters = value.chars().count();
-    if lengths.contains(&letters) && !value.contains(is_refused) {
-        return Ok(());
-    }
-    let rule = format!("must have {} to {} letters, without control characters", lengths.start(), lengths.end());
-    let shown = if lengths.contains(&letters) { format!("{value:?}") } else { format!("{letters} letters") };
-    Err(FieldError::new(field, shown, rule))
 }
 
 impl Labels {

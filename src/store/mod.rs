@@ -79,7 +79,9 @@ pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, New
 pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, StoredKeys, Successor};
 pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labelled, Labels, MOST_TAGS, Relabel, given};
-pub use overview::{SessionIs, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary};
+pub use overview::{
+    Counted, SessionIs, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
+};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary, Stored};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};

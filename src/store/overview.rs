@@ -45,6 +45,17 @@ pub enum SessionIs {
     Needing(Option<Care>),
 }
 
+/// What is counted beside a page, each of which reads every session that matches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Counted {
+    #[default]
+    Nothing,
+    /// Those that match.
+    Total,
+    /// Those that match, and those of them that need care.
+    Care,
+}
+
 /// What is asked of a list of sessions; all of them, as they were opened, where nothing is given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionQuery {
@@ -58,6 +69,7 @@ pub struct SessionQuery {
     pub order: SessionOrder,
     pub descending: bool,
     pub limit: usize,
+    pub counted: Counted,
     /// The last row of the page before.
     pub after: Option<SessionPlace>,
 }
@@ -106,7 +118,7 @@ pub struct SessionSummary {
     pub place: SessionPlace,
 }
 
-/// A page of sessions, and how many match in all.
+/// A page of sessions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionList {
     pub sessions: Vec<SessionSummary>,
@@ -114,7 +126,6 @@ pub struct SessionList {
     pub damaged: Vec<(String, String)>,
     /// The place of the last row, sound or not, if the page is full.
     pub last: Option<SessionPlace>,
-    pub total: usize,
 }
 
 const WEALTH: &str =
@@ -122,14 +133,15 @@ const WEALTH: &str =
     AS DOUBLE PRECISION), sessions.initial_wealth)";
 
 impl Store {
-    /// Sessions of a tenant.
+    /// A page of the sessions of a tenant.
     pub async fn sessions(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<SessionList, StoreError> {
-        let doing = "listing sessions";
-        let (page, count) = (asked.page(tenant), asked.count(tenant));
-        let decode = |rows: &[Row]| asked.listed(rows);
-        let counted = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get::<i64>("total"));
-        let (list, total) = futures_util::try_join!(self.list(doing, page, decode), self.list(doing, count, counted))?;
-        Ok(SessionList { total: usize::try_from(total).unwrap_or_default(), ..list })
+        self.list("listing sessions", asked.page(tenant), |rows| asked.listed(rows)).await
+    }
+
+    /// Counts the sessions of a tenant that match.
+    pub async fn total(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<usize, StoreError> {
+        let decode = |rows: &[Row]| rows.first().map_or(Ok(0), |row| from_sql(row.get("total")?));
+        self.list("counting sessions", asked.count(tenant), decode).await
     }
 
     /// Counts what needs care among the sessions that match, in whatever state.
@@ -142,7 +154,7 @@ impl SessionQuery {
     fn listed(&self, rows: &[Row]) -> Result<SessionList, Failure> {
         let last = rows.last().filter(|_| rows.len() == self.limit);
         let last = last.map(|row| self.order.place(row)).transpose()?;
-        let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last, total: 0 };
+        let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last };
         for row in rows {
             match SessionSummary::from_row(row, self.order) {
                 Ok(session) => list.sessions.push(session),
@@ -158,7 +170,7 @@ impl SessionQuery {
             "SELECT sessions.sequence, sessions.session, sessions.tenant, sessions.policy AS first_policy,
                     sessions.initial_wealth, sessions.initial_holding, sessions.history_seal,
                     sessions.horizon AS first_horizon, sessions.plan_json, sessions.created_ms, sessions.seal,
-                    last.entry, last.kind, last.number, last.content_json, last.access_key, last.seal AS last_seal,
+                    last.entry, last.kind, last.number, last.content_json, last.numbers, last.access_key, last.seal AS last_seal,
                     labels.name, labels.notes, labels.tags,
                     coalesce(renewals.policy, sessions.policy) AS policy, called.name AS policy_name,
                     policies.periods_per_year, {HORIZON} AS horizon, {OBSERVATIONS} AS observations, sessions.due,
@@ -282,7 +294,7 @@ impl SessionSummary {
     fn from_row(row: &Row, order: SessionOrder) -> Result<Self, Failure> {
         let observations = from_sql(row.get("observations")?)?;
         let due = row.get::<Option<i64>>("due")?.map(from_sql).transpose()?;
-        let start = start_of(row)?;
+        let start = SessionRow::start_of(row)?;
         let last = last_of(row)?;
         Ok(SessionSummary {
             session: start.session,
@@ -303,25 +315,6 @@ impl SessionSummary {
     }
 }
 
-/// The start of a session, verified; its history is not read.
-fn start_of(row: &Row) -> Result<SessionRow, Failure> {
-    let start = SessionRow {
-        session: row.get("session")?,
-        tenant: Tenant::stored(&row.get::<String>("tenant")?),
-        policy: row.get("first_policy")?,
-        initial_wealth: row.get("initial_wealth")?,
-        initial_holding: row.get("initial_holding")?,
-        initial_history: Vec::new(),
-        horizon: from_sql(row.get("first_horizon")?)?,
-        plan_json: row.get("plan_json")?,
-        due: None,
-        created_ms: row.get("created_ms")?,
-    };
-    let seal = start.seal_with(&row.get::<Vec<u8>>("history_seal")?);
-    seal.verify(&row.get::<Vec<u8>>("seal")?, || format!("the start of session {}", start.session))?;
-    Ok(start)
-}
-
 /// The last entry that moved a session, verified; `None` before the first.
 fn last_of(row: &Row) -> Result<Option<EntryRow>, Failure> {
     let Some(entry) = row.get::<Option<i64>>("entry")? else { return Ok(None) };
@@ -332,6 +325,7 @@ fn last_of(row: &Row) -> Result<Option<EntryRow>, Failure> {
         number: from_sql(row.get("number")?)?,
         content_json: row.get("content_json")?,
         answer_json: row.get("answer_json")?,
+        numbers: row.get("numbers")?,
         created_ms: row.get("reported_ms")?,
         key: row.get("access_key")?,
     };

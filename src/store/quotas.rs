@@ -4,8 +4,8 @@
 //! statement: whoever waits for the row waits for a commit and no more. Queued jobs are counted where they stand, up to
 //! the quota; those made for sessions have a bound of their own (`super::session_trainings`).
 //!
-//! Bytes are those of requests, reports, policies, histories and labels, and [`ROW_BYTES`] for each job, policy and session. A
-//! session takes the room of all its observations when it is opened: no return that an investor reports is ever refused
+//! Bytes are those of requests, reports, policies, histories, plans and labels, and [`ROW_BYTES`] for each job, policy and session.
+//! A session takes the room of all its observations when it is opened, each what the longest takes: no return that an investor reports is ever refused
 //! for a quota, nor is what a worker finished. Checkpoints are not counted; they go with the end of their job.
 //!
 //! Checked by: `tests/service/quotas.rs`, `tests/service/store_model.rs`.
@@ -20,9 +20,13 @@ use super::{Store, StoreError};
 
 /// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
 pub(super) const ROW_BYTES: i64 = 1024;
-/// What one entry of a session takes with its report, its answer, its seal and its index entry: some 900 bytes, up to 1,100
-/// where everything of a period is reported, and more where a correction has a long reason (`docs/capacity.md`).
+/// What one entry of a session takes with its report, its answer, its seal and its index entry: some 900 bytes, and up to 1,400
+/// where everything of a period is reported (`docs/capacity.md`).
 pub(super) const ENTRY_BYTES: i64 = 1536;
+/// Of them, what every entry takes with its seal, its numbers and its index entry.
+pub(super) const SEALED_BYTES: i64 = 160;
+/// What it takes more for each of several assets: eleven numbers, three of them reported and eight answered.
+pub(super) const ASSET_BYTES: i64 = 11 * 8;
 
 /// What every tenant may keep; 0: any number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,10 +61,15 @@ impl Usage {
         Usage { sessions: 0, bytes }
     }
 
-    /// Of a session, with `room` for so many entries.
-    pub(super) fn of_session(history_bytes: i64, room: i64) -> Self {
-        let entries = room.saturating_mul(ENTRY_BYTES);
-        Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(history_bytes).saturating_add(entries) }
+    /// Of a session, with `room` for so many entries of so many assets.
+    pub(super) fn of_session(start_bytes: i64, room: i64, assets: i64) -> Self {
+        let entries = Usage::of_entries(room, assets).bytes;
+        Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(start_bytes).saturating_add(entries) }
+    }
+
+    /// Of so many entries of so many assets.
+    pub(super) fn of_entries(room: i64, assets: i64) -> Self {
+        Usage::of_bytes(room.saturating_mul(entry_bytes(assets)))
     }
 
     /// Of both together.
@@ -71,6 +80,11 @@ impl Usage {
     pub(super) fn given_back(self) -> Self {
         Usage { sessions: -self.sessions, bytes: -self.bytes }
     }
+}
+
+/// Bytes that an entry is counted with; 0 assets where there is one.
+pub(super) fn entry_bytes(assets: i64) -> i64 {
+    ENTRY_BYTES.saturating_add(assets.saturating_mul(ASSET_BYTES))
 }
 
 impl Store {

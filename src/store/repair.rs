@@ -21,7 +21,7 @@ use super::keys::KeyRow;
 use super::migrations;
 use super::policies;
 use super::query::{Connection, Row, query};
-use super::quotas::{ENTRY_BYTES, Quotas, ROW_BYTES};
+use super::quotas::{ASSET_BYTES, ENTRY_BYTES, Quotas, ROW_BYTES};
 use super::sessions::SessionRow;
 use super::sqlite::opening::{DATABASE, connect, existing, lock, opening, version};
 use super::tenant::Tenant;
@@ -76,6 +76,7 @@ const SESSIONS: Table = Table {
         "initial_history",
         "horizon",
         "plan_json",
+        "assets",
         "created_ms",
         "seal",
     ],
@@ -86,7 +87,7 @@ const ENTRIES: Table = Table {
     name: "entries",
     of: "session",
     number: Some("entry"),
-    columns: &["kind", "number", "content_json", "answer_json", "created_ms", "access_key", "seal"],
+    columns: &["kind", "number", "content_json", "answer_json", "numbers", "created_ms", "access_key", "seal"],
     others: &[],
     verify: |row| EntryRow::from_row(row).map(drop),
 };
@@ -230,7 +231,7 @@ impl Repairs<'_> {
 
     /// Sums the totals of each tenant anew, or of one.
     async fn totals(&mut self, only: Option<&Tenant>) -> Result<(), Failure> {
-        for row in self.connection.rows(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES)).await? {
+        for row in self.connection.rows(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES).bind(ASSET_BYTES)).await? {
             let tenant: String = row.get("tenant")?;
             let sum = |column: &str| row.get::<Option<i64>>(column).map(Option::unwrap_or_default);
             let (kept, summed) = ((sum("sessions")?, sum("kept")?), (sum("counted")?, sum("summed")?));

@@ -2,7 +2,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, Deed};
+use super::audit::{Actor, AuditRow, Deed};
 use super::audit_chain;
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::entries::EntryRow;
@@ -48,6 +48,8 @@ pub struct SessionRow {
     pub plan_json: String,
     /// Periods after which it is due to be renewed by itself. It finds sessions, and no seal covers it.
     pub due: Option<usize>,
+    /// Number of assets where there are several, 0 of one. It counts bytes, and no seal covers it.
+    pub assets: usize,
     pub created_ms: i64,
 }
 
@@ -98,15 +100,27 @@ impl Store {
         Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
     }
 
-    /// Bytes of the entries of a session; none where it is no session.
+    /// Bytes of the entries of a session as they are read: of several assets with their names, which a plan has half as often as an entry;
+    /// none where it is no session.
     pub async fn entry_bytes(&self, session: &str) -> Result<usize, StoreError> {
         let sum = query(
-            "SELECT CAST(coalesce(sum(octet_length(content_json) + octet_length(answer_json)), 0) AS BIGINT) AS bytes
-             FROM entries WHERE session = $1",
+            "SELECT CAST(coalesce(sum(octet_length(content_json) + octet_length(answer_json)
+                        + CASE WHEN octet_length(numbers) > 0 THEN 2 * octet_length(plan_json) ELSE 0 END), 0) AS BIGINT) AS bytes
+             FROM entries JOIN sessions ON sessions.session = entries.session WHERE entries.session = $1",
         );
         let summed = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get("bytes"));
         let bytes: i64 = self.read("measuring entries", sum.bind(session), summed).await?;
         Ok(usize::try_from(bytes).unwrap_or_default())
+    }
+
+    /// The newest observations of a session, newest first, as the audit shows them; none where it is no session.
+    pub(super) async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
+        let newest = query(
+            "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
+             WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
+        );
+        let decode = |rows: &[Row]| rows.iter().map(EntryRow::told).collect();
+        self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
     }
 
     /// Deletes a session of a tenant and its entries. False where there was none.
@@ -151,8 +165,8 @@ async fn create(
         let earlier = repeated(connection, &row.tenant, key).await?;
         return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
     }
-    let history_bytes = quotas::length(&encode_reals(&row.initial_history));
-    let mut usage = Usage::of_session(history_bytes, to_sql(row.horizon));
+    let start_bytes = quotas::length(&encode_reals(&row.initial_history)) + quotas::length(row.plan_json.as_bytes());
+    let mut usage = Usage::of_session(start_bytes, to_sql(row.horizon), to_sql(row.assets));
     if !labels.is_empty() {
         usage = usage.and(labels::put(connection, &row.tenant, &row.session, &labels).await?.1);
     }
@@ -189,8 +203,8 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
     }
     let insert = query(
         "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, room, created_ms,
-                               seal, tenant, plan_json, due, history_seal)
-         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11, $12) ON CONFLICT (session) DO NOTHING",
+                               seal, tenant, plan_json, due, history_seal, assets)
+         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11, $12, $13) ON CONFLICT (session) DO NOTHING",
     );
     let insert = insert
         .bind(row.session.as_str())
@@ -204,7 +218,8 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
         .bind(row.tenant.as_str())
         .bind(row.plan_json.as_str())
         .bind(row.due.map(to_sql))
-        .bind(history_seal(&row.initial_history));
+        .bind(history_seal(&row.initial_history))
+        .bind(to_sql(row.assets));
     let inserted = connection.execute(insert).await?;
     Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
 }
@@ -222,11 +237,11 @@ async fn delete(
     let entries: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("entries"))?;
     let delete = query(
         "DELETE FROM sessions WHERE session = $1 AND tenant = $2
-         RETURNING CAST(octet_length(initial_history) AS BIGINT) AS history_bytes, room",
+         RETURNING CAST(octet_length(initial_history) + octet_length(plan_json) AS BIGINT) AS start_bytes, room, assets",
     );
     let deleted = connection.row(delete.bind(session.as_str()).bind(tenant.as_str())).await?;
     let Some(row) = deleted else { return Ok(false) };
-    let usage = Usage::of_session(row.get("history_bytes")?, row.get("room")?);
+    let usage = Usage::of_session(row.get("start_bytes")?, row.get("room")?, row.get("assets")?);
     let usage = usage.and(labels::remove(connection, &tenant, &session).await?);
     quotas::change(connection, &tenant, usage.given_back()).await?;
     let outcome = format!("deleted, with {entries} entries");
@@ -263,6 +278,26 @@ impl SessionRow {
             .integer(self.created_ms)
     }
 
+    /// The start of a session in a list, verified; its history is not read.
+    pub(super) fn start_of(row: &Row) -> Result<Self, Failure> {
+        let start = SessionRow {
+            session: row.get("session")?,
+            tenant: Tenant::stored(&row.get::<String>("tenant")?),
+            policy: row.get("first_policy")?,
+            initial_wealth: row.get("initial_wealth")?,
+            initial_holding: row.get("initial_holding")?,
+            initial_history: Vec::new(),
+            horizon: from_sql(row.get("first_horizon")?)?,
+            plan_json: row.get("plan_json")?,
+            assets: 0,
+            due: None,
+            created_ms: row.get("created_ms")?,
+        };
+        let seal = start.seal_with(&row.get::<Vec<u8>>("history_seal")?);
+        seal.verify(&row.get::<Vec<u8>>("seal")?, || format!("the start of session {}", start.session))?;
+        Ok(start)
+    }
+
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let session: String = row.get("session")?;
         let what = || format!("the start of session {session}");
@@ -276,6 +311,7 @@ impl SessionRow {
             horizon: from_sql(row.get("horizon")?)?,
             plan_json: row.get("plan_json")?,
             due: row.get::<Option<i64>>("due")?.map(from_sql).transpose()?,
+            assets: from_sql(row.get("assets")?)?,
             created_ms: row.get("created_ms")?,
             session: session.clone(),
         };

@@ -20,6 +20,41 @@ impl Drop for Process {
     }
 }
 
+/// Eight clients send bodies of 4 MB, each of which takes far longer to decode than anybody should wait.
+#[tokio::test(flavor = "multi_thread")]
+async fn large_bodies_are_decoded_in_nobodys_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let (child, url) = process::serve(|command| {
+        command.arg("--data").arg(folder.path());
+    });
+    let (_process, app) = (Process(child), App::at(url, folder));
+    let report = r#"{"session":"session_0","period":1,"log_returns":{"one":0.1,"another":0.2}},"#;
+    let body = format!("[{}{{}}]", report.repeat(4_000_000 / report.len()));
+    let address = format!("{}/observe", app.url);
+    let attack = join_all((0..8).map(|_| async {
+        loop {
+            let asked = app.client.post(&address).header("content-type", "application/json").body(body.clone());
+            assert!(asked.send().await.unwrap().status().as_u16() >= 400);
+        }
+    }));
+    let victim = async {
+        let mut taken = Vec::new();
+        for _ in 0..100 {
+            let asked = Instant::now();
+            assert_eq!(app.get("/livez").await.0, 200);
+            taken.push(asked.elapsed());
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        taken.sort_unstable();
+        taken
+    };
+    let taken = tokio::select! {
+        _ = attack => unreachable!("it goes on until the victim is done"),
+        taken = victim => taken,
+    };
+    assert!(taken[89] < within(Duration::from_millis(100)), "{taken:?}");
+}
+
 const SLOW_SOCKETS: usize = 1000;
 /// What a call may take at most while all of them are open, on a machine that builds something else meanwhile.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(2);

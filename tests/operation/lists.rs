@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use crate::support::patience::within;
 use crate::support::{App, execute, postgres, specification};
 use ballast::service::config::StoreLocation;
+use futures_util::future::join_all;
 use serde_json::json;
 
 const JOBS: usize = 1000;
@@ -56,6 +57,60 @@ async fn a_list_of_large_jobs_is_quick_small_and_in_nobodys_way() {
         postgres::execute(&url, statement).await;
     }
     are_quick_small_and_in_nobodys_way(app, ACTION_BESIDE_A_DATABASE).await;
+}
+
+const SESSIONS: usize = 20_000;
+/// Of a list of another tenant meanwhile, where each of the lists before it takes several times as long.
+const OTHER_LIST: Duration = Duration::from_millis(400);
+
+/// One tenant puts all its sessions in order, eight lists at a time; another's lists find a connection.
+#[tokio::test(flavor = "multi_thread")]
+async fn long_lists_of_one_tenant_are_in_nobodys_way() {
+    let mut app = App::start().await;
+    let (north, south) = (app.key("north", "admin").await, app.key("south", "admin").await);
+    app.enter(&north).await;
+    app.train(&specification(3)).await;
+    app.open().await;
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+    for statement in [
+        "WITH RECURSIVE numbers (n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM numbers WHERE n < 20000)
+         INSERT INTO sessions (session, tenant, policy, initial_wealth, initial_holding, initial_history, history_seal,
+                               horizon, plan_json, room, assets, created_ms, seal)
+         SELECT printf('session_%032d', n), tenant, policy, initial_wealth, initial_holding, initial_history, history_seal,
+                horizon, plan_json, room, assets, n, seal FROM numbers CROSS JOIN sessions",
+        "INSERT INTO entries SELECT sessions.session, entry, kind, number, content_json, answer_json, numbers,
+                entries.created_ms, access_key, entries.seal
+         FROM sessions CROSS JOIN entries WHERE sessions.session LIKE 'session_0000%'",
+    ] {
+        execute(app.folder(), statement).await;
+    }
+    let all = format!("{}/sessions?sort=-wealth&count=care", app.url);
+    let (page, started) = (app.get("/sessions?count=total").await, Instant::now());
+    assert_eq!((page.0.as_u16(), page.1["total"].as_u64()), (200, Some(SESSIONS as u64 + 1)), "{page:?}");
+    assert_eq!(app.client.get(&all).send().await.unwrap().status(), 200);
+    println!("{:?} for all {SESSIONS} sessions in order", started.elapsed());
+    let client = app.client.clone();
+    app.enter(&south).await;
+    let attack = join_all((0..8).map(|_| async {
+        loop {
+            client.get(&all).send().await.unwrap().bytes().await.unwrap();
+        }
+    }));
+    let others = async {
+        let mut slowest = Duration::ZERO;
+        for path in ["/sessions?search=zz", "/jobs", "/policies", "/sessions"].iter().cycle().take(40) {
+            let asked = Instant::now();
+            assert_eq!(app.get(path).await.0, 200, "{path}");
+            slowest = slowest.max(asked.elapsed());
+        }
+        slowest
+    };
+    let slowest = tokio::select! {
+        _ = attack => unreachable!("it goes on until the others are done"),
+        slowest = others => slowest,
+    };
+    println!("{slowest:?} for another tenant's");
+    assert!(slowest < within(OTHER_LIST), "{slowest:?}");
 }
 
 async fn are_quick_small_and_in_nobodys_way(mut app: App, action: Duration) {

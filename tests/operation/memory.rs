@@ -119,11 +119,16 @@ async fn part(app: &App, part: &str) -> usize {
     line.parse::<f64>().unwrap() as usize
 }
 
+/// A figure of a process, as `/proc` shows it.
+fn figure(child: &Child, name: &str) -> usize {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap();
+    line.split_whitespace().next().unwrap().parse().unwrap()
+}
+
 /// Resident bytes of a process.
 fn resident(child: &Child) -> usize {
-    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
-    line.split_whitespace().next().unwrap().parse::<usize>().unwrap() * 1024
+    figure(child, "VmRSS:") * 1024
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -223,6 +228,40 @@ async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     let (status, document) = app.get(&path).await;
     assert_eq!(status, StatusCode::OK, "{document}");
     assert!(document == large, "the document came whole");
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// Two clients report for 200 sessions at a time. No period finds its bridges made, so each report is prepared on a thread that
+/// may block; threads that wait for one another would be as many as reports.
+#[tokio::test(flavor = "multi_thread")]
+async fn batches_of_reports_take_few_threads_and_little_memory() {
+    const SESSIONS: usize = 200;
+    const PERIODS: usize = 3;
+    let (mut child, mut app) = confined(&["--memory-limit", "256MB"]);
+    let mut long = crate::support::specification(PERIODS);
+    long["problem"]["radius"]["paths"] = json!(10_000);
+    long["problem"]["history"] = json!(monthly_returns());
+    app.train(&long).await;
+    let mut sessions = [const { Vec::new() }; 2];
+    for _ in 0..SESSIONS {
+        for client in &mut sessions {
+            app.open().await;
+            client.push(app.session.clone());
+        }
+    }
+    for period in 1..=PERIODS {
+        let batch = |client: &Vec<String>| {
+            let report = |session: &String| json!({ "session": session, "period": period, "log_return": 0.01 });
+            json!(client.iter().map(report).collect::<Vec<_>>())
+        };
+        let [first, second] = [&sessions[0], &sessions[1]].map(batch);
+        let ((status, _), (other, _)) = tokio::join!(app.post("/observe", &first), app.post("/observe", &second));
+        assert_eq!((status, other), (StatusCode::OK, StatusCode::OK));
+        // Threads of work that may block live on for ten seconds.
+        let (threads, resident) = (figure(&child, "Threads:"), resident(&child));
+        assert!(threads < 64 && resident < 300 << 20, "{threads} threads, {resident} bytes resident");
+    }
     child.kill().unwrap();
     child.wait().unwrap();
 }

@@ -216,12 +216,12 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
     }
     let now = session(&app, &app.session).await;
     assert_eq!(json!([now["state"], now["period"], now["horizon"]]), json!(["waiting", 4, 3]));
-    let listed = app.get("/sessions?search=late").await.1;
+    let listed = app.get("/sessions?search=late&count=care").await.1;
     let row = &listed["sessions"][0];
     assert_eq!(json!([row["state"], row["care"]]), json!(["waiting", ["renewal"]]));
     assert_eq!(json!([listed["care"]["sessions"], listed["care"]["renewal"]]), json!([1, 1]));
     for (state, total) in [("waiting", 1), ("care", 1), ("renewal", 1), ("active", 0), ("completed", 0)] {
-        assert_eq!(app.get(&format!("/sessions?state={state}")).await.1["total"], total, "{state}");
+        assert_eq!(app.get(&format!("/sessions?count=total&state={state}")).await.1["total"], total, "{state}");
     }
 
     // The last step of its policy, at the law of all returns reported: also what a session in its last period is told that

@@ -247,11 +247,12 @@ async fn a_check_finds_a_torn_file() {
     let file = folder.path().join("ballast.sqlite");
     succeeds(&["backup", "--data", text(app.folder()), "--out", text(&file)]);
     let sound = std::fs::read(&file).unwrap();
+    const PAGE: usize = 8192;
     // A page in the middle is lost, then the first, then half the file.
-    let middle = sound.len() / 2 / 4096 * 4096;
+    let middle = sound.len() / 2 / PAGE * PAGE;
     let torn = [
-        [&sound[..middle], &[0xa5; 4096], &sound[middle + 4096..]].concat(),
-        [&[0; 4096], &sound[4096..]].concat(),
+        [&sound[..middle], &[0xa5; PAGE], &sound[middle + PAGE..]].concat(),
+        [&[0; PAGE], &sound[PAGE..]].concat(),
         sound[..middle].to_vec(),
     ];
     for torn in torn {

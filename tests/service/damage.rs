@@ -62,16 +62,14 @@ async fn a_list_leaves_out_what_is_damaged_and_names_it() {
         let (status, page) = app.get(&format!("/sessions{query}")).await;
         assert_eq!(status, 200, "{query}: {page}");
         let (mut shown, mut damaged) = names(&page);
-        (
-            shown.sort_by_key(|name| sessions.iter().position(|one| one == name)),
-            damaged.sort_by_key(|name| sessions.iter().position(|one| one == name)),
-        );
+        for names in [&mut shown, &mut damaged] {
+            names.sort_by_key(|name| sessions.iter().position(|one| one == name));
+        }
         assert_eq!(
             (shown, damaged),
             (vec![sessions[3].as_str(), &sessions[4]], sessions[..3].iter().map(String::as_str).collect()),
             "{query}"
         );
-        assert_eq!(page["total"], 5);
         assert!(!page.to_string().contains("99999999"), "{page}");
     }
     assert!(corrupt_failures(&app).await >= before + 15, "each is counted");

@@ -59,7 +59,8 @@ fn replaced(file: &Path) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_file_that_is_another_ends_the_service_before_it_acknowledges_more() {
-    let changes: [(&str, fn(&Path)); 6] = [
+    type Change = fn(&Path);
+    let changes: [(&str, Change); 6] = [
         ("ballast.sqlite", moved),
         ("ballast.sqlite", removed),
         ("ballast.sqlite", replaced),

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use crate::support::patience::{patience, until};
-use crate::support::{App, execute, postgres, specification};
+use crate::support::{App, entry_bytes, execute, postgres, several_assets, specification};
 use ballast::service::config::StoreLocation;
-use ballast::store::Quotas;
+use ballast::store::{Inspection, Quotas};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
@@ -64,6 +64,70 @@ async fn is_refused_with_the_numbers(mut app: App) {
     assert_refused(app.post("/train", &endless()).await, 429, "quota-queued-jobs", 3, 2);
     assert_eq!(app.post(&format!("/jobs/{}/cancel", queued[0]), &json!({})).await.0, 202);
     app.queue(&endless()).await;
+}
+
+/// 30 assets, the longest names, and all that can be reported of a period: what an entry takes is what it is counted with.
+#[tokio::test]
+async fn an_entry_is_counted_with_what_it_takes_whatever_assets_are_called() {
+    let mut app = App::start().await;
+    let names: Vec<String> = (0..30).map(|asset| format!("{asset:02}{}", "\u{1F4C8}".repeat(98))).collect();
+    let wave = |date: usize, asset: usize| 0.004 + 0.03 * ((7 * date + 11 * asset + 3) as f64).sin();
+    let rows: Vec<Vec<f64>> = (0..40).map(|date| (0..30).map(|asset| wave(date, asset)).collect()).collect();
+    let mut several = several_assets(3);
+    (several["problem"]["assets"], several["problem"]["history"]) = (json!(names), json!(rows));
+    app.train(&several).await;
+    app.open().await;
+    let by_name = |value: &dyn Fn(usize) -> f64| -> Value {
+        names.iter().enumerate().map(|(asset, name)| (name.clone(), json!(value(asset)))).collect()
+    };
+    let report = json!({ "session": app.session, "period": 1, "confirm": true, "date": "2026-01-31", "rate": 0.001234567891234567,
+        "flow": -0.1234567891234567, "wealth": 101.23456789123456, "prices": by_name(&|asset| 100.0 / 7.0 + asset as f64),
+        "previous_prices": by_name(&|asset| 100.0 / 7.1 + asset as f64),
+        "executed_allocations": by_name(&|asset| 1.0 / (40.0 + asset as f64)) });
+    let (status, first) = app.post("/observe", &report).await;
+    assert_eq!(status, 200, "{first}");
+    let plain = json!({ "session": app.session, "period": 2, "confirm": true, "log_returns": by_name(&|asset| wave(41, asset)) });
+    assert_eq!(app.post("/observe", &plain).await.0, 200);
+    let reason = "\u{1F4C8}".repeat(200);
+    let correction = json!({ "correction": 1, "period": 2, "reason": reason, "confirm": true,
+        "log_returns": by_name(&|asset| wave(42, asset)) });
+    let corrections = format!("/sessions/{}/corrections", app.session);
+    let (status, corrected) = app.post(&corrections, &correction).await;
+    assert_eq!(status, 200, "{corrected}");
+    let bytes = entry_bytes(app.folder()).await;
+    assert_eq!(bytes.len(), 3);
+    assert!(bytes[..2].iter().all(|bytes| *bytes < 4000), "{bytes:?}");
+    assert!(bytes[2] < 2 * (1536 + 30 * 88), "{bytes:?}");
+    // What is read of them is what was answered.
+    assert_eq!(app.post("/observe", &report).await, (StatusCode::OK, first));
+    assert_eq!(app.post(&corrections, &correction).await, (StatusCode::OK, corrected));
+    let mut other = report;
+    other["previous_prices"][&names[0]] = json!(14.0);
+    assert_eq!(app.post("/observe", &other).await.0, StatusCode::CONFLICT);
+    let (_, advised) = app.action().await;
+    app.restart().await;
+    assert_eq!(app.action().await, (StatusCode::OK, advised));
+    let (mut checked, folder) = (0, Inspection::of_folder(app.folder()).await.unwrap());
+    folder.run(&mut |_| checked += 1).await.unwrap();
+    assert!(checked > 5, "{checked}");
+}
+
+#[tokio::test]
+async fn names_with_control_characters_are_refused_with_their_place() {
+    let app = App::start().await;
+    let mut several = several_assets(2);
+    several["problem"]["assets"][1] = json!("bo\u{7}nds");
+    let advise = json!({ "problem": { "assets": ["stocks", "bo\u{7}nds"], "rate_per_step": 0.001, "history": [[0.1, 0.0], [0.0, 0.1]] } });
+    for (path, asked) in [("/train", several), ("/advise", advise)] {
+        let (status, refused) = app.post(path, &asked).await;
+        assert_eq!(
+            (status, &refused["field"]),
+            (StatusCode::UNPROCESSABLE_ENTITY, &json!("problem.assets[1]")),
+            "{refused}"
+        );
+        let rule = refused["rule"].as_str().unwrap();
+        assert!(rule.contains("letter 3 is U+0007") && rule.contains("remove it"), "{rule}");
+    }
 }
 
 #[tokio::test]

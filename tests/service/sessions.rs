@@ -264,7 +264,7 @@ async fn an_opening_repeated_under_its_key_opens_one_session() {
     let other = open_under(&app, "mine", json!({ "wealth": 51.0 })).await;
     assert_refused(&other, 409, "Idempotency-Key", "mine");
     assert_eq!(other.1["type"], "/problems/idempotency-conflict");
-    assert_refused(&open_under(&app, "", json!({})).await, 422, "Idempotency-Key", "0 bytes");
+    assert_refused(&open_under(&app, "", json!({})).await, 422, "Idempotency-Key", "0 letters");
     assert_eq!(app.get("/sessions").await.1["sessions"].as_array().unwrap().len(), 1);
     assert_ne!(open_under(&app, "another", json!({ "wealth": 50.0 })).await.1["session"], first.1["session"]);
     assert_eq!(app.delete(&format!("/sessions/{}", app.session)).await, 204);

@@ -91,6 +91,7 @@ async fn with_session(store: &Store, session: &str, history: &[f64]) -> Seen {
         horizon: 3,
         plan_json: "{}".into(),
         due: None,
+        assets: 0,
         created_ms: 5,
     };
     let seen = store.about_to_open(&new);
@@ -106,6 +107,7 @@ fn observation(session: &str, period: usize, content: &str) -> EntryRow {
         number: period,
         content_json: content.into(),
         answer_json: format!(r#"{{"answer":"{content}"}}"#),
+        numbers: Vec::new(),
         created_ms: 7,
         key: "key_1".into(),
     }
@@ -386,6 +388,7 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
         horizon: 1,
         plan_json: "{}".into(),
         due: None,
+        assets: 0,
         created_ms: 1,
     };
     assert_eq!(store.create_session(new.clone(), Relabel::default(), None).await.unwrap(), CreateSession::NoPolicy);
@@ -624,6 +627,7 @@ async fn two_replicas_meet(place: &Place) {
             horizon: 1,
             plan_json: "{}".into(),
             due: None,
+            assets: 0,
             created_ms: 1,
         };
         let tenant = Tenant::default();
@@ -782,6 +786,7 @@ fn session_of(owner: &str, session: &str) -> SessionRow {
         horizon: 3,
         plan_json: "{}".into(),
         due: None,
+        assets: 0,
         created_ms: 5,
     }
 }

@@ -181,7 +181,7 @@ impl Model {
         if tenant == 0 {
             usage.sessions = self.sessions.len() as i64;
             let corrections = self.sessions.iter().flat_map(|row| &row.2).filter(|&&content| content == 1).count();
-            usage.bytes += usage.sessions * (ROW + 16 + 3 * ENTRY) + corrections as i64 * ENTRY;
+            usage.bytes += usage.sessions * (ROW + 16 + 2 + 3 * ENTRY) + corrections as i64 * ENTRY;
         }
         usage
     }
@@ -239,6 +239,7 @@ fn entry_of(session: u8, entry: usize, content: u8) -> EntryRow {
         number: entry + 10,
         content_json: format!("content_{content}"),
         answer_json: format!(r#"{{"answer":{content}}}"#),
+        numbers: Vec::new(),
         created_ms: 7,
         key: String::new(),
     }
@@ -424,6 +425,7 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 horizon: 3,
                 plan_json: "{}".into(),
                 due: None,
+                assets: 0,
                 created_ms: model.now,
             };
             let taken = model.sessions.iter().any(|row| row.0 == session);
@@ -496,7 +498,8 @@ async fn compare(store: &Store, model: &Model) {
         let entries = store.entries(&row.session).await.unwrap().expect("the session listed");
         let wrote = |(&content, entry)| entry_of(*session, entry, content);
         assert_eq!(entries, contents.iter().zip(1..).map(wrote).collect::<Vec<_>>());
-        let observed = entries.iter().rev().find(|entry| entry.kind == EntryKind::Observation);
+        // The answers of corrections here say of no period that it was observed.
+        let observed = entries.last().filter(|entry| entry.kind == EntryKind::Observation);
         assert_eq!(row.observations, observed.map_or(0, |entry| entry.number));
     }
 }

@@ -18,7 +18,7 @@ use ballast::service::clock::Clock;
 use ballast::service::config::{Config, StoreLocation};
 use ballast::service::keys;
 use ballast::service::shutdown::Shutdown;
-use ballast::store::KeyRing;
+use ballast::store::{Append, EntryRow, KeyRing, Store, Tenant};
 use reqwest::header::{AUTHORIZATION, HeaderMap};
 use reqwest::{Client, Method, Response, StatusCode};
 use serde_json::{Value, json};
@@ -111,9 +111,9 @@ async fn connection(folder: &Path) -> SqliteConnection {
 }
 
 /// Runs a statement behind the service's back.
-pub async fn execute(folder: &Path, statement: &'static str) {
+pub async fn execute(folder: &Path, statement: &str) {
     let mut connection = connection(folder).await;
-    sqlx::query(statement).execute(&mut connection).await.expect(statement);
+    sqlx::query(sqlx::AssertSqlSafe(statement.to_owned())).execute(&mut connection).await.expect(statement);
     connection.close().await.expect("closed");
 }
 
@@ -121,6 +121,15 @@ pub async fn execute(folder: &Path, statement: &'static str) {
 pub async fn attempts(folder: &Path) -> i64 {
     let mut connection = connection(folder).await;
     sqlx::query_scalar("SELECT attempt FROM jobs").fetch_one(&mut connection).await.expect("one job")
+}
+
+/// Bytes of what each entry of the folder's sessions holds, in the order they were recorded.
+pub async fn entry_bytes(folder: &Path) -> Vec<i64> {
+    let mut connection = connection(folder).await;
+    let bytes =
+        "SELECT octet_length(content_json) + octet_length(answer_json) + octet_length(numbers) + octet_length(seal)
+        + octet_length(access_key) + 2 * octet_length(session) FROM entries ORDER BY rowid";
+    sqlx::query_scalar(bytes).fetch_all(&mut connection).await.expect("entries")
 }
 
 /// Keeps the service from writing until it is given up.
@@ -212,6 +221,29 @@ impl App {
         self.start_again().await;
     }
 
+    /// As [`Self::restart`], with the answer of a session's last entry replaced in between, by an entry as sound as it was.
+    /// `database` is the address of the store where that is no folder.
+    pub async fn retell(&mut self, session: &str, database: Option<&str>, change: impl Fn(&str) -> String) {
+        self.stop().await;
+        let store = match database {
+            None => Store::open(self.folder()).await,
+            Some(url) => Store::connect(&url.parse().expect("an address")).await,
+        };
+        let store = store.expect("the store");
+        let facts = store.session_facts(&Tenant::default(), session).await.expect("read").expect("a session");
+        let entry = facts.entries.into_iter().last().expect("an entry");
+        let remove = format!("DELETE FROM entries WHERE session = '{session}' AND entry = {}", entry.entry);
+        match database {
+            None => execute(self.folder(), &remove).await,
+            Some(url) => assert_eq!(postgres::execute(url, &remove).await, 1),
+        }
+        let answer_json = change(&entry.answer_json);
+        assert_ne!(answer_json, entry.answer_json, "the answer is another");
+        assert_eq!(store.append(EntryRow { answer_json, ..entry }).await.expect("stored"), Append::Appended);
+        store.close().await;
+        self.start_again().await;
+    }
+
     /// Stops the service and starts one over a folder within this one.
     pub async fn move_to(&mut self, folder: &str) {
         self.stop().await;
@@ -221,7 +253,7 @@ impl App {
 
     async fn stop(&mut self) {
         self.client = Client::new();
-        self.running.take().expect("running").stop().await;
+        self.running.take().expect("running").stop().await.expect("the store holds");
     }
 
     async fn start_again(&mut self) {

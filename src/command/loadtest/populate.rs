@@ -118,6 +118,7 @@ impl World {
             horizon: self.horizon,
             plan_json: Plan::once(problem).json()?,
             due: None,
+            assets: 0,
             created_ms: 0,
         })
     }

@@ -51,11 +51,11 @@ fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
     assert_eq!(
         asked,
         "Which day is 01/02/2008?\n  --day-first true: 1 February 2008. 3 monthly simple returns as fractions, February 2008 to \
-         April 2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 80.00 % and 87.18 % a year.\n  --day-first \
+         April 2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 116.94 % and 87.18 % a year.\n  --day-first \
          false: 2 January 2008. 3 daily simple returns in percent, 2 January 2008 to 4 January 2008, as in column fund. Mean \
-         0.07 % and deviation 0.25 % a day, 16.80 % and 3.99 % a year.\nAre the returns fractions or percent? What is \
+         0.07 % and deviation 0.25 % a day, 18.29 % and 3.99 % a year.\nAre the returns fractions or percent? What is \
          0.3?\n  --unit fraction: Fractions: 0.3 is 30.00 %. 3 monthly simple returns as fractions, February 2008 to April \
-         2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 80.00 % and 87.18 % a year.\n  --unit percent: \
+         2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 116.94 % and 87.18 % a year.\n  --unit percent: \
          Percent: 0.3 is 0.30 %. 3 monthly simple returns in percent, February 2008 to April 2008, as in column fund. Mean \
          0.07 % and deviation 0.25 % a month, 0.80 % and 0.87 % a year."
     );

@@ -12,6 +12,7 @@ use super::learning::Learning;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::{InitialLaws, ProblemSpecification, Specification, UtilitySpecification, defaults};
+use super::text::check_text;
 use crate::control::error::FieldError;
 use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
@@ -132,10 +133,7 @@ pub fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
     let mut seen = BTreeSet::new();
     for (index, name) in assets.iter().enumerate() {
         let field = || format!("{named}[{index}]");
-        if !NAME_LENGTH.contains(&name.chars().count()) {
-            let rule = format!("must have {} to {} characters", NAME_LENGTH.start(), NAME_LENGTH.end());
-            return Err(FieldError::new(field(), format!("{} characters", name.chars().count()), rule));
-        }
+        check_text(&field(), name, NAME_LENGTH, &[])?;
         if !seen.insert(name) {
             return Err(FieldError::new(field(), name, "must be a name of its own"));
         }

@@ -20,5 +20,6 @@ pub mod rules;
 pub mod sampling_law;
 pub mod specification;
 pub mod terms;
+pub mod text;
 pub mod warnings;
 pub mod withdrawals;

@@ -54,9 +54,9 @@ const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 /** What of `chosen` is other than where nothing is said. */
 const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
 
-/** A page of those that match. */
+/** A page of those that match; they are counted with the first. */
 function read(chosen, after, signal) {
-  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
+  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), after === null ? ["count", "care"] : ["after", after]]);
   return get(`/sessions?${query}`, signal);
 }
 
@@ -91,7 +91,7 @@ function overview(chosen, first, leaving) {
     ask({ sort: chosen.sort === one ? other : one }).then(() => kept && holder.querySelector("[aria-sort] button")?.focus());
   };
   const add = (now) => {
-    page = now;
+    page = { ...now, total: now.total ?? page.total };
     entries.push(...page.sessions);
     damaged.push(...page.damaged);
     for (const tag of page.sessions.flatMap(({ tags }) => tags)) known.add(tag);
@@ -139,7 +139,7 @@ function overview(chosen, first, leaving) {
     needs.replaceChildren(careWords(counts), " ", all, " ", beyond);
   };
   // Those of all sessions, whatever is searched for.
-  const judgeAll = () => get("/sessions?limit=1", leaving).then(({ care }) => judge(care), failed);
+  const judgeAll = () => get("/sessions?limit=1&count=care", leaving).then(({ care }) => judge(care), failed);
   if (filtered({ ...chosen, state: "" })) judgeAll();
   else judge(first.care);
   return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];

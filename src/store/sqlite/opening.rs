@@ -22,16 +22,19 @@ const LOCK: &str = "ballast.lock";
 const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
 /// A reader waits this long for recovery after a crash, and a writer for one that adds or revokes a key.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
-/// Pages of the log, of 4 KB, at which they are copied into the database: many observations change the same page of the
+/// Bytes of a page: three observations of 30 assets fill one, where each would take a page of 4 KB alone.
+const PAGE: u32 = 8192;
+/// Pages of the log at which they are copied into the database: many observations change the same page of the
 /// index, which is then copied once for all of them. SQLite's own 1000 copies most of them a second time.
-const COPIED_AT: &str = "8000";
+const COPIED_AT: &str = "4000";
 /// Memory for the pages of a connection that writes, in KiB: the pages of the index that observations find their places in.
 const CACHE: &str = "-16384";
 /// A log that grew beyond this, in bytes, is cut back to it once it is copied into the database.
 const LOG_KEPT: &str = "67108864";
-/// Each read connection is a thread; reads are short. Advice has most of them, and lists as few as keep a processor busy.
+/// Each read connection is a thread; reads are short. Advice has most of them. Of lists, two of sessions take their turns at a
+/// time, and one connection is for what is shown at once.
 const ADVICE_READERS: u32 = 4;
-const LIST_READERS: u32 = 2;
+const LIST_READERS: u32 = 3;
 const PROBE_READERS: u32 = 1;
 
 /// A folder, its schema up to date, with the files that are held of it: none if another process may hold it.
@@ -185,7 +188,8 @@ pub(in crate::store) async fn connect(file: &Path) -> Result<SqliteConnection, S
     let options = SqliteConnectOptions::new()
         .filename(file)
         .create_if_missing(true)
-        // Takes effect in a new file only.
+        // These two take effect in a new file only.
+        .page_size(PAGE)
         .auto_vacuum(SqliteAutoVacuum::Incremental)
         .pragma("journal_size_limit", LOG_KEPT)
         .pragma("wal_autocheckpoint", COPIED_AT)

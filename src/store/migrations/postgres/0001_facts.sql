@@ -114,6 +114,8 @@ CREATE TABLE sessions (
     due             BIGINT,
     -- Entries that its tenant's total counts it with; it grows, so no seal covers it.
     room            BIGINT NOT NULL,
+    -- Number of assets where there are several, by which an entry is counted; 0 of one.
+    assets          BIGINT NOT NULL,
     created_ms      BIGINT NOT NULL,
     seal            BYTEA NOT NULL
 );
@@ -160,6 +162,8 @@ CREATE TABLE entries (
     number       BIGINT NOT NULL,
     content_json TEXT NOT NULL,
     answer_json  TEXT NOT NULL,
+    -- Doubles of several assets, little-endian, which either of them names by their place.
+    numbers      BYTEA NOT NULL,
     created_ms   BIGINT NOT NULL,
     -- Of who reported it.
     access_key   TEXT NOT NULL,
@@ -229,13 +233,13 @@ CREATE TABLE audit_chains (
 
 -- How many chains there are.
 CREATE TABLE audit_total (
-    only   BIGINT PRIMARY KEY CHECK (only = 1),
+    row_id BIGINT PRIMARY KEY CHECK (row_id = 1),
     chains BIGINT NOT NULL,
     seal   BYTEA NOT NULL
 );
 
 -- The newest moment that a folder's process knew of.
 CREATE TABLE heartbeat (
-    only  BIGINT PRIMARY KEY CHECK (only = 1),
+    row_id BIGINT PRIMARY KEY CHECK (row_id = 1),
     at_ms BIGINT NOT NULL
 );

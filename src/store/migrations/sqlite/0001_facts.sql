@@ -103,6 +103,8 @@ CREATE TABLE sessions (
     due             INTEGER,
     -- Entries that its tenant's total counts it with; it grows, so no seal covers it.
     room            INTEGER NOT NULL,
+    -- Number of assets where there are several, by which an entry is counted; 0 of one.
+    assets          INTEGER NOT NULL,
     created_ms      INTEGER NOT NULL,
     seal            BLOB NOT NULL
 ) STRICT;
@@ -149,6 +151,8 @@ CREATE TABLE entries (
     number       INTEGER NOT NULL,
     content_json TEXT NOT NULL,
     answer_json  TEXT NOT NULL,
+    -- Doubles of several assets, little-endian, which either of them names by their place.
+    numbers      BLOB NOT NULL,
     created_ms   INTEGER NOT NULL,
     -- Of who reported it.
     access_key   TEXT NOT NULL,
@@ -218,13 +222,13 @@ CREATE TABLE audit_chains (
 
 -- How many chains there are.
 CREATE TABLE audit_total (
-    only   INTEGER PRIMARY KEY CHECK (only = 1),
+    row_id INTEGER PRIMARY KEY CHECK (row_id = 1),
     chains INTEGER NOT NULL,
     seal   BLOB NOT NULL
 ) STRICT;
 
 -- The newest moment that a folder's process knew of.
 CREATE TABLE heartbeat (
-    only  INTEGER PRIMARY KEY CHECK (only = 1),
+    row_id INTEGER PRIMARY KEY CHECK (row_id = 1),
     at_ms INTEGER NOT NULL
 ) STRICT;

@@ -1,0 +1,48 @@
+//! The rule of texts that people write: names, notes, tags, reasons.
+
+use std::ops::RangeInclusive;
+
+use crate::control::error::FieldError;
+
+/// Checks that a text has so many letters, and no control characters but those in `accepted`.
+///
+/// # Errors
+/// It has more or fewer letters; it has a control character, which is named with its place.
+pub fn check_text(
+    field: &str,
+    text: &str,
+    lengths: RangeInclusive<usize>,
+    accepted: &[char],
+) -> Result<(), FieldError> {
+    let letters = text.chars().count();
+    if !lengths.contains(&letters) {
+        let rule = format!("must have {} to {} letters", lengths.start(), lengths.end());
+        return Err(FieldError::new(field, format!("{letters} letters"), rule));
+    }
+    let control = text.chars().zip(1..).find(|(letter, _)| letter.is_control() && !accepted.contains(letter));
+    let Some((control, place)) = control else { return Ok(()) };
+    let rule = format!(
+        "must have no control character, and letter {place} is U+{:04X}: remove it, or put a space in its place",
+        u32::from(control)
+    );
+    Err(FieldError::new(field, format!("{text:?}"), rule))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_control_character_is_named_with_its_place() {
+        assert_eq!(check_text("name", "Été 2008, \u{1F600}", 1..=100, &[]), Ok(()));
+        assert_eq!(check_text("notes", "one\ntwo", 0..=100, &['\n']), Ok(()));
+        for (text, named) in
+            [("a\u{7}b", "letter 2 is U+0007"), ("one\ntwo", "letter 4 is U+000A"), ("\u{85}", "U+0085")]
+        {
+            let refused = check_text("name", text, 1..=100, &[]).unwrap_err().to_string();
+            assert!(refused.contains(named) && refused.contains("remove it"), "{refused}");
+        }
+        let refused = check_text("name", "", 1..=100, &[]).unwrap_err().to_string();
+        assert!(refused.contains("must have 1 to 100 letters"), "{refused}");
+    }
+}

@@ -1,0 +1,73 @@
+//! Turns over tenants at what blocks no thread: each tenant has one at a time, and waits for it among one of each other.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::allowance::Allowance;
+use super::error::ServiceError;
+
+/// So many turns at a time.
+#[derive(Clone)]
+pub(super) struct Turns {
+    places: Arc<Semaphore>,
+    wait: Duration,
+}
+
+/// A turn of a tenant, over when dropped.
+pub(super) struct Turn(#[expect(dead_code, reason = "held, not read")] [OwnedSemaphorePermit; 2]);
+
+impl Turns {
+    pub(super) fn new(places: usize, wait: Duration) -> Self {
+        Turns { places: Arc::new(Semaphore::new(places)), wait }
+    }
+
+    /// Waits for the other calls of the tenant first, so that it has one in the queue of all.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] where the turn did not come in time.
+    pub(super) async fn of(&self, tenant: &Allowance) -> Result<Turn, ServiceError> {
+        let both = async {
+            let own = tenant.lists().acquire_owned().await?;
+            Ok::<_, tokio::sync::AcquireError>(Turn([own, self.places.clone().acquire_owned().await?]))
+        };
+        let turn = tokio::time::timeout(self.wait, both).await;
+        turn.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures_util::poll;
+
+    use super::*;
+    use crate::service::allowance::Limits;
+
+    #[tokio::test]
+    async fn a_tenant_has_one_turn_at_a_time_and_another_passes_its_queue() {
+        let (turns, [north, south]) =
+            (Turns::new(1, Duration::from_secs(60)), [(); 2].map(|()| Allowance::new(&Limits::default())));
+        let first = turns.of(&north).await.unwrap();
+        let mut queue: Vec<_> = (0..3).map(|_| Box::pin(turns.of(&north))).collect();
+        for waiting in &mut queue {
+            assert!(poll!(waiting).is_pending());
+        }
+        let mut other = Box::pin(turns.of(&south));
+        assert!(poll!(&mut other).is_pending());
+        drop(first);
+        // The next of the same tenant is behind the other's one.
+        let has_turn = poll!(&mut other);
+        assert!(has_turn.is_ready() && poll!(&mut queue[0]).is_pending());
+        drop(has_turn);
+        let has_turn = poll!(&mut queue[0]);
+        assert!(has_turn.is_ready() && poll!(&mut queue[1]).is_pending());
+    }
+
+    #[tokio::test]
+    async fn who_waits_too_long_is_told_to_come_again() {
+        let (turns, north) = (Turns::new(1, Duration::from_millis(5)), Allowance::new(&Limits::default()));
+        let _first = turns.of(&north).await.unwrap();
+        assert!(matches!(turns.of(&north).await, Err(ServiceError::Busy)));
+    }
+}
