@@ -1741,8 +1741,8 @@ class SessionPage(TypedDict):
     Sessions of this page that are not what was written: nothing of them is shown, and a call for one gets 500 until an
     operator has restored it.
     """
-    total: int
-    """Sessions that match, on all pages together."""
+    total: NotRequired[int | None]
+    """Sessions that match, on all pages together; null unless `count` asks for it."""
     care: NotRequired[CareCount | None]
     next: NotRequired[str | None]
     """Give it as `after` for the next page; null on the last."""
