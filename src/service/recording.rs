@@ -27,7 +27,7 @@ use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
 
 impl Sessions {
     /// Records the return of a period, durably before it is answered, exactly once, and answers with an
-    /// [`Observed`](super::answer::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
+    /// [`Observed`] in JSON as it was recorded. Where the caller goes away meanwhile
     /// the store may or may not record it, and nothing of it stays in memory.
     ///
     /// # Errors
