@@ -1,8 +1,9 @@
 //! Work that requests cause, bounded and taken in turn over tenants.
 //!
-//! A piece of work begins in one of the first places, of which a tenant has half at most, and has it for 100 ms. What takes longer goes on in one of the
-//! places for long work, of which there are fewer than processors, and gives it up to the next one each 250 ms. So whoever asks
-//! something short waits for moments of others, however long their questions are, and long questions share what is left.
+//! A piece of work begins in one of the first places, of which a tenant has half at most, and has it for 100 ms. What takes
+//! longer goes on in one of the places for long work, of which there are fewer than processors, and gives it up to the next
+//! one each 250 ms. So whoever asks something short waits for moments of others, however long their questions are, and long
+//! questions share what is left.
 //! Whoever finds no place waits in the queue of the tenant, and a place that becomes free goes to the tenants in turn.
 //!
 //! A piece whose caller is gone, by a time limit, a closed connection or the end of the service, ends at its next checkpoint (see
