@@ -14,7 +14,7 @@ use super::error::Failure;
 use super::labels::Labels;
 use super::query::{Query, Row};
 use super::sessions::SessionRow;
-use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES};
+use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES, WEALTH};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -127,10 +127,6 @@ pub struct SessionList {
     /// The place of the last row, sound or not, if the page is full.
     pub last: Option<SessionPlace>,
 }
-
-const WEALTH: &str =
-    "coalesce(CAST(json_extract(CASE WHEN json_valid(last.answer_json) THEN last.answer_json END, '$.wealth')
-    AS DOUBLE PRECISION), sessions.initial_wealth)";
 
 impl Store {
     /// A page of the sessions of a tenant.

@@ -8,6 +8,7 @@ use super::entries::{self, APPENDING, Append, EntryRow};
 use super::error::Failure;
 use super::query::{Connection, Row, query};
 use super::quotas::Quotas;
+use super::statement::DUE;
 use super::tenant::Tenant;
 use super::training_names::withdraw;
 use super::{Store, StoreError, policies};
@@ -37,20 +38,11 @@ impl Store {
     /// At most `limit` sessions that are due to be renewed by themselves, in the order they were opened, with their
     /// tenants and sequences; `after` is the sequence of the last one of the page before.
     pub async fn due_sessions(&self, limit: usize, after: i64) -> Result<Vec<(i64, Tenant, String)>, StoreError> {
-        let page = query(
-            "SELECT sequence, tenant, session FROM sessions WHERE due IS NOT NULL AND sequence > $1
-             AND due <= (SELECT CASE kind WHEN 'observation' THEN number
-                                ELSE CAST(json_extract(CASE WHEN json_valid(answer_json) THEN answer_json END,
-                                                        '$.observed') AS BIGINT) END
-                         FROM entries WHERE entries.session = sessions.session AND kind <> 'renewal'
-                         ORDER BY entry DESC LIMIT 1)
-             ORDER BY sequence LIMIT $2",
-        );
         let found = |row: &Row| {
             let tenant = Tenant::stored(&row.get::<String>("tenant")?);
             Ok((row.get("sequence")?, tenant, row.get("session")?))
         };
-        let page = page.bind(after).bind(to_sql(limit));
+        let page = query(DUE).bind(after).bind(to_sql(limit));
         self.list("listing sessions that are due", page, |rows| rows.iter().map(found).collect()).await
     }
 }

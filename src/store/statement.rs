@@ -15,16 +15,47 @@ pub(super) const TABLES: &str = "FROM sessions
     LEFT JOIN entries AS last ON last.session = sessions.session
          AND last.entry = (SELECT entry FROM entries AS made WHERE made.session = sessions.session
                            AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)";
-/// The answer of the last entry, unless it is damaged so that it cannot be read.
-pub(super) const ANSWER: &str = "CASE WHEN json_valid(last.answer_json) THEN last.answer_json END";
+/// The answer of the entry in a table, or in the one of a statement, unless it is damaged so that it cannot be read.
+macro_rules! answer {
+    ($of:literal) => {
+        concat!("CASE WHEN json_valid(", $of, "answer_json) THEN ", $of, "answer_json END")
+    };
+}
+/// Periods observed, as that entry says.
+macro_rules! observations {
+    ($of:literal) => {
+        concat!(
+            "coalesce(CASE ",
+            $of,
+            "kind WHEN 'observation' THEN ",
+            $of,
+            "number ELSE CAST(json_extract(",
+            answer!($of),
+            ", '$.observed') AS BIGINT) END, 0)"
+        )
+    };
+}
+
+pub(super) const ANSWER: &str = answer!("last.");
 pub(super) const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
-/// Periods observed, as the last entry that moved the session says.
-pub(super) const OBSERVATIONS: &str = "coalesce(CASE last.kind WHEN 'observation' THEN last.number
-    ELSE CAST(json_extract(CASE WHEN json_valid(last.answer_json) THEN last.answer_json END, '$.observed') AS BIGINT) END, 0)";
+pub(super) const OBSERVATIONS: &str = observations!("last.");
 /// Whether the next policy of a session is to be trained. Until it is there the session goes on, past its horizon too.
-pub(super) const IS_WAITING: &str = "(sessions.due IS NOT NULL AND sessions.due <=
-    coalesce(CASE last.kind WHEN 'observation' THEN last.number
-    ELSE CAST(json_extract(CASE WHEN json_valid(last.answer_json) THEN last.answer_json END, '$.observed') AS BIGINT) END, 0))";
+pub(super) const IS_WAITING: &str =
+    concat!("(sessions.due IS NOT NULL AND sessions.due <= ", observations!("last."), ")");
+/// What a session has now.
+pub(super) const WEALTH: &str = concat!(
+    "coalesce(CAST(json_extract(",
+    answer!("last."),
+    ", '$.wealth') AS DOUBLE PRECISION), sessions.initial_wealth)"
+);
+/// Sessions that are due to be renewed, after the sequence $1, at most $2.
+pub(super) const DUE: &str = concat!(
+    "SELECT sequence, tenant, session FROM sessions WHERE due IS NOT NULL AND sequence > $1
+     AND due <= (SELECT ",
+    observations!(""),
+    " FROM entries WHERE entries.session = sessions.session AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)
+     ORDER BY sequence LIMIT $2"
+);
 
 /// A statement under way: its text and its values.
 pub(super) struct Statement {
