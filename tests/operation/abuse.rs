@@ -5,20 +5,12 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until, within};
+use crate::support::process::Process;
 use crate::support::{App, process, read, specification, trained};
 use ballast::service::allowance::Limits;
 use futures_util::future::join_all;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-
-struct Process(std::process::Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// Eight clients send bodies of 4 MB, each of which takes far longer to decode than anybody should wait.
 #[tokio::test(flavor = "multi_thread")]

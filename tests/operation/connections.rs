@@ -5,10 +5,11 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until, within};
+use crate::support::process::Process;
 use crate::support::{App, process, specification};
 use reqwest::header::AUTHORIZATION;
 use serde_json::{Value, json};
@@ -22,15 +23,6 @@ const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 fn held_for() -> Duration {
     let asked = std::env::var("BALLAST_TEST_CROWD_SECONDS").ok().and_then(|seconds| seconds.parse().ok());
     Duration::from_secs(asked.unwrap_or(4))
-}
-
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// Whether this process may open a crowd. Where it may not, the test runs once more in a process that may, or says that it

@@ -1,11 +1,12 @@
 //! Questions that take long: they stop when nobody waits for them, keep nobody else waiting, and do not outlive the process.
 
 use std::os::unix::process::ExitStatusExt;
-use std::process::{Child, Command};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::support::App;
 use crate::support::patience::{until, within};
+use crate::support::process::{self, Process};
 use serde_json::{Value, json};
 
 /// The largest question of several assets that is taken: some minutes of work.
@@ -21,37 +22,37 @@ fn largest() -> Value {
     json!({ "problem": { "assets": names, "history": history, "rate_per_step": 0.002 } })
 }
 
-fn service() -> (Child, App) {
+fn service() -> (Process, App) {
     let folder = tempfile::tempdir().unwrap();
-    let (child, url) = crate::support::process::serve(|command| {
+    let (child, url) = process::serve(|command| {
         command.arg("--data").arg(folder.path());
     });
-    (child, App::at(url, folder))
+    (Process(child), App::at(url, folder))
 }
 
 /// Seconds of processor that the process has used.
-fn processor_seconds(child: &Child) -> f64 {
+fn processor_seconds(process: &Process) -> f64 {
     const TICKS_A_SECOND: f64 = 100.0;
-    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.0.id())).unwrap();
     let after_name = stat.rsplit(')').next().unwrap();
     let ticks = after_name.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<f64>().unwrap());
     ticks.sum::<f64>() / TICKS_A_SECOND
 }
 
-fn terminate(child: &Child) {
-    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+fn terminate(process: &Process) {
+    assert!(Command::new("kill").args(["-TERM", &process.0.id().to_string()]).status().unwrap().success());
 }
 
 /// A call under way.
 type Call = tokio::task::JoinHandle<reqwest::Result<reqwest::Response>>;
 
 /// So many of the largest questions, once all are being solved.
-async fn asked(app: &App, child: &Child, count: usize) -> Vec<Call> {
-    let (question, before) = (largest(), processor_seconds(child));
+async fn asked(app: &App, process: &Process, count: usize) -> Vec<Call> {
+    let (question, before) = (largest(), processor_seconds(process));
     let calls: Vec<_> = (0..count)
         .map(|_| tokio::spawn(app.client.post(format!("{}/advise", app.url)).json(&question).send()))
         .collect();
-    while processor_seconds(child) < before + 0.3 * count as f64 {
+    while processor_seconds(process) < before + 0.3 * count as f64 {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
     calls
@@ -60,24 +61,24 @@ async fn asked(app: &App, child: &Child, count: usize) -> Vec<Call> {
 #[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
 #[tokio::test(flavor = "multi_thread")]
 async fn what_nobody_waits_for_stops() {
-    let (mut child, app) = service();
-    let calls = asked(&app, &child, 1).await;
+    let (mut process, app) = service();
+    let calls = asked(&app, &process, 1).await;
     calls.iter().for_each(Call::abort);
-    let mut used = processor_seconds(&child);
+    let mut used = processor_seconds(&process);
     until("the work to stop", async || {
         tokio::time::sleep(Duration::from_millis(500)).await;
-        let before = std::mem::replace(&mut used, processor_seconds(&child));
+        let before = std::mem::replace(&mut used, processor_seconds(&process));
         (used - before < 0.05).then_some(())
     })
     .await;
-    terminate(&child);
-    assert!(child.wait().unwrap().success());
+    terminate(&process);
+    assert!(process.0.wait().unwrap().success());
 }
 
 #[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
 #[tokio::test(flavor = "multi_thread")]
 async fn long_questions_keep_no_short_one_waiting() {
-    let (mut child, app) = service();
+    let (process, app) = service();
     let history: Vec<f64> = (0..120).map(|k| 0.006 + 0.03 * f64::sin(7.0 * f64::from(k))).collect();
     let short = json!({ "problem": { "history": history, "rate_per_step": 0.002 } });
     let time = async || {
@@ -88,7 +89,7 @@ async fn long_questions_keep_no_short_one_waiting() {
     };
     time().await;
     let idle = time().await.max(time().await);
-    let calls = asked(&app, &child, 6).await;
+    let calls = asked(&app, &process, 6).await;
     let mut busy: Vec<Duration> = Vec::new();
     for _ in 0..9 {
         busy.push(time().await);
@@ -97,21 +98,19 @@ async fn long_questions_keep_no_short_one_waiting() {
     // Two cores, of which the long ones have one: three times leaves room for a slow machine.
     assert!(busy[4] < within(3 * idle + Duration::from_millis(100)), "{busy:?}, idle {idle:?}");
     calls.iter().for_each(Call::abort);
-    child.kill().unwrap();
-    child.wait().unwrap();
 }
 
 #[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
 #[tokio::test(flavor = "multi_thread")]
 async fn a_second_signal_ends_the_process_at_once() {
-    let (mut child, app) = service();
-    let _calls = asked(&app, &child, 1).await;
-    terminate(&child);
+    let (mut process, app) = service();
+    let _calls = asked(&app, &process, 1).await;
+    terminate(&process);
     tokio::time::sleep(Duration::from_millis(300)).await;
-    assert!(child.try_wait().unwrap().is_none(), "the caller is given the time of the drain");
-    terminate(&child);
+    assert!(process.0.try_wait().unwrap().is_none(), "the caller is given the time of the drain");
+    terminate(&process);
     let asked = Instant::now();
-    let status = child.wait().unwrap();
+    let status = process.0.wait().unwrap();
     assert!(asked.elapsed() < within(Duration::from_secs(1)), "{:?}", asked.elapsed());
     assert_eq!((status.code(), status.signal()), (Some(143), None));
 }

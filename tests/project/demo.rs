@@ -3,9 +3,10 @@
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use crate::support::patience::patience;
+use crate::support::process::Process;
 
 #[tokio::test]
 async fn the_demo_tells_both_acts_and_opens_its_page() {
@@ -58,21 +59,11 @@ fn the_readme_shows_what_advise_prints() {
     assert_eq!(shown()[0], printed.lines().collect::<Vec<_>>());
 }
 
-/// Ends the demo when the test does.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// The demo as the README tells to run it, as far as the README shows it: to the end of its first act.
 #[test]
 fn the_readme_shows_what_the_demo_prints() {
     let mut demo = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    let mut demo = Ended(demo.arg("demo").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+    let mut demo = Process(demo.arg("demo").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
     let mut printed = BufReader::new(demo.0.stdout.take().unwrap()).lines().map(Result::unwrap);
     let mut last = String::new();
     // The README leaves lines out, and says so.

@@ -1,13 +1,14 @@
 //! What goes over a wire is encrypted, and with whom it is spoken is known.
 
 use std::path::Path;
-use std::process::{Child, Command};
+use std::process::Command;
 use std::sync::Arc;
 
 use crate::support::certificates::{Authority, Certificate};
 use crate::support::patience::until;
 use crate::support::postgres::Cluster;
 use crate::support::process;
+use crate::support::process::Process;
 use ballast::store::Store;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, ServerName};
@@ -16,15 +17,6 @@ use tempfile::TempDir;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio_rustls::TlsConnector;
-
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 fn write(folder: &Path, certificate: &Certificate) {
     std::fs::write(folder.join("cert.pem"), &certificate.pem).unwrap();

@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use crate::support::patience::{self, patience};
+use crate::support::process::Process;
 use crate::support::{App, issue_key, postgres, process, read, specification};
 use ballast::service::config::StoreLocation;
 use ballast::store::{KeyRing, KeyRole};
@@ -301,16 +302,6 @@ fn ballast(arguments: &[&str]) -> (Option<i32>, String, String) {
     let output = command.args(arguments).env_remove("BALLAST_STORE").output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
     (output.status.code(), text(&output.stdout), text(&output.stderr))
-}
-
-/// Ends with its process.
-struct Process(std::process::Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

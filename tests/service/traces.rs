@@ -2,21 +2,12 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpListener;
-use std::process::Child;
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
 use crate::support::patience::patience;
+use crate::support::process::Process;
 use crate::support::{App, process, specification};
-
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// A collector: its address, and what was posted to it, path and body.
 fn collector() -> (String, Receiver<(String, Vec<u8>)>) {

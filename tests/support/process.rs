@@ -3,6 +3,16 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
+/// Ends with its test.
+pub struct Process(pub Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// Starts `ballast serve` on a free port, with what `configure` adds; the process and its address.
 pub fn serve(configure: impl FnOnce(&mut Command)) -> (Child, String) {
     try_serve(configure).unwrap_or_else(|(_, printed)| panic!("printed {printed:?}"))
