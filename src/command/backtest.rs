@@ -334,7 +334,7 @@ mod tests {
         assert_eq!(dates.as_ref().unwrap()[0], "2006-03");
         let stock = strategies.iter().find(|figures| figures.strategy == "All in stocks").unwrap();
         let mean = (24..28).map(risky_return).sum::<f64>() / 4.0;
-        assert!((stock.performance.annual_mean.value - 4.0 * mean).abs() < 1e-12, "{stock:?}");
+        assert!((stock.performance.annual_mean.value - ((1.0 + mean).powi(4) - 1.0)).abs() < 1e-12, "{stock:?}");
         assert_eq!(files::periods(&shown).lines().nth(1).unwrap().split(',').next(), Some("2006-03"));
         assert!(shown.page().unwrap().contains("<title>Backtest, 2006-03 to 2006-12</title>"));
     }

@@ -97,7 +97,7 @@ pub struct Performance {
     /// Its own less that of the mix of its own average, which nobody could have chosen beforehand: what changing the allocation
     /// earned. Null of strategies that are such a mix.
     pub beyond_own_mix: Option<BootstrapEstimate>,
-    /// Of simple returns.
+    /// Mean simple return of a year, compounded: `(1 + m)^p - 1`, m the mean of a period and p the periods of a year.
     pub annual_mean: BootstrapEstimate,
     /// Standard deviation of simple returns.
     pub annual_volatility: BootstrapEstimate,

@@ -22,7 +22,7 @@ pub struct EvaluationReport {
     pub reference: String,
     /// Frameworks first, then constant mixes, in the order of the request.
     pub strategies: Vec<StrategyReport>,
-    /// Terminal wealth of all-bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does.
+    /// Terminal wealth of All in the bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does.
     pub floor: f64,
     /// Common bin edges of terminal utility, ascending.
     pub histogram_edges: Vec<f64>,

@@ -62,7 +62,7 @@ pub struct BacktestRequest {
     /// Multiple of the radius of every ball.
     #[serde(default = "defaults::scale")]
     pub scale: f64,
-    /// What the balls are centred on, and what plug-in takes for the law.
+    /// What the balls are centred on, and what “Trusts the record” takes for the law.
     #[serde(default)]
     pub centre: CentreSpecification,
     /// Relative: 1 is log utility.

@@ -46,7 +46,7 @@ pub struct EvaluationRequest {
     /// Frameworks to compare.
     #[serde(default = "defaults::frameworks")]
     pub frameworks: Vec<Framework>,
-    /// Constant allocations to compare; 0 is all-bank. Default: 0 to 1 by 0.1, as far as the actions go.
+    /// Constant allocations to compare; 0 is All in the bank. Default: 0 to 1 by 0.1, as far as the actions go.
     #[serde(default)]
     pub constant_mixes: Option<Vec<f64>>,
     /// A trained policy for a framework; the others are trained inside the job.

@@ -665,7 +665,7 @@ class Performance(TypedDict):
     """Of mean utility over the whole years, each from wealth 100."""
     beyond_own_mix: NotRequired[BootstrapEstimate | None]
     annual_mean: BootstrapEstimate
-    """Of simple returns."""
+    """Mean simple return of a year, compounded: `(1 + m)^p - 1`, m the mean of a period and p the periods of a year."""
     annual_volatility: BootstrapEstimate
     """Standard deviation of simple returns."""
     sharpe_ratio: BootstrapEstimate
@@ -2116,7 +2116,7 @@ class BacktestRequest(TypedDict):
     scale: NotRequired[float]
     """Multiple of the radius of every ball."""
     centre: NotRequired[CentreSpecification]
-    """What the balls are centred on, and what plug-in takes for the law."""
+    """What the balls are centred on, and what “Trusts the record” takes for the law."""
     risk_aversion: NotRequired[float]
     """Relative: 1 is log utility."""
     trading_cost: NotRequired[float]
@@ -2199,7 +2199,7 @@ class EvaluationRequest(TypedDict):
     frameworks: NotRequired[list[Framework]]
     """Frameworks to compare."""
     constant_mixes: NotRequired[list[ConstantMix] | None]
-    """Constant allocations to compare; 0 is all-bank. Default: 0 to 1 by 0.1, as far as the actions go."""
+    """Constant allocations to compare; 0 is All in the bank. Default: 0 to 1 by 0.1, as far as the actions go."""
     policies: NotRequired[dict[str, str]]
     """A trained policy for a framework; the others are trained inside the job."""
     paths: NotRequired[int]
@@ -2511,7 +2511,7 @@ class EvaluationReport(TypedDict):
     strategies: list[StrategyReport]
     """Frameworks first, then constant mixes, in the order of the request."""
     floor: float
-    """Terminal wealth of all-bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does."""
+    """Terminal wealth of All in the bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does."""
     histogram_edges: list[float]
     """Common bin edges of terminal utility, ascending."""
     wealth_edges: list[float]
