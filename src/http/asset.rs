@@ -1,9 +1,11 @@
 //! Files that are embedded in the binary and served as they stand.
 
+use axum::Extension;
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
+use super::bodies::Embedded;
 use super::problem::{Problem, ProblemKind};
 
 pub const HTML: &str = "text/html; charset=utf-8";
@@ -66,6 +68,6 @@ impl Asset {
             return (StatusCode::NOT_MODIFIED, fixed, tag).into_response();
         }
         let encoding = self.is_compressed.then_some([(header::CONTENT_ENCODING, "gzip")]);
-        (fixed, tag, AppendHeaders(encoding.into_iter().flatten()), self.bytes).into_response()
+        (fixed, tag, AppendHeaders(encoding.into_iter().flatten()), Extension(Embedded), self.bytes).into_response()
     }
 }

@@ -2,16 +2,18 @@
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::State;
+use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::access::{By, Read};
+use super::bodies;
 use super::extract::Parameters;
 use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
 use crate::service::Service;
+use crate::service::memory::Large;
 use crate::store::{AuditFilter, AuditRow};
 
 /// Query parameters, as text.
@@ -86,12 +88,14 @@ pub async fn list(
     State(service): State<Arc<Service>>,
     By(_admin, _): By<Read>,
     Parameters(ask): Parameters<Ask>,
-) -> Result<Json<AuditPage>, Problem> {
+) -> Result<Response, Problem> {
     let (limit, after) = Page::new(ask.limit, ask.after).bounds()?;
+    let room = service.room_for(page::bytes(limit)).await?;
     let tenant = ask.tenant.map(|name| name.parse()).transpose();
     let tenant = tenant.map_err(|error| Problem::of_field(ProblemKind::InvalidQuery, error))?;
     let rows = service.audit.list(&AuditFilter { tenant, object: ask.object }, limit, after).await?;
     let mut entries = rows.iter().filter(|row| row.sequence > 0);
     let next = page::next(entries.clone().count(), limit, entries.next_back().map(|row| row.sequence));
-    Ok(Json(AuditPage { entries: rows.into_iter().map(Into::into).collect(), next }))
+    let value = AuditPage { entries: rows.into_iter().map(Into::into).collect(), next };
+    bodies::written(Large { value, room }).await
 }

@@ -5,10 +5,11 @@
 //! budget. Small bodies are not counted; the connections bound them.
 
 use std::convert::Infallible;
+use std::io;
 use std::sync::Arc;
 
 use axum::Json;
-use axum::body::{Body, Bytes};
+use axum::body::{Body, Bytes, HttpBody, to_bytes};
 use axum::extract::Request;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -17,8 +18,9 @@ use serde::Serialize;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::problem::{Problem, ProblemKind};
+use crate::service::Service;
 use crate::service::error::ServiceError;
-use crate::service::memory::Large;
+use crate::service::memory::{Large, Reserved};
 
 /// Bodies up to this size are not counted, and larger ones in units of it.
 const UNIT: usize = 64 << 10;
@@ -75,8 +77,60 @@ pub async fn written<T: Serialize + Send + 'static>(Large { value, room }: Large
     Ok(sent(Large { value: bytes, room }))
 }
 
+/// A value that is in memory already as the answer, which takes its part of the budget by its length before it is written.
+///
+/// # Errors
+/// Other large answers leave no room for it; it cannot be written as JSON.
+pub async fn fitting<T: Serialize + Send + 'static>(service: &Service, value: T) -> Result<Response, Problem> {
+    let mut length = Length(0);
+    serde_json::to_writer(&mut length, &value).map_err(ServiceError::internal)?;
+    written(Large { value, room: service.room_for(length.0).await? }).await
+}
+
+/// Counts what is written.
+struct Length(usize);
+
+impl io::Write for Length {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0 += bytes.len();
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Marks an answer whose bytes are part of the program, so that it takes no memory.
+#[derive(Clone)]
+pub struct Embedded;
+
+/// `response` as it leaves: a large one has its part of the budget, by [`written`] or [`sent`]. One that has none is a fault of its
+/// operation, which stops a development build; in a release build it is given its part late.
+///
+/// Test: `tests/operation/answers.rs` asks every operation for its largest answer.
+pub async fn budgeted(service: &Service, response: Response) -> Response {
+    let bytes = response.body().size_hint().exact().map_or(0, |bytes| bytes as usize);
+    if bytes <= UNIT || response.extensions().get::<Embedded>().is_some() {
+        return response;
+    }
+    debug_assert!(false, "an answer of {bytes} bytes took no part of the budget");
+    let (head, body) = response.into_parts();
+    let made = async {
+        let room = service.room_for(bytes).await?;
+        let value = to_bytes(body, bytes).await.map_err(ServiceError::internal)?.to_vec();
+        Ok::<_, Problem>(sent(Large { value, room }))
+    };
+    match made.await {
+        Ok(late) => Response::from_parts(head, late.into_body()),
+        Err(problem) => problem.into_response(),
+    }
+}
+
 /// A document as the answer, in parts: its memory is held until the last of them is taken from it, however slowly a client reads.
+/// What was reserved beyond its length is given back.
 pub fn sent(Large { value: bytes, room }: Large<Vec<u8>>) -> Response {
+    let room = room.and_then(|room| Reserved::only(room, bytes.len()));
     let headers =
         [(header::CONTENT_TYPE, "application/json".to_owned()), (header::CONTENT_LENGTH, bytes.len().to_string())];
     let parts = stream::unfold((Bytes::from(bytes), room), async |(mut left, room)| {

@@ -40,6 +40,11 @@ pub struct LargeBody {
 }
 
 impl JsonBytes {
+    /// Bytes of it.
+    pub fn length(&self) -> usize {
+        self.bytes.len()
+    }
+
     /// Decodes the body: a large one in a turn, on a thread that may block, so that the calls of others go on meanwhile.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use utoipa::{IntoResponses, ToSchema};
 
 use super::access::{By, Heavy, Live, Read};
 use super::advise::{SaidOfProblem, said};
+use super::bodies;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
@@ -24,6 +25,7 @@ use crate::control::request::specification::{
 };
 use crate::service::Service;
 use crate::service::jobs::Accepted;
+use crate::service::memory::Large;
 use crate::service::sessions::Sessions;
 use crate::store::{Relabel, Tenant};
 
@@ -182,11 +184,13 @@ pub async fn list(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Parameters(page): Parameters<Page>,
-) -> Result<Json<wire::JobPage>, Problem> {
+) -> Result<Response, Problem> {
     let (limit, after) = page.bounds()?;
+    let room = service.room_for(page::bytes(limit)).await?;
     let jobs = service.jobs.list(&caller.tenant, limit, after).await?;
     let next = page::next(jobs.len(), limit, jobs.last().map(|job| job.row.sequence));
-    Ok(Json(wire::JobPage { jobs: jobs.into_iter().map(Into::into).collect(), next }))
+    let value = wire::JobPage { jobs: jobs.into_iter().map(Into::into).collect(), next };
+    bodies::written(Large { value, room }).await
 }
 
 /// A job: state, progress, result.
@@ -198,8 +202,8 @@ pub async fn get(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Id(id): Id,
-) -> Result<Json<wire::Job>, Problem> {
-    Ok(Json(service.jobs.get(&caller.tenant, &id).await?.into()))
+) -> Result<Response, Problem> {
+    bodies::fitting(&service, wire::Job::from(service.jobs.get(&caller.tenant, &id).await?)).await
 }
 
 /// Cancel a job: always accepted; it stops within a second. An ended job stays as it is.

@@ -3,16 +3,18 @@
 use std::sync::Arc;
 
 use axum::extract::State;
-use axum::http::header;
+use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::bodies::{self, Embedded};
 use super::documentation::Published;
 use super::problem::Problem;
 use super::telemetry;
 use crate::service::Service;
+use crate::service::memory::Large;
 
 /// The service in a few words.
 #[derive(Debug, Serialize, ToSchema)]
@@ -69,12 +71,15 @@ pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Pr
     let (jobs, sessions) = service.counts().await?;
     service.record_memory();
     let text = telemetry::exposition(jobs, sessions, service.waiting(), &service.keys.figures());
-    Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())
+    let room = service.room_for(text.len()).await?;
+    let mut response = bodies::sent(Large { value: text.into_bytes(), room });
+    response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; version=0.0.4"));
+    Ok(response)
 }
 
 /// The description of this interface.
 #[utoipa::path(get, path = "/openapi.json", tag = "operations",
     responses((status = 200, description = "OpenAPI 3.1.", body = serde_json::Value)))]
 pub async fn openapi(Extension(published): Extension<Published>) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], published.as_str()).into_response()
+    ([(header::CONTENT_TYPE, "application/json")], Extension(Embedded), published.as_str()).into_response()
 }

@@ -2,20 +2,22 @@
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::State;
+use axum::response::Response;
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::access::{By, Read};
+use super::bodies;
 use super::extract::Parameters;
-use super::page::Page;
+use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
 use super::wire::{SessionState, session_state};
 use crate::control::error::FieldError;
 use crate::service::Service;
 use crate::service::drift::DriftLevel;
+use crate::service::memory::Large;
 use crate::service::overview::Listed;
 use crate::store::LONGEST_TAG;
 use crate::store::{
@@ -205,13 +207,15 @@ pub async fn list(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Parameters(asked): Parameters<Asked>,
-) -> Result<Json<SessionPage>, Problem> {
+) -> Result<Response, Problem> {
     let asked = asked.read()?;
+    let room = service.room_for(page::bytes(asked.limit)).await?;
     let found = service.sessions.list(&caller, asked.clone()).await?;
     let next = found.last.as_ref().map(|place| cursor(&asked, place));
     let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
     let (damaged, care) = (found.damaged, found.care.map(CareCount::from));
-    Ok(Json(SessionPage { sessions, damaged, total: found.total, care, next }))
+    let value = SessionPage { sessions, damaged, total: found.total, care, next };
+    bodies::written(Large { value, room }).await
 }
 
 fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {

@@ -8,6 +8,14 @@ use crate::control::error::FieldError;
 const DEFAULT_LIMIT: usize = 50;
 const LARGEST_LIMIT: usize = 1000;
 
+/// Most bytes of a row of a list: labels at their limits take 12,400, and what else it tells less than 3,000.
+const ROW_BYTES: usize = 16 << 10;
+
+/// Most bytes of a page of so many rows, for the budget of large answers.
+pub fn bytes(limit: usize) -> usize {
+    limit * ROW_BYTES
+}
+
 /// Query parameters of a list, as text.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -16,6 +16,7 @@ use super::problem::Problem;
 use super::wire;
 use crate::control::policy::Policy;
 use crate::service::Service;
+use crate::service::memory::Large;
 
 /// List policies, newest first.
 #[utoipa::path(get, path = "/policies", tag = "policies",
@@ -28,11 +29,13 @@ pub async fn list(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Parameters(page): Parameters<Page>,
-) -> Result<Json<wire::PolicyPage>, Problem> {
+) -> Result<Response, Problem> {
     let (limit, after) = page.bounds()?;
+    let room = service.room_for(page::bytes(limit)).await?;
     let rows = service.policies.list(&caller.tenant, limit, after).await?;
     let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
-    Ok(Json(wire::PolicyPage { policies: rows.into_iter().map(Into::into).collect(), next }))
+    let value = wire::PolicyPage { policies: rows.into_iter().map(Into::into).collect(), next };
+    bodies::written(Large { value, room }).await
 }
 
 /// A policy with its specification and the diagnostics of every step.
@@ -44,11 +47,11 @@ pub async fn get(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Id(id): Id,
-) -> Result<Json<wire::PolicyDetail>, Problem> {
+) -> Result<Response, Problem> {
     let created_ms = service.policies.created_ms(&caller.tenant, &id).await?;
     let advisor = service.policies.advisor(&caller.tenant, &id).await?;
     let specification = advisor.specification().clone();
-    Ok(Json(wire::PolicyDetail {
+    let detail = wire::PolicyDetail {
         labels: service.names.of(&caller.tenant, &id).await?,
         policy: id,
         created_ms,
@@ -58,7 +61,8 @@ pub async fn get(
         warnings: specification.problem.warnings(),
         diagnostics: advisor.policy().diagnostics().cloned().collect(),
         specification,
-    }))
+    };
+    bodies::fitting(&service, detail).await
 }
 
 /// The portable document of a policy; its SHA-256 is the policy's name.

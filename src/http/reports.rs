@@ -12,6 +12,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::access::{By, Live};
+use super::bodies;
 use super::decode;
 use super::extract::JsonBytes;
 use super::problem::Problem;
@@ -19,8 +20,13 @@ use super::sessions::as_recorded;
 use super::telemetry;
 use crate::service::Service;
 use crate::service::answer::Observed;
+use crate::service::memory::Large;
 use crate::service::report::Observe;
 use crate::service::reports::{self, REPORTS, Reported};
+
+/// Most bytes of the answer to a report, and for each byte of it: names of assets that it has are told in four places at most.
+const ANSWER_BYTES: usize = 2048;
+const ANSWERED_A_BYTE: usize = 8;
 
 /// One report, or a list of reports of as many sessions.
 #[derive(Debug, Serialize, ToSchema)]
@@ -103,13 +109,15 @@ pub async fn observe(
     By(caller, _): By<Live>,
     body: JsonBytes,
 ) -> Result<Response, Problem> {
+    let length = body.length();
     match body.decoded(decode::json).await? {
         Reports::One(report) => Ok(as_recorded(service.sessions.report(&caller, *report, &caller.turn).await?)),
         Reports::Many(reports) => {
+            let room = service.room_for(reports.len() * ANSWER_BYTES + ANSWERED_A_BYTE * length).await?;
             let reported = service.sessions.report_all(&caller, reports).await?;
             let elements: Vec<String> =
                 reported.into_iter().map(|element| answered(element, caller.tenant.as_str())).collect();
-            Ok(as_recorded(format!("[{}]", elements.join(","))))
+            Ok(bodies::sent(Large { value: format!("[{}]", elements.join(",")).into_bytes(), room }))
         }
     }
 }

@@ -2,15 +2,20 @@
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::State;
+use axum::response::Response;
 
 use super::access::{By, Heavy};
+use super::bodies;
 use super::extract::JsonBody;
 use super::problem::Problem;
 use crate::returns::Reading;
 use crate::service::Service;
+use crate::service::memory::Large;
 use crate::service::returns::ReadReturns;
+
+/// Most bytes of an answer for each of the text: a number of two digits is told with seventeen.
+const ANSWERED_A_BYTE: usize = 16;
 
 /// What a text of returns or prices says: one record, or what must be asked, or where it is wrong. Nothing is stored.
 #[utoipa::path(post, path = "/returns", tag = "advice",
@@ -23,6 +28,8 @@ pub async fn read(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     JsonBody(question): JsonBody<ReadReturns>,
-) -> Result<Json<Reading>, Problem> {
-    Ok(Json(service.sessions.read_returns(&caller.tenant, question).await?))
+) -> Result<Response, Problem> {
+    let room = service.room_for(ANSWERED_A_BYTE * question.text.len()).await?;
+    let value = service.sessions.read_returns(&caller.tenant, question).await?;
+    bodies::written(Large { value, room }).await
 }

@@ -17,7 +17,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::access::{By, Gate, Read};
-use super::bodies::Bodies;
+use super::bodies::{self, Bodies};
 use super::documentation::Published;
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
@@ -171,7 +171,11 @@ struct Surroundings {
 /// clones and the allocations of all below it.
 async fn answered(State(around): State<Surroundings>, request: Request, next: Next) -> Response {
     let recording = telemetry::Recording::start(&request);
-    let answering = within_time(around.limit, access::admit(State(around.gate), request, next));
+    let service = around.gate.service.clone();
+    let answering = async {
+        let response = within_time(around.limit, access::admit(State(around.gate), request, next)).await;
+        bodies::budgeted(&service, response).await
+    };
     let response = match AssertUnwindSafe(answering.instrument(recording.span())).catch_unwind().await {
         Ok(response) => response,
         Err(_) => Problem::new(ProblemKind::Internal, "the cause is in the log").into_response(),

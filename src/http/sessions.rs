@@ -67,11 +67,11 @@ pub async fn get(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Id(id): Id,
-) -> Result<Json<wire::Session>, Problem> {
+) -> Result<Response, Problem> {
     let live = service.sessions.get(&caller.tenant, &id).await?;
     let renewal = service.sessions.renewal(&live).await?;
     let labels = service.names.of(&caller.tenant, &id).await?;
-    Ok(Json(wire::Session { renewal, labels, ..live.into() }))
+    bodies::fitting(&service, wire::Session { renewal, labels, ..live.into() }).await
 }
 
 /// Where a session started and everything recorded of it: what was reported, what was told then, what would be told now.

@@ -134,23 +134,13 @@ impl Sessions {
         turn: &HeavyTurn,
     ) -> Result<Large<History>, ServiceError> {
         let Large { value: facts, room } = self.facts(tenant, session).await?;
-        let periods = Periods::of(&facts)?;
-        let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
-        for entry in &facts.entries {
-            match entry.kind {
-                EntryKind::Observation => {}
-                EntryKind::Correction => corrections.push(Correction {
-                    correction: content(entry, periods.names())?,
-                    told: answer(entry, periods.names())?,
-                    corrected_ms: entry.created_ms,
-                }),
-                EntryKind::Renewal => renewals.push(Renewal {
-                    told: answer(entry, periods.names())?,
-                    window: content::<Renew>(entry, periods.names())?.window,
-                    renewed_ms: entry.created_ms,
-                }),
-            }
-        }
+        let is_large = room.is_some();
+        let reading = move || {
+            let periods = Periods::of(&facts)?;
+            let (corrections, renewals) = amendments(&facts, &periods)?;
+            Ok::<_, ServiceError>((facts, periods, corrections, renewals))
+        };
+        let (facts, periods, corrections, renewals) = self.apart(tenant, is_large, reading).await??;
         let first = periods.first_changed();
         let changed = match first < periods.all.len() {
             true => {
@@ -159,13 +149,14 @@ impl Sessions {
             }
             false => Vec::new(),
         };
-        let observations = observations(&facts, &periods, first, changed)?;
-        let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
-        let (first, start) =
-            (self.policies.advisor(tenant, &facts.row.policy).await?, periods.at_start(terms.learning));
+        let start = periods.at_start(Plan::of(&facts.row)?.terms.learning);
+        let listing = move || Ok::<_, ServiceError>((observations(&facts, &periods, first, changed)?, facts.row));
+        let (observations, row) = self.apart(tenant, is_large, listing).await??;
+        let Plan { terms, assets, .. } = Plan::of(&row)?;
+        let first = self.policies.advisor(tenant, &row.policy).await?;
         let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
-        let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
+        let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = row;
         let value = History {
             session,
             policy,
@@ -220,6 +211,27 @@ impl Sessions {
         changed.last_mut().into_iter().for_each(|(last, _)| last.radius = radius);
         Ok(changed)
     }
+}
+
+/// What was put right, and the policies that followed the first, in their order.
+fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction>, Vec<Renewal>), ServiceError> {
+    let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
+    for entry in &facts.entries {
+        match entry.kind {
+            EntryKind::Observation => {}
+            EntryKind::Correction => corrections.push(Correction {
+                correction: content(entry, periods.names())?,
+                told: answer(entry, periods.names())?,
+                corrected_ms: entry.created_ms,
+            }),
+            EntryKind::Renewal => renewals.push(Renewal {
+                told: answer(entry, periods.names())?,
+                window: content::<Renew>(entry, periods.names())?.window,
+                renewed_ms: entry.created_ms,
+            }),
+        }
+    }
+    Ok((corrections, renewals))
 }
 
 /// A period as it stands now, and of one that was put in later what stands in the place of an answer to its observation.

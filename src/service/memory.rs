@@ -140,7 +140,18 @@ pub struct Memory {
 }
 
 /// Bytes reserved by a job or an answer until this is dropped.
-pub struct Reserved(#[expect(dead_code, reason = "held, not read")] OwnedSemaphorePermit);
+pub struct Reserved(OwnedSemaphorePermit);
+
+impl Reserved {
+    /// What of it `bytes` take, once they are known; `None` where they are so few that they are not counted.
+    pub fn only(Reserved(mut permits): Self, bytes: usize) -> Option<Self> {
+        let needed = if bytes <= UNIT { 0 } else { bytes.div_ceil(UNIT) };
+        match permits.num_permits().saturating_sub(needed) {
+            0 => Some(Reserved(permits)),
+            _ => permits.split(needed).filter(|_| needed > 0).map(Reserved),
+        }
+    }
+}
 
 impl Memory {
     pub fn new(limit: MemoryLimit) -> Self {

@@ -50,6 +50,7 @@ pub mod report;
 pub mod reports;
 pub mod returns;
 mod secret;
+mod session_rows;
 pub mod sessions;
 pub mod shutdown;
 mod slots;
@@ -73,7 +74,7 @@ use error::ServiceError;
 use jobs::{Accepted, Jobs};
 use keys::{Caller, Keys};
 use labels::Names;
-use memory::Memory;
+use memory::{Memory, Reserved};
 use policies::Policies;
 use renewer::Renewer;
 use sessions::Sessions;
@@ -228,6 +229,14 @@ impl Service {
     pub fn waiting(&self) -> [(&'static str, usize); 3] {
         let Sessions { advising, resolving, .. } = &self.sessions;
         [advising, resolving, &self.decoding].map(|turns| (turns.name, turns.waiting()))
+    }
+
+    /// Waits until the other large answers leave room for one of so many bytes; `None` where it is small.
+    ///
+    /// # Errors
+    /// They do not in time.
+    pub async fn room_for(&self, bytes: usize) -> Result<Option<Reserved>, ServiceError> {
+        self.memory.answers(bytes).await
     }
 
     /// Tells the recorder what takes memory now.

@@ -26,10 +26,10 @@ use super::identity;
 use super::keys::Caller;
 use super::known::KnownReturns;
 use super::live::{Live, Means, SESSION_BYTES};
-use super::memory::{Large, Memory};
+use super::memory::Memory;
 use super::plan::{Plan, Renewing};
 use super::policies::Policies;
-use super::slots::{Generation, Held, Slots, Source};
+use super::slots::{Generation, Held, Slots};
 use super::spans;
 use super::standing::Standing;
 use super::turns::Turns;
@@ -39,14 +39,7 @@ use crate::control::policy::content_hash;
 use crate::control::problem::state::State;
 use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
-use crate::store::{CreateSession, Relabel, RequestKey, SessionFacts, SessionRow, Store, Tenant};
-
-/// Entries replayed in a few milliseconds.
-const PROMPT_ENTRIES: usize = 520;
-/// Log-returns of a start that make each of them as long again.
-const RETURNS_AN_ENTRY: usize = 2000;
-/// Entries are held as rows and as what is read from them.
-const FORMS_OF_ENTRIES: usize = 2;
+use crate::store::{CreateSession, Relabel, RequestKey, SessionRow, Store, Tenant};
 
 /// Lists of sessions that read at a time: fewer than the store has connections for lists, so that those of jobs, policies and
 /// labels, which read what they show, always find one.
@@ -302,49 +295,7 @@ impl Sessions {
         self.slots.weigh(&(live.row.tenant.clone(), live.row.session.clone()), live.bytes());
     }
 
-    pub(super) fn rows<'a>(&'a self, tenant: &'a Tenant, session: &'a str) -> Rows<'a> {
-        Rows { sessions: self, tenant, session }
-    }
-
     pub(super) async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
         self.slots.hold((tenant.clone(), session.to_owned())).await
-    }
-
-    /// A session and its entries, once other large answers leave room for them; the room is held as long as they are.
-    ///
-    /// # Errors
-    /// There is no such session; there is no room in time.
-    pub(super) async fn facts(&self, tenant: &Tenant, session: &str) -> Result<Large<SessionFacts>, ServiceError> {
-        let room = self.memory.answers(FORMS_OF_ENTRIES * self.store.entry_bytes(session).await?).await?;
-        let facts = self.store.session_facts(tenant, session).await?;
-        Ok(Large { value: facts.ok_or_else(|| ServiceError::unknown("session", session))?, room })
-    }
-}
-
-/// The rows of a tenant's session.
-pub(super) struct Rows<'a> {
-    sessions: &'a Sessions,
-    tenant: &'a Tenant,
-    session: &'a str,
-}
-
-impl Source<Live> for Rows<'_> {
-    type Error = ServiceError;
-
-    async fn is_current(&self, live: &mut Live) -> Result<bool, ServiceError> {
-        Ok(self.sessions.store.is_as_seen(self.session, &mut live.seen).await?)
-    }
-
-    async fn read(&self) -> Result<Live, ServiceError> {
-        let Large { value: facts, room } = self.sessions.facts(self.tenant, self.session).await?;
-        let is_prompt =
-            facts.entries.len() * (1 + facts.row.initial_history.len() / RETURNS_AN_ENTRY) <= PROMPT_ENTRIES;
-        let live = match is_prompt {
-            true => Live::replayed(facts)?,
-            false => self.sessions.advising.run(self.tenant, move || Live::replayed(facts)).await??,
-        };
-        drop(room);
-        self.sessions.weigh(&live);
-        Ok(live)
     }
 }

@@ -5,6 +5,7 @@
 mod support;
 
 mod abuse;
+mod answers;
 mod connections;
 mod interruption;
 mod lists;

@@ -1,0 +1,72 @@
+//! What is read of a session: its rows, in the room that other large answers leave, and the session replayed from them.
+
+use super::error::ServiceError;
+use super::live::Live;
+use super::memory::Large;
+use super::sessions::Sessions;
+use super::slots::Source;
+use crate::store::{SessionFacts, Tenant};
+
+/// Entries replayed in a few milliseconds.
+const PROMPT_ENTRIES: usize = 520;
+/// Log-returns of a start that make each of them as long again.
+const RETURNS_AN_ENTRY: usize = 2000;
+/// Entries are held as rows and as what is read from them.
+const FORMS_OF_ENTRIES: usize = 2;
+
+impl Sessions {
+    pub(super) fn rows<'a>(&'a self, tenant: &'a Tenant, session: &'a str) -> Rows<'a> {
+        Rows { sessions: self, tenant, session }
+    }
+
+    /// The work done at once where it is short, and in a turn of the tenant's apart from the runtime's threads where it is long.
+    ///
+    /// # Errors
+    /// No turn came in time.
+    pub(super) async fn apart<T: Send + 'static>(
+        &self,
+        tenant: &Tenant,
+        is_long: bool,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        match is_long {
+            true => self.advising.run(tenant, work).await,
+            false => Ok(work()),
+        }
+    }
+
+    /// A session and its entries, once other large answers leave room for them; the room is held as long as they are.
+    ///
+    /// # Errors
+    /// There is no such session; there is no room in time.
+    pub(super) async fn facts(&self, tenant: &Tenant, session: &str) -> Result<Large<SessionFacts>, ServiceError> {
+        let room = self.memory.answers(FORMS_OF_ENTRIES * self.store.entry_bytes(session).await?).await?;
+        let facts = self.store.session_facts(tenant, session).await?;
+        Ok(Large { value: facts.ok_or_else(|| ServiceError::unknown("session", session))?, room })
+    }
+}
+
+/// The rows of a tenant's session.
+pub(super) struct Rows<'a> {
+    sessions: &'a Sessions,
+    tenant: &'a Tenant,
+    session: &'a str,
+}
+
+impl Source<Live> for Rows<'_> {
+    type Error = ServiceError;
+
+    async fn is_current(&self, live: &mut Live) -> Result<bool, ServiceError> {
+        Ok(self.sessions.store.is_as_seen(self.session, &mut live.seen).await?)
+    }
+
+    async fn read(&self) -> Result<Live, ServiceError> {
+        let Large { value: facts, room } = self.sessions.facts(self.tenant, self.session).await?;
+        let is_prompt =
+            facts.entries.len() * (1 + facts.row.initial_history.len() / RETURNS_AN_ENTRY) <= PROMPT_ENTRIES;
+        let live = self.sessions.apart(self.tenant, !is_prompt, move || Live::replayed(facts)).await??;
+        drop(room);
+        self.sessions.weigh(&live);
+        Ok(live)
+    }
+}

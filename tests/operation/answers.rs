@@ -1,0 +1,205 @@
+//! Every answer that may be large takes its part of one budget before it is made: each operation of the description is asked for its
+//! largest answer, and in a development build an answer above 64 KB without its part ends the call with 500.
+
+use reqwest::{Method, StatusCode};
+use serde_json::{Value, json};
+
+use crate::support::App;
+
+/// Answers up to this size are not counted.
+const COUNTED_FROM: usize = 64 << 10;
+/// Letters of four bytes each.
+const NAME: &str = "\u{10348}";
+
+/// Labels at all their limits.
+fn labels() -> Value {
+    let tags: Vec<String> = (0..20).map(|tag| format!("{}{tag:02}", NAME.repeat(48))).collect();
+    json!({ "name": NAME.repeat(100), "notes": NAME.repeat(2000), "tags": tags })
+}
+
+fn labelled(mut body: Value) -> Value {
+    let labels = labels();
+    body.as_object_mut().unwrap().extend(labels.as_object().unwrap().clone());
+    body
+}
+
+fn returns(count: usize) -> Vec<f64> {
+    (0..count).map(|k| 0.004 + 0.02 * (1.7 * k as f64).sin()).collect()
+}
+
+/// What the largest answers are made of.
+struct Store {
+    app: App,
+    /// A training that has ended, and an evaluation.
+    jobs: [String; 2],
+    /// Of a long history.
+    policy: String,
+    /// Of many periods.
+    session: String,
+}
+
+impl Store {
+    async fn filled() -> Store {
+        let mut app = App::start().await;
+        let problem = json!({ "horizon": 2, "rate_per_step": 0.001, "history": returns(3000),
+            "learning": { "kind": "decay", "half_life": 40 }, "radius": { "rule": "bridge", "paths": 100, "scale": 0.1 } });
+        let training = labelled(json!({ "problem": problem, "design": { "count": 20, "initial_laws": "resampled" } }));
+        app.train(&training).await;
+        let trained = app.policy.clone();
+        app.open_with(labelled(json!({ "rolling": true }))).await;
+        for (period, log_return) in returns(250).into_iter().enumerate() {
+            assert_eq!(app.observe(period + 1, log_return).await.0, StatusCode::OK);
+        }
+        let session = app.session.clone();
+        let evaluation =
+            json!({ "problem": crate::support::specification(2)["problem"], "frameworks": ["plug_in"], "paths": 200 });
+        let (status, accepted) = app.post("/evaluate", &evaluation).await;
+        assert_eq!(status, StatusCode::ACCEPTED, "{accepted}");
+        let evaluated = accepted["job"].as_str().unwrap().to_owned();
+        app.until(&evaluated, |job| job["state"] == "succeeded").await;
+        let (_, listed) = app.get("/jobs?limit=1000").await;
+        let training = listed["jobs"].as_array().unwrap().iter().find(|job| job["kind"] == "train").unwrap()["job"]
+            .as_str()
+            .unwrap();
+        let jobs = [training.to_owned(), evaluated];
+        // Enough of each kind for a list above 64 KB.
+        let small: Value = serde_json::from_slice(&crate::support::trained(&crate::support::specification(2))).unwrap();
+        for seed in 1..=8 {
+            let mut other = small.clone();
+            other["specification"]["seed"] = json!(seed);
+            let (status, imported) = app.post("/policies/import", &other).await;
+            assert_eq!(status, StatusCode::CREATED, "{imported}");
+            let policy = format!("/policies/{}", imported["policy"].as_str().unwrap());
+            assert_eq!(app.send(Method::PATCH, &policy, Some(&labels())).await.0, StatusCode::OK);
+            assert_eq!(
+                app.post("/sessions", &labelled(json!({ "policy": imported["policy"] }))).await.0,
+                StatusCode::CREATED
+            );
+            let mut queued = crate::support::specification(2);
+            queued["seed"] = json!(seed + 100);
+            assert_eq!(app.post("/train", &labelled(queued)).await.0, StatusCode::ACCEPTED);
+        }
+        let named = format!("/sessions/{session}");
+        for round in 0..300 {
+            let change = json!({ "name": format!("{round}") });
+            assert_eq!(app.send(Method::PATCH, &named, Some(&change)).await.0, StatusCode::OK);
+        }
+        Store { app, jobs, policy: trained, session }
+    }
+
+    /// The largest legal request of an operation, and whether its answer is above 64 KB.
+    fn largest(&self, operation: &str) -> (String, Option<Value>, bool) {
+        let Store { jobs: [training, evaluation], policy, session, .. } = self;
+        let (of_policy, of_session, of_job) =
+            (format!("/policies/{policy}"), format!("/sessions/{session}"), format!("/jobs/{training}"));
+        let problem =
+            json!({ "rate_per_step": 0.001, "history": returns(5000), "radius": { "rule": "fixed", "radius": 0.001 } });
+        let of_text = |lines: usize| returns(lines).iter().map(|back| format!("{back:.4}\n")).collect::<String>();
+        let body = |path: &str, body: Value| (path.to_owned(), Some(body), false);
+        let asked = |path: &str| (path.to_owned(), None, false);
+        let large = |path: &str| (path.to_owned(), None, true);
+        match operation {
+            "get /" => asked("/"),
+            "get /action" => large(&format!("/action?session={session}&explain=worst_case")),
+            "post /advise" => ("/advise".into(), Some(json!({ "problem": problem })), false),
+            "get /audit" => large("/audit?limit=1000"),
+            "post /backtest" => body(
+                "/backtest",
+                json!({ "log_returns": returns(60), "rate": 0.002, "periods_per_year": 12, "window": 24, "count": 20 }),
+            ),
+            "get /dashboard/{file}" => asked("/dashboard/inter.woff2"),
+            "get /docs" => asked("/docs"),
+            "get /docs/{file}" => asked("/docs/start.js"),
+            "post /evaluate" => body(
+                "/evaluate",
+                json!({ "problem": crate::support::specification(2)["problem"], "frameworks": ["plug_in"] }),
+            ),
+            "post /frontier" => body(
+                "/frontier",
+                json!({ "problem": { "rate_per_step": 0.001, "history": returns(40) }, "resamples": 20, "scales": [0, 1], "block": 3 }),
+            ),
+            "get /guide" => asked("/guide"),
+            "get /guide/{file}" => asked("/guide/requests"),
+            "get /jobs" => asked("/jobs?limit=1000"),
+            "get /jobs/{id}" => asked(&of_job),
+            "delete /jobs/{id}" => asked(&of_job),
+            "post /jobs/{id}/cancel" => (format!("{of_job}/cancel"), None, false),
+            "get /jobs/{id}/events" => asked(&format!("{of_job}/events")),
+            "get /jobs/{id}/report" => asked(&format!("/jobs/{evaluation}/report")),
+            "get /health" | "get /key" | "get /livez" | "get /metrics" | "get /readyz" => asked(&operation[4..]),
+            "post /observe" => {
+                let one = |period: usize| json!({ "session": session, "period": period, "log_return": 0.001, "confirm": true });
+                let unknown =
+                    |k: usize| json!({ "session": format!("session_{k:032x}"), "period": 1, "log_return": 0.001 });
+                let reports: Vec<Value> = std::iter::once(one(251)).chain((0..999).map(unknown)).collect();
+                ("/observe".into(), Some(json!(reports)), true)
+            }
+            "get /openapi.json" => large("/openapi.json"),
+            "get /policies" => large("/policies?limit=1000"),
+            "post /policies/import" => {
+                let small = crate::support::trained(&crate::support::specification(2));
+                body("/policies/import", serde_json::from_slice(&small).unwrap())
+            }
+            "get /policies/{id}" => large(&of_policy),
+            "get /policies/{id}/export" => large(&format!("{of_policy}/export")),
+            "post /returns" => (
+                "/returns".into(),
+                Some(json!({ "text": of_text(8000), "choices": { "kind": "simple", "unit": "fraction" } })),
+                true,
+            ),
+            "get /sessions" => large("/sessions?limit=1000&count=care"),
+            "post /sessions" => body("/sessions", labelled(json!({ "policy": policy, "rolling": true }))),
+            "get /sessions/{id}" | "delete /sessions/{id}" => asked(&of_session),
+            "patch /sessions/{id}" => body(&of_session, labels()),
+            "delete /policies/{id}" => asked(&of_policy),
+            "patch /policies/{id}" => body(&of_policy, labels()),
+            "post /sessions/{id}/corrections" => body(
+                &format!("{of_session}/corrections"),
+                json!({ "correction": 1, "period": 3, "log_return": 0.002, "reason": NAME.repeat(200), "confirm": true }),
+            ),
+            "get /sessions/{id}/history" => large(&format!("{of_session}/history")),
+            "post /sessions/{id}/renewals" => {
+                body(&format!("{of_session}/renewals"), json!({ "renewal": 1, "policy": policy }))
+            }
+            "post /train" => body("/train", labelled(json!({ "problem": problem, "design": { "count": 20 } }))),
+            "post /what-if" => {
+                let range = json!({ "from": 0.01, "to": 2, "points": 30 });
+                let asked = json!({ "session": session, "sweep": { "radius_scale": range }, "explain": "worst_case" });
+                ("/what-if".into(), Some(asked), true)
+            }
+            _ => panic!(
+                "{operation} of the description has no largest answer here: what part of the budget does it take?"
+            ),
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_operation_has_its_part_of_the_budget_before_its_largest_answer_is_made() {
+    let store = Store::filled().await;
+    let description: Value = serde_json::from_str(&std::fs::read_to_string("api/openapi.json").unwrap()).unwrap();
+    let paths = description["paths"].as_object().unwrap();
+    let methods = |path: &str| {
+        paths[path].as_object().unwrap().keys().map(|method| format!("{method} {path}")).collect::<Vec<_>>()
+    };
+    let mut operations: Vec<String> = paths.keys().flat_map(|path| methods(path)).collect();
+    // What others ask about is deleted last.
+    operations.sort_by_key(|operation| operation.starts_with("delete"));
+    for operation in operations {
+        let (path, body, is_large) = store.largest(&operation);
+        let method = operation.split(' ').next().unwrap().to_uppercase();
+        let request = store
+            .app
+            .client
+            .request(Method::from_bytes(method.as_bytes()).unwrap(), format!("{}{path}", store.app.url));
+        let answer = body.iter().fold(request, |request, body| request.json(body)).send().await.unwrap();
+        let status = answer.status();
+        let bytes = answer.bytes().await.unwrap();
+        // A policy that sessions live by stays.
+        let is_answered = status.is_success() || status.is_redirection() || status == StatusCode::CONFLICT;
+        let told = String::from_utf8_lossy(&bytes[..bytes.len().min(400)]).into_owned();
+        assert!(is_answered, "{operation}: {status} {told}");
+        assert!(!is_large || bytes.len() > COUNTED_FROM, "{operation}: {} bytes", bytes.len());
+        println!("{operation}: {} bytes", bytes.len());
+    }
+}
