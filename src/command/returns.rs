@@ -219,7 +219,7 @@ impl Returns {
             self.column,
             self.periods_per_year,
             if self.periods_per_year == 1 { "" } else { "s" },
-            100.0 * compounded(mean / periods, periods),
+            100.0 * mean,
             100.0 * volatility,
             100.0 * self.rate(),
             100.0 * compounded(self.rate(), periods),

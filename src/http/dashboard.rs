@@ -8,11 +8,12 @@ use std::sync::LazyLock;
 
 use axum::Extension;
 use axum::http::{HeaderMap, HeaderValue, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 
 use super::asset::{Asset, HTML, SCRIPT, STYLE, TEXT};
 use super::documentation::Published;
 use super::extract::Id;
+use super::operations;
 use super::problem::Problem;
 
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
@@ -137,7 +138,7 @@ pub fn embedded(name: &str) -> Option<&'static [u8]> {
 pub async fn root(Extension(published): Extension<Published>, headers: HeaderMap) -> Response {
     let mut response = match asset("index.html") {
         Some(page) if !wants_json(&headers) => page.served(CONTENT_SECURITY_POLICY, &headers),
-        _ => ([(header::CONTENT_TYPE, "application/json")], published.as_str()).into_response(),
+        _ => operations::description(published),
     };
     response.headers_mut().insert(header::LINK, HeaderValue::from_static(LINKS));
     response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));

@@ -81,5 +81,9 @@ pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Pr
 #[utoipa::path(get, path = "/openapi.json", tag = "operations",
     responses((status = 200, description = "OpenAPI 3.1.", body = serde_json::Value)))]
 pub async fn openapi(Extension(published): Extension<Published>) -> Response {
+    description(published)
+}
+
+pub(super) fn description(published: Published) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], Extension(Embedded), published.as_str()).into_response()
 }
