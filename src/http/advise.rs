@@ -62,7 +62,7 @@ pub async fn advise(
         }
     };
     metrics::histogram!(ACTION_SECONDS, "mode" => mode).record(started.elapsed().as_secs_f64());
-    bodies::written(answer).await
+    bodies::written(&service, answer).await
 }
 
 /// What tells whether a question says its horizon, and whether it names assets.

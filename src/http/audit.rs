@@ -97,5 +97,5 @@ pub async fn list(
     let mut entries = rows.iter().filter(|row| row.sequence > 0);
     let next = page::next(entries.clone().count(), limit, entries.next_back().map(|row| row.sequence));
     let value = AuditPage { entries: rows.into_iter().map(Into::into).collect(), next };
-    bodies::written(Large { value, room }).await
+    bodies::written(&service, Large { value, room }).await
 }

@@ -8,7 +8,6 @@ use std::convert::Infallible;
 use std::io;
 use std::sync::Arc;
 
-use axum::Json;
 use axum::body::{Body, Bytes, HttpBody, to_bytes};
 use axum::extract::Request;
 use axum::http::header;
@@ -64,35 +63,58 @@ impl Bodies {
     }
 }
 
-/// A value as the answer. What is large is written where nobody waits for the thread, and leaves in parts.
-///
-/// # Errors
-/// It cannot be written as JSON.
-pub async fn written<T: Serialize + Send + 'static>(Large { value, room }: Large<T>) -> Result<Response, Problem> {
-    if room.is_none() {
-        return Ok(Json(value).into_response());
-    }
-    let writing = tokio::task::spawn_blocking(move || serde_json::to_vec(&value));
-    let bytes = writing.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)?;
-    Ok(sent(Large { value: bytes, room }))
-}
-
-/// A value that is in memory already as the answer, which takes its part of the budget by its length before it is written.
+/// A value as the answer. What is large has its part of the budget, by its length where nobody could estimate it before, is written
+/// where nobody waits for the thread, and leaves in parts.
 ///
 /// # Errors
 /// Other large answers leave no room for it; it cannot be written as JSON.
-pub async fn fitting<T: Serialize + Send + 'static>(service: &Service, value: T) -> Result<Response, Problem> {
-    let mut length = Length(0);
-    serde_json::to_writer(&mut length, &value).map_err(ServiceError::internal)?;
-    written(Large { value, room: service.room_for(length.0).await? }).await
+pub async fn written<T: Serialize + Send + 'static>(
+    service: &Service,
+    Large { value, room }: Large<T>,
+) -> Result<Response, Problem> {
+    let room = match room {
+        Some(room) => room,
+        None => {
+            let mut start = Start { bytes: Vec::new(), length: 0 };
+            serde_json::to_writer(&mut start, &value).map_err(ServiceError::internal)?;
+            match service.room_for(start.length).await? {
+                Some(room) => room,
+                None => return Ok(as_json(start.bytes)),
+            }
+        }
+    };
+    let writing = tokio::task::spawn_blocking(move || serde_json::to_vec(&value));
+    let bytes = writing.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)?;
+    Ok(sent(Large { value: bytes, room: Some(room) }))
 }
 
-/// Counts what is written.
-struct Length(usize);
+/// What was recorded as the answer to a call, which the same call gets again: so one that finds no room may come again.
+///
+/// # Errors
+/// Other large answers leave no room for it.
+pub async fn recorded(service: &Service, json: String) -> Result<Response, Problem> {
+    Ok(match service.room_for(json.len()).await? {
+        Some(room) => sent(Large { value: json.into_bytes(), room: Some(room) }),
+        None => as_json(json.into_bytes()),
+    })
+}
 
-impl io::Write for Length {
+fn as_json(bytes: Vec<u8>) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], bytes).into_response()
+}
+
+/// Keeps what is written as long as it is small, and counts it all.
+struct Start {
+    bytes: Vec<u8>,
+    length: usize,
+}
+
+impl io::Write for Start {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 += bytes.len();
+        self.length += bytes.len();
+        if self.length <= UNIT {
+            self.bytes.extend_from_slice(bytes);
+        }
         Ok(bytes.len())
     }
 

@@ -190,7 +190,7 @@ pub async fn list(
     let jobs = service.jobs.list(&caller.tenant, limit, after).await?;
     let next = page::next(jobs.len(), limit, jobs.last().map(|job| job.row.sequence));
     let value = wire::JobPage { jobs: jobs.into_iter().map(Into::into).collect(), next };
-    bodies::written(Large { value, room }).await
+    bodies::written(&service, Large { value, room }).await
 }
 
 /// A job: state, progress, result.
@@ -203,7 +203,7 @@ pub async fn get(
     By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Response, Problem> {
-    bodies::fitting(&service, wire::Job::from(service.jobs.get(&caller.tenant, &id).await?)).await
+    bodies::written(&service, Large::from(wire::Job::from(service.jobs.get(&caller.tenant, &id).await?))).await
 }
 
 /// Cancel a job: always accepted; it stops within a second. An ended job stays as it is.

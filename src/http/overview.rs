@@ -215,7 +215,7 @@ pub async fn list(
     let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
     let (damaged, care) = (found.damaged, found.care.map(CareCount::from));
     let value = SessionPage { sessions, damaged, total: found.total, care, next };
-    bodies::written(Large { value, room }).await
+    bodies::written(&service, Large { value, room }).await
 }
 
 fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {

@@ -35,7 +35,7 @@ pub async fn list(
     let rows = service.policies.list(&caller.tenant, limit, after).await?;
     let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
     let value = wire::PolicyPage { policies: rows.into_iter().map(Into::into).collect(), next };
-    bodies::written(Large { value, room }).await
+    bodies::written(&service, Large { value, room }).await
 }
 
 /// A policy with its specification and the diagnostics of every step.
@@ -62,7 +62,7 @@ pub async fn get(
         diagnostics: advisor.policy().diagnostics().cloned().collect(),
         specification,
     };
-    bodies::fitting(&service, detail).await
+    bodies::written(&service, Large::from(detail)).await
 }
 
 /// The portable document of a policy; its SHA-256 is the policy's name.

@@ -16,7 +16,6 @@ use super::bodies;
 use super::decode;
 use super::extract::JsonBytes;
 use super::problem::Problem;
-use super::sessions::as_recorded;
 use super::telemetry;
 use crate::service::Service;
 use crate::service::answer::Observed;
@@ -111,7 +110,9 @@ pub async fn observe(
 ) -> Result<Response, Problem> {
     let length = body.length();
     match body.decoded(decode::json).await? {
-        Reports::One(report) => Ok(as_recorded(service.sessions.report(&caller, *report, &caller.turn).await?)),
+        Reports::One(report) => {
+            bodies::recorded(&service, service.sessions.report(&caller, *report, &caller.turn).await?).await
+        }
         Reports::Many(reports) => {
             let room = service.room_for(reports.len() * ANSWER_BYTES + ANSWERED_A_BYTE * length).await?;
             let reported = service.sessions.report_all(&caller, reports).await?;

@@ -31,5 +31,5 @@ pub async fn read(
 ) -> Result<Response, Problem> {
     let room = service.room_for(ANSWERED_A_BYTE * question.text.len()).await?;
     let value = service.sessions.read_returns(&caller.tenant, question).await?;
-    bodies::written(Large { value, room }).await
+    bodies::written(&service, Large { value, room }).await
 }

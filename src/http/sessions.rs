@@ -24,6 +24,7 @@ use crate::service::allowance::Class;
 use crate::service::answer::Corrected;
 use crate::service::explain::Explain;
 use crate::service::history::History;
+use crate::service::memory::Large;
 use crate::service::metrics::ACTION_SECONDS;
 use crate::service::plan::{Renew, Renewed};
 use crate::service::report::Correct;
@@ -71,7 +72,7 @@ pub async fn get(
     let live = service.sessions.get(&caller.tenant, &id).await?;
     let renewal = service.sessions.renewal(&live).await?;
     let labels = service.names.of(&caller.tenant, &id).await?;
-    bodies::fitting(&service, wire::Session { renewal, labels, ..live.into() }).await
+    bodies::written(&service, Large::from(wire::Session { renewal, labels, ..live.into() })).await
 }
 
 /// Where a session started and everything recorded of it: what was reported, what was told then, what would be told now.
@@ -84,7 +85,7 @@ pub async fn history(
     By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Response, Problem> {
-    bodies::written(service.sessions.history(&caller.tenant, &id, &caller.turn).await?).await
+    bodies::written(&service, service.sessions.history(&caller.tenant, &id, &caller.turn).await?).await
 }
 
 /// Report a period anew, put in one that was skipped or take one out: exactly once, durable before it is answered. What was
@@ -106,7 +107,7 @@ pub async fn correct(
     JsonBody(correction): JsonBody<Correct>,
 ) -> Result<Response, Problem> {
     let corrected = service.sessions.correct(&caller, &id, &correction, &caller.turn).await?;
-    Ok(as_recorded(corrected))
+    bodies::recorded(&service, corrected).await
 }
 
 /// Go on by another policy from the coming period: exactly once, durable before it is answered.
@@ -127,12 +128,7 @@ pub async fn renew(
     JsonBody(renewal): JsonBody<Renew>,
 ) -> Result<Response, Problem> {
     let (by, turn) = (caller.actor(), Some(&*caller.turn));
-    Ok(as_recorded(service.sessions.renew(&caller.tenant, by, &id, &renewal, turn).await?))
-}
-
-/// An answer as it is stored.
-pub fn as_recorded(json: String) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], json).into_response()
+    bodies::recorded(&service, service.sessions.renew(&caller.tenant, by, &id, &renewal, turn).await?).await
 }
 
 /// Delete a session and all that is recorded of it.
@@ -209,5 +205,5 @@ pub async fn action(State(service): State<Arc<Service>>, Asked(caller, ask): Ask
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());
-    bodies::written(action.map(|action| ActionAnswer::new(ask.session, action))).await
+    bodies::written(&service, action.map(|action| ActionAnswer::new(ask.session, action))).await
 }

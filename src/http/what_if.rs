@@ -33,5 +33,5 @@ pub async fn what_if(
     let started = Instant::now();
     let answer = service.sessions.what_if(&caller.tenant, request).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => "what_if").record(started.elapsed().as_secs_f64());
-    bodies::written(answer).await
+    bodies::written(&service, answer).await
 }
