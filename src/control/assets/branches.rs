@@ -32,8 +32,12 @@ pub(super) struct Branch {
     pub bend: f64,
     /// The level to which positions are lowered; infinite where the atom is left.
     pub level: f64,
+    /// The logarithm of the level, which branches are compared by.
+    log_level: f64,
     /// True where the level follows allocation and price: at a local minimum inside a phase.
     pub follows: bool,
+    /// The branch of the point before that it goes on from; `None` of a new one, and where there was no point before.
+    pub continues: Option<usize>,
 }
 
 /// All branches of all atoms; those of an atom lie together, the first leaves it.
@@ -84,8 +88,9 @@ impl Branches {
         }
     }
 
-    /// Finds the branches at a point, and keeps beside them, as moves that stay, those of `before` that none of now continues and
-    /// that `counts` still: what is gone may come back, far below.
+    /// Finds the branches at a point with what each continues, and keeps beside them, as moves that stay, those of `before` that none
+    /// of now continues and that `counts` still: what is gone may come back, far below. Cost O(n d ln d), and for each atom the
+    /// product of its branches then and now.
     pub fn find_after(
         &mut self,
         step: &AssetsStep,
@@ -95,27 +100,25 @@ impl Branches {
         counts: impl Fn(usize, usize) -> bool,
     ) {
         self.start(step);
+        let mut goes_on = Vec::new();
         for atom in 0..step.atoms() {
             let from = self.all.len();
             self.find_of(step, atom, allocation, price);
-            let found = from + 1..self.all.len();
-            for gone in before.of(atom).skip(1) {
-                let goes_on = |branch: usize| before.nearest(atom, &self.all[branch]) == Some(gone);
-                if counts(atom, gone) && !found.clone().any(goes_on) {
-                    let (level, cost, row) = (before.all[gone].level, before.all[gone].cost, before.excess(gone));
-                    self.push(step.utility, price, allocation, row.iter().copied(), cost, level);
-                }
+            let then = before.of(atom);
+            goes_on.clear();
+            goes_on.resize(then.len(), false);
+            self.all[from].continues = Some(then.start);
+            for branch in &mut self.all[from + 1..] {
+                branch.continues = before.nearest(atom, branch);
+                branch.continues.into_iter().for_each(|continued| goes_on[continued - then.start] = true);
+            }
+            for gone in then.clone().skip(1).filter(|gone| !goes_on[gone - then.start] && counts(atom, *gone)) {
+                let (level, cost, row) = (before.all[gone].level, before.all[gone].cost, before.excess(gone));
+                self.push(step.utility, price, allocation, row.iter().copied(), cost, level);
+                self.all.last_mut().into_iter().for_each(|kept| kept.continues = Some(gone));
             }
             self.first.push(self.all.len());
         }
-    }
-
-    /// The branch of an atom `before` that this one of now continues.
-    pub fn continued(&self, atom: usize, branch: usize, before: &Branches) -> Option<usize> {
-        if branch == self.first[atom] {
-            return Some(before.first[atom]);
-        }
-        before.nearest(atom, &self.all[branch])
     }
 
     /// The moved branch of an atom that is nearest to another by level and cost, if it is as near as a step may take it. The level
@@ -123,7 +126,7 @@ impl Branches {
     fn nearest(&self, atom: usize, other: &Branch) -> Option<usize> {
         let apart = |branch: &usize| {
             let branch = &self.all[*branch];
-            (branch.level / other.level).ln().abs().max((branch.cost - other.cost).abs())
+            (branch.log_level - other.log_level).abs().max((branch.cost - other.cost).abs())
         };
         let moved = self.of(atom).skip(1).filter(|branch| apart(branch) < NEAR);
         moved.min_by(|left, right| apart(left).total_cmp(&apart(right)))
@@ -159,7 +162,17 @@ impl Branches {
         self.still.push(0.0);
         let (value, slope) = utility.at(wealth);
         let bend = utility.relative_aversion(wealth) / wealth;
-        self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows: false });
+        let payoff = value + price * cost;
+        self.all.push(Branch {
+            cost,
+            payoff,
+            slope,
+            bend,
+            level,
+            log_level: level.ln(),
+            follows: false,
+            continues: None,
+        });
     }
 
     fn find_of(&mut self, step: &AssetsStep, atom: usize, allocation: &[f64], price: f64) {
@@ -208,7 +221,8 @@ impl Branches {
                 self.still.push(0.0);
             }
             let bend = if follows { aversion / room } else { aversion };
-            self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows });
+            let (payoff, log_level) = (value + price * cost, level.ln());
+            self.all.push(Branch { cost, payoff, slope, bend, level, log_level, follows, continues: None });
         });
         (self.levelling, self.last) = (levelling, last);
         self.bounded &= bounded;

@@ -272,7 +272,7 @@ impl<'a> Interior<'a> {
     fn give_way(&mut self, atom: usize) -> f64 {
         let mut way: f64 = 0.0;
         for branch in self.branches.of(atom) {
-            let least = match self.branches.continued(atom, branch, &self.before) {
+            let least = match self.branches.all[branch].continues {
                 Some(before) => (KEPT_SLACK * self.pairs_before[before].slack).max(LEAST_SLACK * self.barrier),
                 None => NEW_SLACK * self.barrier,
             };
@@ -288,7 +288,7 @@ impl<'a> Interior<'a> {
         let mut off_centre = false;
         for branch in self.branches.of(atom) {
             let slack = self.branches.all[branch].payoff - self.tops[atom];
-            let multiplier = match self.branches.continued(atom, branch, &self.before) {
+            let multiplier = match self.branches.all[branch].continues {
                 Some(before) => {
                     off_centre |= self.pairs_before[before].multiplier * slack > OFF_CENTRE * central;
                     self.pairs_before[before].multiplier + direction.dual_length * direction.multipliers[before]
