@@ -2,6 +2,7 @@
 
 use super::moments::{middle, moments, spread, sure_mean};
 use super::words::{percent, percent_a_year};
+use crate::control::request::annualised::compounded;
 
 /// A standard deviation a period and a year, and a mean a year beyond chance, above which a reading holds only where a person
 /// confirms it.
@@ -30,7 +31,7 @@ pub fn unusual_moments(simple: &[f64], periods: f64) -> Option<String> {
     } else if deviation_per_year > DOUBTFUL_YEARLY_DEVIATION {
         found.push(format!("a standard deviation of {} a year", percent(deviation_per_year)));
     }
-    if sure_mean(simple) * periods > DOUBTFUL_YEARLY_MEAN {
+    if compounded(sure_mean(simple), periods) > DOUBTFUL_YEARLY_MEAN {
         found.push(format!("a mean of {} a year", percent_a_year(mean, periods)));
     }
     (!found.is_empty()).then(|| found.join(" and "))

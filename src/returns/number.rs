@@ -139,6 +139,20 @@ pub fn looks_numeric(text: &str) -> bool {
         && is_digits(exponent.strip_prefix(['+', '-']).unwrap_or(exponent))
 }
 
+/// Splits a number with a part after its point off a mark of one to three letters or symbols before or after it, as amounts of a
+/// currency have one and labels do not: the mark, and the number.
+pub fn marked(text: &str) -> Option<(&str, &str)> {
+    let start = text.find(|letter: char| letter.is_ascii_digit() || matches!(letter, '-' | '+' | '.'))?;
+    let end = text.rfind(|letter: char| letter.is_ascii_digit())? + 1;
+    let (before, number, after) = (text[..start].trim(), text.get(start..end)?, text[end..].trim());
+    let mark = match (before, after) {
+        (mark, "") | ("", mark) => mark,
+        _ => return None,
+    };
+    let is_amount = number.contains(['.', ',']) && looks_numeric(number);
+    ((1..=3).contains(&mark.chars().count()) && is_amount).then_some((mark, number))
+}
+
 pub fn has_percent(text: &str) -> bool {
     text.trim_end_matches([')', ' ']).ends_with('%')
 }
@@ -146,6 +160,23 @@ pub fn has_percent(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_with_an_unknown_mark_is_told_apart_from_words() {
+        for (text, found) in [
+            ("kr 12.3", Some(("kr", "12.3"))),
+            ("\u{20b9}12.3", Some(("\u{20b9}", "12.3"))),
+            ("12,3p", Some(("p", "12,3"))),
+            ("C$-1,234.5", Some(("C$", "-1,234.5"))),
+            ("DE0001234567", None),
+            ("2021-01-31", None),
+            ("Fund", None),
+            ("12.3", None),
+            ("kr 12 p", None),
+        ] {
+            assert_eq!(marked(text), found, "{text}");
+        }
+    }
 
     #[test]
     fn numbers_are_read_by_their_mark_and_nothing_else_is_one() {

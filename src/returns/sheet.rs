@@ -12,7 +12,7 @@ use super::choices::Choices;
 use super::dates::{are_dates, heads_dates};
 use super::heading::{aside, core, headings};
 use super::months::MonthsOfYears;
-use super::number::{is_number, looks_numeric};
+use super::number::{is_number, looks_numeric, marked};
 use super::outcome::Stop;
 use super::table::Table;
 use super::words::counted;
@@ -69,8 +69,14 @@ impl Column<'_> {
 
     fn is_mostly_numbers(&self) -> bool {
         let given = self.given();
-        !given.is_empty()
-            && 2 * given.iter().filter(|text| looks_numeric(text) || is_number(text)).count() > given.len()
+        let numbers = given.iter().filter(|text| looks_numeric(text) || is_number(text)).count();
+        !given.is_empty() && (2 * numbers > given.len() || self.are_amounts(&given))
+    }
+
+    /// Whether all cells are amounts of one currency that is not known.
+    fn are_amounts(&self, given: &[&str]) -> bool {
+        let marks: Option<Vec<&str>> = given.iter().map(|text| Some(marked(text)?.0)).collect();
+        marks.is_some_and(|marks| marks.iter().all(|mark| *mark == marks[0]))
     }
 
     /// The first cell that is no number, refused.

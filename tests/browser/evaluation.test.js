@@ -36,7 +36,7 @@ test("what was compared, on which policy and for whom, comes first, and then wha
   assert.match(first, /the bank pays 0\.20 % a month\. .Cautious, learns. is policy [0-9a-f]{10}; the other policies were trained for this\./);
   await page.locator(`a[href="#/policies/${policy}"]`).waitFor();
   const best = report.strategies.reduce((best, one) => (one.certainty_equivalent.value > best.certainty_equivalent.value ? one : best));
-  assert.ok(words.includes(`is worth the most to this investor: as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
+  assert.ok(words.includes(`came to the most over these futures: as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
   assert.match(words, /ends with less than was put in in \d+ % of the futures; the worst 5 % of them end with [\d.]+ on average\./);
   const main = report.strategies.find(({ strategy }) => strategy === report.reference);
   assert.notEqual(main, best);

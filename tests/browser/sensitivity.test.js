@@ -24,7 +24,7 @@ test("the sentences say what differs, in percent", () => {
     said(near),
     "Without its return of -8.6 % the advice would be 100 %. " +
       "After a return of -7.0 % the advice would be 0 %; after one of 6.0 % it would be 61.2 %. " +
-      "A coming return of -6.2 % would take the advice to the bank, and a higher one would not. " +
+      "A coming return of -6.2 % would take the advice to the bank. " +
       "The record has paid 0.51 % a period beyond what the bank pays now; the advice leaves the bank at 0.44 %.",
   );
 });

@@ -52,7 +52,7 @@ fn tell_why(past: &Past, advice: &Advice) {
         advice.radius
     );
     println!(
-        "Why: over {} months stocks paid {:.2} % a month beyond the bank. So short a record does not rule out laws",
+        "Why: over {} months stocks paid {:.2} % a month beyond the bank. The ball at a nominal 90 % holds laws",
         advice.sample_size,
         100.0 * past.edge()
     );

@@ -83,7 +83,7 @@ function conclusions({ reference, request }, ended) {
   const sure = ({ certainty_equivalent: { value } }) => `as much as a sure ${wealth(value)}`;
   const main = ended.find(({ strategy }) => strategy === reference);
   const said = [
-    `${called(best)} is worth the most to this investor: ${sure(best)}${bank && bank !== best ? `, where all in the bank comes to ${wealth(bank.certainty_equivalent.value)}` : ""}.`,
+    `${called(best)} came to the most over these futures: ${sure(best)}${bank && bank !== best ? `, where all in the bank comes to ${wealth(bank.certainty_equivalent.value)}` : ""}.`,
   ];
   const place = ended.indexOf(main) + 1;
   if (main && main !== best) {

@@ -61,9 +61,9 @@ function coming({ allocation: told }, { to_bank, to_highest, low, high }, unit) 
   return [
     after,
     to_bank && now === allocation(0) && `The next ${unit} must return more than ${simple(to_bank)} before it leaves the bank.`,
-    to_bank && now !== allocation(0) && `A coming return of ${simple(to_bank)} would take the advice to the bank, and a higher one would not.`,
+    to_bank && now !== allocation(0) && `A coming return of ${simple(to_bank)} would take the advice to the bank.`,
     to_highest && now === allocation(1) && `It stays there unless the next ${unit} returns less than ${simple(to_highest)}.`,
-    to_highest && now !== allocation(1) && `One of ${simple(to_highest)} would take it to the highest allocation, and a lower one would not.`,
+    to_highest && now !== allocation(1) && `One of ${simple(to_highest)} would take it to the highest allocation.`,
   ].filter(Boolean);
 }
 
