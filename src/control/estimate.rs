@@ -33,7 +33,7 @@ const POLICY_NUMBER_BYTES: usize = 80;
 /// Statistics over all paths that a thread holds beside those of the states that it measures together.
 const STATISTICS: usize = 8;
 /// Numbers a value of the history that a thread holds while it solves a robust step.
-const STEP_NUMBERS: usize = 64;
+const STEP_NUMBERS: usize = 74;
 /// Predictions a function beyond those, where trading costs: at eight trades, while a refined table is made beside the one before.
 const TABLES: usize = 16;
 const FUNCTIONS_WITHOUT_COST: usize = 2;

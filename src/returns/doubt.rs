@@ -31,7 +31,8 @@ pub fn unusual_moments(simple: &[f64], periods: f64) -> Option<String> {
     } else if deviation_per_year > DOUBTFUL_YEARLY_DEVIATION {
         found.push(format!("a standard deviation of {} a year", percent(deviation_per_year)));
     }
-    if compounded(sure_mean(simple), periods) > DOUBTFUL_YEARLY_MEAN {
+    // Few numbers may be sure of nothing, not even of a positive mean.
+    if compounded(sure_mean(simple).max(0.0), periods) > DOUBTFUL_YEARLY_MEAN {
         found.push(format!("a mean of {} a year", percent_a_year(mean, periods)));
     }
     (!found.is_empty()).then(|| found.join(" and "))

@@ -29,7 +29,9 @@ const form = () => page.locator("form", { has: page.getByRole("button", { name: 
 test("the last period comes first, and the fields are those of their own form", async () => {
   await page.goto(`${ballast.url}/#/sessions/${session}`);
   await page.getByText("Put a period right").click();
-  assert.deepEqual(await form().getByLabel("Period").locator("option").allInnerTexts(), ["February 2008", "January 2008"]);
+  const periods = form().getByLabel("Period").locator("option");
+  await periods.first().waitFor({ state: "attached" });
+  assert.deepEqual(await periods.allInnerTexts(), ["February 2008", "January 2008"]);
   await form().getByText("Return, %").click();
   assert.equal(await page.evaluate(() => document.activeElement.form.textContent.includes("Put it right")), true);
 });

@@ -144,7 +144,9 @@ impl Store {
             "get /policies/{id}/export" => large(&format!("{of_policy}/export")),
             "post /returns" => (
                 "/returns".into(),
-                Some(json!({ "text": of_text(8000), "choices": { "kind": "simple", "unit": "fraction" } })),
+                Some(
+                    json!({ "text": of_text(8000), "choices": { "kind": "simple", "unit": "fraction", "unusual": true } }),
+                ),
                 true,
             ),
             "get /sessions" => large("/sessions?limit=1000&count=care"),
