@@ -19,10 +19,8 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use super::problem::{Problem, ProblemKind};
 use crate::service::Service;
 use crate::service::error::ServiceError;
-use crate::service::memory::{Large, Reserved};
+use crate::service::memory::{Large, UNIT};
 
-/// Bodies up to this size are not counted, and larger ones in units of it.
-const UNIT: usize = 64 << 10;
 /// Part of the memory limit that bodies may take: half of what the process has for itself.
 const PART: usize = 16;
 
@@ -152,7 +150,7 @@ pub async fn budgeted(service: &Service, response: Response) -> Response {
 /// A document as the answer, in parts: its memory is held until the last of them is taken from it, however slowly a client reads.
 /// What was reserved beyond its length is given back.
 pub fn sent(Large { value: bytes, room }: Large<Vec<u8>>) -> Response {
-    let room = room.and_then(|room| Reserved::only(room, bytes.len()));
+    let room = room.and_then(|room| room.only(bytes.len()));
     let headers =
         [(header::CONTENT_TYPE, "application/json".to_owned()), (header::CONTENT_LENGTH, bytes.len().to_string())];
     let parts = stream::unfold((Bytes::from(bytes), room), async |(mut left, room)| {

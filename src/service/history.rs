@@ -149,10 +149,10 @@ impl Sessions {
             }
             false => Vec::new(),
         };
-        let start = periods.at_start(Plan::of(&facts.row)?.terms.learning);
+        let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
+        let start = periods.at_start(terms.learning);
         let listing = move || Ok::<_, ServiceError>((observations(&facts, &periods, first, changed)?, facts.row));
         let (observations, row) = self.apart(tenant, is_large, listing).await??;
-        let Plan { terms, assets, .. } = Plan::of(&row)?;
         let first = self.policies.advisor(tenant, &row.policy).await?;
         let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();

@@ -34,7 +34,7 @@ const COPIES_OF_AN_ANSWER: usize = 2;
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// Bytes that a permit of a semaphore stands for: its permits are counted in 32 bits. An answer of no more is not counted; the
 /// connections bound those.
-const UNIT: usize = 1 << 16;
+pub const UNIT: usize = 1 << 16;
 
 /// Where a limit comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,7 +144,8 @@ pub struct Reserved(OwnedSemaphorePermit);
 
 impl Reserved {
     /// What of it `bytes` take, once they are known; `None` where they are so few that they are not counted.
-    pub fn only(Reserved(mut permits): Self, bytes: usize) -> Option<Self> {
+    pub fn only(self, bytes: usize) -> Option<Self> {
+        let Reserved(mut permits) = self;
         let needed = if bytes <= UNIT { 0 } else { bytes.div_ceil(UNIT) };
         match permits.num_permits().saturating_sub(needed) {
             0 => Some(Reserved(permits)),

@@ -322,6 +322,11 @@ impl EntryRow {
     }
 
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+        Self::beside(row, "created_ms", "seal")
+    }
+
+    /// The entry of a row that has a session beside it, so that its time and its seal have names of their own.
+    pub(super) fn beside(row: &Row, created_ms: &str, seal: &str) -> Result<Self, Failure> {
         let read = EntryRow {
             session: row.get("session")?,
             entry: from_sql(row.get("entry")?)?,
@@ -330,10 +335,10 @@ impl EntryRow {
             content_json: row.get("content_json")?,
             answer_json: row.get("answer_json")?,
             numbers: row.get("numbers")?,
-            created_ms: row.get("created_ms")?,
+            created_ms: row.get(created_ms)?,
             key: row.get("access_key")?,
         };
-        read.verified(&row.get::<Vec<u8>>("seal")?)
+        read.verified(&row.get::<Vec<u8>>(seal)?)
     }
 
     /// # Errors

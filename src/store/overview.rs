@@ -9,7 +9,7 @@
 
 use super::care::{Care, CareCounts, Today, needs, needs_any};
 use super::codec::{from_sql, to_sql};
-use super::entries::{EntryKind, EntryRow};
+use super::entries::EntryRow;
 use super::error::Failure;
 use super::labels::Labels;
 use super::query::{Query, Row};
@@ -313,17 +313,8 @@ impl SessionSummary {
 
 /// The last entry that moved a session, verified; `None` before the first.
 fn last_of(row: &Row) -> Result<Option<EntryRow>, Failure> {
-    let Some(entry) = row.get::<Option<i64>>("entry")? else { return Ok(None) };
-    let last = EntryRow {
-        session: row.get("session")?,
-        entry: from_sql(entry)?,
-        kind: EntryKind::stored(&row.get::<String>("kind")?)?,
-        number: from_sql(row.get("number")?)?,
-        content_json: row.get("content_json")?,
-        answer_json: row.get("answer_json")?,
-        numbers: row.get("numbers")?,
-        created_ms: row.get("reported_ms")?,
-        key: row.get("access_key")?,
-    };
-    last.verified(&row.get::<Vec<u8>>("last_seal")?).map(Some)
+    match row.get::<Option<i64>>("entry")? {
+        Some(_) => EntryRow::beside(row, "reported_ms", "last_seal").map(Some),
+        None => Ok(None),
+    }
 }

@@ -21,8 +21,9 @@ use super::branches::Branches;
 
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
 const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
-/// Points at most, and from a similar step's solution: where that takes more, it was not similar, and a fresh start is faster.
+/// Points at most.
 const STEP_LIMIT: usize = 100;
+/// The same from a similar step's solution: where that takes more, it was not similar, and a fresh start is faster.
 const STEP_LIMIT_NEAR: usize = 30;
 /// Halvings of a step that falls far below what it foresaw, at most.
 const HALVINGS: usize = 10;
@@ -208,8 +209,9 @@ impl<'a> Interior<'a> {
     /// Runs until the bounds are within the tolerance, or other assets would enter; from the solution of a step that turns out not to
     /// be similar, not to the end.
     pub fn run(&mut self, tolerance: f64, is_near: bool) {
+        let limit = if is_near { STEP_LIMIT_NEAR } else { STEP_LIMIT };
         let mut length = 1.0;
-        for _ in 0..if is_near { STEP_LIMIT_NEAR } else { STEP_LIMIT } {
+        for _ in 0..limit {
             self.tell_bounds();
             if self.upper - self.lower < tolerance || !self.entering.is_empty() {
                 return;

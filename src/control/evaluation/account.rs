@@ -140,8 +140,8 @@ pub fn mix_ended(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &
     periods.iter().zip(returns).fold((Ended::at(initial_wealth), 0.0), step).0
 }
 
-/// Mean, volatility and Sharpe ratio of a year, from returns of its periods: `mean` and the ratio's excess over the bank
-/// are arithmetic, deviations grow with the root of time.
+/// Mean, volatility and Sharpe ratio of a year, from returns of its periods: the mean is compounded, the ratio's excess over the
+/// bank is arithmetic, and deviations grow with the root of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Annual {
     /// Mean simple return of a year, compounded: `(1 + m)^p - 1`, m the mean of a period and p the periods of a year.
