@@ -71,7 +71,7 @@ impl AssetsAdvice {
         let solution = step(problem, fund, rows, radius).solve(None);
         let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let without_crash = (floor(problem) < lowest)
-            .then(|| step_above(lowest, problem, fund, rows, radius).solve(None).allocation.iter().sum());
+            .then(|| step_above(lowest, problem, fund, rows, radius).solve(Some(&solution)).allocation.iter().sum());
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
         AssetsAdvice {
             allocation: named(&problem.assets, &solution.allocation),

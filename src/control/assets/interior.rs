@@ -23,8 +23,6 @@ use super::branches::Branches;
 const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
 /// Points at most.
 const STEP_LIMIT: usize = 100;
-/// The same from a similar step's solution: where that takes more, it was not similar, and a fresh start is faster.
-const STEP_LIMIT_NEAR: usize = 30;
 /// Halvings of a step that falls far below what it foresaw, at most.
 const HALVINGS: usize = 10;
 /// How much of the barrier atoms may give way by, together, before a step is halved.
@@ -206,12 +204,10 @@ impl<'a> Interior<'a> {
         }));
     }
 
-    /// Runs until the bounds are within the tolerance, or other assets would enter; from the solution of a step that turns out not to
-    /// be similar, not to the end.
-    pub fn run(&mut self, tolerance: f64, is_near: bool) {
-        let limit = if is_near { STEP_LIMIT_NEAR } else { STEP_LIMIT };
+    /// Runs until the bounds are within the tolerance, or other assets would enter.
+    pub fn run(&mut self, tolerance: f64) {
         let mut length = 1.0;
-        for _ in 0..limit {
+        for _ in 0..STEP_LIMIT {
             self.tell_bounds();
             if self.upper - self.lower < tolerance || !self.entering.is_empty() {
                 return;

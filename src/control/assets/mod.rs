@@ -176,7 +176,7 @@ impl AssetsStep {
         loop {
             let among = self.among(&held);
             let mut interior = Interior::start(&among, self, &held, start, barrier);
-            interior.run(TOLERANCE, near.is_some());
+            interior.run(TOLERANCE);
             upper = interior.upper.min(upper);
             evaluations += interior.evaluations;
             if interior.entering.is_empty() {
