@@ -67,16 +67,11 @@ impl Column<'_> {
         self.cells.iter().filter(|cell| !cell.is_missing()).map(|cell| cell.text.as_ref()).collect()
     }
 
+    /// Whether most cells are meant as numbers, those of a currency that is not known among them.
     fn is_mostly_numbers(&self) -> bool {
         let given = self.given();
-        let numbers = given.iter().filter(|text| looks_numeric(text) || is_number(text)).count();
-        !given.is_empty() && (2 * numbers > given.len() || self.are_amounts(&given))
-    }
-
-    /// Whether all cells are amounts of one currency that is not known.
-    fn are_amounts(&self, given: &[&str]) -> bool {
-        let marks: Option<Vec<&str>> = given.iter().map(|text| Some(marked(text)?.0)).collect();
-        marks.is_some_and(|marks| marks.iter().all(|mark| *mark == marks[0]))
+        let is_meant = |text: &&&str| looks_numeric(text) || is_number(text) || marked(text).is_some();
+        2 * given.iter().filter(is_meant).count() > given.len()
     }
 
     /// The first cell that is no number, refused.
