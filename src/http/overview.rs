@@ -193,7 +193,7 @@ pub struct SessionPage {
 
 /// List sessions: all, or those that match, in some order, newest first unless told.
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
-    params(("search" = Option<String>, Query, max_length = 100, description = "Part of a name, of a tag, of the session's or its policy's identifier or of the policy's name, whatever the case."),
+    params(("search" = Option<String>, Query, max_length = 100, description = "Words, each the beginning of a word of the session's name or tags, of its policy's name or tags, or eight digits or more with which either's identifier begins, in any order and whatever the case."),
            ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
            ("state" = inline(Option<Is>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
            ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),

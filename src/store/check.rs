@@ -36,7 +36,8 @@ pub(super) const TOTALS: &str = "
         UNION ALL SELECT tenant, 0, $1 + octet_length(json)
             FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
         UNION ALL SELECT tenant, 0, octet_length(name) + octet_length(notes) + octet_length(tags)
-            + octet_length(folded_name) + octet_length(folded_tags) FROM labels
+            + octet_length(folded_name) + 2 * octet_length(words)
+            + 64 * (octet_length(words) - octet_length(replace(words, ' ', ''))) FROM labels
         UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + octet_length(plan_json)
             + room * ($2 + assets * $3) FROM sessions
     ), sums (tenant, sessions, bytes) AS (SELECT tenant, sum(sessions), sum(bytes) FROM parts GROUP BY tenant)

@@ -4,7 +4,7 @@
 //! and a session's advice are the same whatever they are called. Both kinds of thing have their labels in one table, each
 //! row written in the transaction of what it is of, and gone with it.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use futures_util::FutureExt;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -16,6 +16,7 @@ use super::error::Failure;
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Usage};
 use super::tenant::Tenant;
+use super::words::{self, Labelled, Worded};
 use super::{Store, StoreError};
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
@@ -54,13 +55,6 @@ pub struct Relabel {
 /// A field that is there, be it null.
 pub fn given<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserializer: D) -> Result<Option<T>, D::Error> {
     Option::<T>::deserialize(deserializer).map(|value| Some(value.unwrap_or_default()))
-}
-
-/// What has labels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Labelled {
-    Policy,
-    Session,
 }
 
 impl Relabel {
@@ -116,8 +110,13 @@ impl Labels {
 
     fn bytes(&self) -> i64 {
         let tags = self.tags_column();
-        let texts = [&self.name, &self.notes, &tags, &self.name.to_lowercase(), &tags.to_lowercase()];
-        texts.iter().map(|text| quotas::length(text.as_bytes())).sum()
+        let texts = [&self.name, &self.notes, &tags, &self.name.to_lowercase()];
+        texts.iter().map(|text| quotas::length(text.as_bytes())).sum::<i64>() + words::bytes(&self.words())
+    }
+
+    /// The words of the name and of the tags.
+    fn words(&self) -> BTreeSet<String> {
+        words::words(&format!("{}\n{}", self.name, self.tags.join("\n")))
     }
 }
 
@@ -143,9 +142,7 @@ impl Store {
         self.write("changing labels", move |mut connection| {
             async move {
                 let connection = &mut connection;
-                if !hold(connection, &tenant, kind, &object).await? {
-                    return Ok(None);
-                }
+                let Some(sequence) = hold(connection, &tenant, kind, &object).await? else { return Ok(None) };
                 if change.is_empty() {
                     return Ok(Some(stored(connection, &tenant, &object).await?));
                 }
@@ -153,7 +150,8 @@ impl Store {
                     Labelled::Policy => Deed::LabelPolicy,
                     Labelled::Session => Deed::LabelSession,
                 };
-                let (labels, grown) = put(connection, &tenant, &object, &change).await?;
+                let of = Worded { tenant: &tenant, kind, sequence };
+                let (labels, grown) = put(connection, of, &object, &change).await?;
                 quotas::take(connection, &tenant, grown, quotas).await?;
                 audit_chain::record(connection, (quotas, &actor), &tenant, deed, &object, &told(&change)).await?;
                 Ok(Some(labels))
@@ -178,56 +176,61 @@ fn told(change: &Relabel) -> String {
     format!("set {}", named.join(", "))
 }
 
-/// Keeps a thing from being deleted or called otherwise until this transaction ends; whether the tenant has it.
+/// Keeps a thing from being deleted or called otherwise until this transaction ends; its row, if the tenant has it.
 pub(super) async fn hold(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
     kind: Labelled,
     object: &str,
-) -> Result<bool, Failure> {
+) -> Result<Option<i64>, Failure> {
     let find = query(match kind {
         Labelled::Policy => "SELECT sequence FROM policy_owners WHERE tenant = $1 AND policy = $2",
         Labelled::Session => "SELECT sequence FROM sessions WHERE tenant = $1 AND session = $2",
     });
     let find = find.bind(tenant.as_str()).bind(object).for_update_but_references();
-    Ok(connection.row(find).await?.is_some())
+    connection.row(find).await?.map(|row| row.get("sequence")).transpose()
 }
 
 /// Changes the labels of a thing that is held by this transaction; as they are now, and what they take more.
 pub(super) async fn put(
     connection: &mut Connection<'_>,
-    tenant: &Tenant,
+    of: Worded<'_>,
     object: &str,
     change: &Relabel,
 ) -> Result<(Labels, Usage), Failure> {
-    let before = stored(connection, tenant, object).await?;
-    let grown = -before.bytes();
+    let before = stored(connection, of.tenant, object).await?;
+    let (grown, former) = (-before.bytes(), before.words());
     let labels = before.after(change);
+    let (words, own) = (labels.words(), words::digits(object));
     let write = query(
-        "INSERT INTO labels (tenant, object, name, notes, tags, folded_name, folded_tags)
+        "INSERT INTO labels (tenant, object, name, notes, tags, folded_name, words)
          VALUES ($1, $2, $3, $4, $5, $6, $7)
          ON CONFLICT (tenant, object) DO UPDATE SET name = excluded.name, notes = excluded.notes,
                                                     tags = excluded.tags, folded_name = excluded.folded_name,
-                                                    folded_tags = excluded.folded_tags",
+                                                    words = excluded.words",
     );
     let write = write
-        .bind(tenant.as_str())
+        .bind(of.tenant.as_str())
         .bind(object)
         .bind(labels.name.as_str())
         .bind(labels.notes.as_str())
         .bind(labels.tags_column())
         .bind(labels.name.to_lowercase())
-        .bind(labels.tags_column().to_lowercase());
+        .bind(words::column(&words));
     connection.execute(write).await?;
+    words::remove(connection, of, former.difference(&words).map(String::as_str).filter(|word| *word != own)).await?;
+    words::add(connection, of, words.difference(&former).map(String::as_str)).await?;
     let grown = grown + labels.bytes();
     Ok((labels, Usage::of_bytes(grown)))
 }
 
-/// Deletes the labels of what is deleted; what they took.
-pub(super) async fn remove(connection: &mut Connection<'_>, tenant: &Tenant, object: &str) -> Result<Usage, Failure> {
-    let labels = stored(connection, tenant, object).await?;
+/// Deletes the labels of what is deleted, and all its words; what the labels took.
+pub(super) async fn remove(connection: &mut Connection<'_>, of: Worded<'_>, object: &str) -> Result<Usage, Failure> {
+    let labels = stored(connection, of.tenant, object).await?;
     let delete = query("DELETE FROM labels WHERE tenant = $1 AND object = $2");
-    connection.execute(delete.bind(tenant.as_str()).bind(object)).await?;
+    connection.execute(delete.bind(of.tenant.as_str()).bind(object)).await?;
+    let words = labels.words();
+    words::remove(connection, of, words.iter().map(String::as_str).chain([words::digits(object)])).await?;
     Ok(Usage::of_bytes(labels.bytes()))
 }
 

@@ -15,9 +15,10 @@ use super::error::Failure;
 use super::job::{ClaimedJob, JobOutcome, JobRow};
 use super::job_state::{JobEvent, JobState};
 use super::jobs::{end, find, labels_of};
-use super::labels::{self, Labelled};
+use super::labels;
 use super::query::{Connection, Query, Row, query};
 use super::quotas::{self, Quotas, Usage};
+use super::words::{Labelled, Worded};
 use super::{Store, StoreError, policies, turns};
 use crate::control::policy::periods_per_year;
 
@@ -231,8 +232,11 @@ async fn finish(
             policies::insert(connection, &row.tenant, &policy_id, (policy_json, year), now_ms, Quotas::NONE).await?;
             let labels = labels_of(connection, &job).await?;
             if !labels.is_empty() {
-                labels::hold(connection, &row.tenant, Labelled::Policy, &policy_id).await?;
-                let (_, grown) = labels::put(connection, &row.tenant, &policy_id, &labels).await?;
+                let kind = Labelled::Policy;
+                let held = labels::hold(connection, &row.tenant, kind, &policy_id).await?;
+                let sequence = held.ok_or_else(|| Failure::Corrupt(format!("the owner of policy {policy_id}")))?;
+                let of = Worded { tenant: &row.tenant, kind, sequence };
+                let (_, grown) = labels::put(connection, of, &policy_id, &labels).await?;
                 quotas::change(connection, &row.tenant, grown).await?;
             }
             query("UPDATE jobs SET policy = $1, steps_done = steps_total WHERE job = $2").bind(policy_id).bind(job)

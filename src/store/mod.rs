@@ -49,6 +49,7 @@ mod quotas;
 mod renewals;
 mod repair;
 mod retention;
+mod search;
 mod seen;
 mod session_trainings;
 mod sessions;
@@ -57,6 +58,7 @@ mod statement;
 mod tenant;
 mod training_names;
 mod turns;
+mod words;
 
 use std::path::Path;
 
@@ -78,7 +80,7 @@ pub use idempotency::RequestKey;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, StoredKeys, Successor};
-pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labelled, Labels, MOST_TAGS, Relabel, given};
+pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labels, MOST_TAGS, Relabel, given};
 pub use overview::{
     Counted, SessionIs, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
 };
@@ -93,6 +95,7 @@ pub use session_trainings::SessionTraining;
 pub use sessions::{CreateSession, SessionFacts, SessionRow};
 pub use tenant::Tenant;
 pub use training_names::TrainingRequest;
+pub use words::Labelled;
 
 /// The durable facts of one folder or one database. Clones share the connections.
 ///

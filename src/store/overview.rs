@@ -13,6 +13,7 @@ use super::entries::EntryRow;
 use super::error::Failure;
 use super::labels::Labels;
 use super::query::{Query, Row};
+use super::search::{self, Among, Rarest, Span};
 use super::sessions::SessionRow;
 use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES, WEALTH};
 use super::tenant::Tenant;
@@ -59,7 +60,7 @@ pub enum Counted {
 /// What is asked of a list of sessions; all of them, as they were opened, where nothing is given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionQuery {
-    /// Part of a name, of a tag, of a session's or a policy's identifier or of the policy's name, whatever the case.
+    /// Beginnings of words of the session or of its policy, in any order and whatever the case: see [`super::search`].
     pub search: Option<String>,
     /// A whole tag.
     pub tag: Option<String>,
@@ -131,18 +132,37 @@ pub struct SessionList {
 impl Store {
     /// A page of the sessions of a tenant.
     pub async fn sessions(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<SessionList, StoreError> {
-        self.list("listing sessions", asked.page(tenant), |rows| asked.listed(rows)).await
+        let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last: None };
+        let look_at = match self.rarest_of(tenant, asked).await? {
+            None => vec![Among::All],
+            Some(rarest) if asked.order == SessionOrder::Created => rarest.windows(),
+            Some(rarest) => vec![rarest.all()],
+        };
+        for among in look_at {
+            list = self.list("listing sessions", asked.page(tenant, &among), |rows| asked.listed(rows)).await?;
+            if list.last.is_some() {
+                break;
+            }
+        }
+        Ok(list)
+    }
+
+    async fn rarest_of(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<Option<Rarest>, StoreError> {
+        let word = |given: &Option<String>| given.clone().unwrap_or_default();
+        self.rarest(tenant, &word(&asked.search), &word(&asked.tag)).await
     }
 
     /// Counts the sessions of a tenant that match.
     pub async fn total(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<usize, StoreError> {
         let decode = |rows: &[Row]| rows.first().map_or(Ok(0), |row| from_sql(row.get("total")?));
-        self.list("counting sessions", asked.count(tenant), decode).await
+        let among = self.rarest_of(tenant, asked).await?.map_or(Among::All, Rarest::all);
+        self.list("counting sessions", asked.count(tenant, &among), decode).await
     }
 
     /// Counts what needs care among the sessions that match, in whatever state.
     pub async fn care(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<CareCounts, StoreError> {
-        self.list("counting sessions that need care", asked.caring(tenant), CareCounts::from_rows).await
+        let among = self.rarest_of(tenant, asked).await?.map_or(Among::All, Rarest::all);
+        self.list("counting sessions that need care", asked.caring(tenant, &among), CareCounts::from_rows).await
     }
 }
 
@@ -160,7 +180,13 @@ impl SessionQuery {
         Ok(list)
     }
 
-    fn page(&self, tenant: &Tenant) -> Query {
+    fn span(&self) -> Span {
+        let (order, beyond, first) = if self.descending { ("DESC", '<', i64::MAX) } else { ("ASC", '>', 0) };
+        let start = self.after.as_ref().map_or(first, |place| place.sequence);
+        Span { start, order, beyond }
+    }
+
+    fn page(&self, tenant: &Tenant, among: &Among) -> Query {
         let key = self.order.key();
         let columns = format!(
             "SELECT sessions.sequence, sessions.session, sessions.tenant, sessions.policy AS first_policy,
@@ -173,9 +199,9 @@ impl SessionQuery {
                     last.answer_json, last.created_ms AS reported_ms, {key} AS sort_key {TABLES}"
         );
         let mut statement = Statement::of(&columns);
-        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
+        among.narrow(&mut statement, tenant, self.span());
         self.only_matching(&mut statement);
-        let (order, beyond) = if self.descending { ("DESC", '<') } else { ("ASC", '>') };
+        let Span { order, beyond, .. } = self.span();
         if let Some(SessionPlace { key: value, sequence }) = &self.after {
             let value = match value {
                 SessionKey::Created => (*sequence).into(),
@@ -192,16 +218,16 @@ impl SessionQuery {
         statement.query()
     }
 
-    fn count(&self, tenant: &Tenant) -> Query {
+    fn count(&self, tenant: &Tenant, among: &Among) -> Query {
         let is_narrowed = self.search.is_some() || self.tag.is_some() || self.is.is_some();
         let tables = if is_narrowed { TABLES } else { "FROM sessions" };
         let mut statement = Statement::of(&format!("SELECT count(*) AS total {tables}"));
-        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
+        among.narrow(&mut statement, tenant, self.span());
         self.only_matching(&mut statement);
         statement.query()
     }
 
-    fn caring(&self, tenant: &Tenant) -> Query {
+    fn caring(&self, tenant: &Tenant, among: &Among) -> Query {
         let mut statement = Statement::of("SELECT count(*) AS sessions");
         let sum = |word: &str| format!(", coalesce(sum({word}), 0) AS {word}");
         for part in ["any_of_them", "overdue", "renewal", "alarm", "ending"].map(sum) {
@@ -218,7 +244,7 @@ impl SessionQuery {
         }
         statement.and(&format!(" {TABLES}"), []);
         let all = SessionQuery { is: None, ..self.clone() };
-        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
+        among.narrow(&mut statement, tenant, self.span());
         all.only_matching(&mut statement);
         statement.and(") AS flags) AS counted", []);
         statement.query()
@@ -226,17 +252,7 @@ impl SessionQuery {
 
     fn only_matching(&self, statement: &mut Statement) {
         if let Some(search) = &self.search {
-            let part = format!("%{}%", escaped(&search.to_lowercase()));
-            let like = |column: &str| format!(r"{column} LIKE ? ESCAPE '\'");
-            let columns = [
-                "labels.folded_name",
-                "labels.folded_tags",
-                "sessions.session",
-                "called.folded_name",
-                "coalesce(renewals.policy, sessions.policy)",
-            ];
-            let any = columns.map(like).join(" OR ");
-            statement.and(&format!(" AND ({any})"), columns.map(|_| part.as_str().into()));
+            search::matches(statement, search);
         }
         if let Some(tag) = &self.tag {
             // What has the tag is another text without it.
@@ -258,11 +274,6 @@ impl SessionQuery {
             }
         }
     }
-}
-
-/// Text as a pattern that means itself.
-fn escaped(text: &str) -> String {
-    text.replace('\\', r"\\").replace('%', r"\%").replace('_', r"\_")
 }
 
 impl SessionOrder {

@@ -11,6 +11,7 @@ use super::labels::{self, Labels};
 use super::query::{Connection, Query, Row, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
+use super::words::{self, Labelled, Worded};
 use super::{Store, StoreError};
 use crate::control::policy::{content_hash, periods_per_year};
 
@@ -165,13 +166,15 @@ pub(super) async fn insert(
     }
     let own = query(
         "INSERT INTO policy_owners (tenant, policy, created_ms) VALUES ($1, $2, $3)
-         ON CONFLICT (policy, tenant) DO NOTHING",
+         ON CONFLICT (policy, tenant) DO NOTHING RETURNING sequence",
     );
-    let is_new = connection.execute(own.bind(tenant.as_str()).bind(id).bind(created_ms)).await? > 0;
-    if is_new {
+    let new = connection.row(own.bind(tenant.as_str()).bind(id).bind(created_ms)).await?;
+    if let Some(row) = &new {
+        let of = Worded { tenant, kind: Labelled::Policy, sequence: row.get("sequence")? };
+        words::add(connection, of, [words::digits(id)]).await?;
         quotas::take(connection, tenant, bytes, quotas).await?;
     }
-    Ok(is_new)
+    Ok(new.is_some())
 }
 
 /// Keeps a policy from being deleted until this transaction ends; whether it is there.
@@ -210,15 +213,18 @@ async fn delete(
     if sessions > 0 {
         return Ok(DeletePolicy::InUse { sessions: sessions.unsigned_abs() });
     }
-    let disown = query("DELETE FROM policy_owners WHERE policy = $1 AND tenant = $2");
-    connection.execute(disown.bind(id.as_str()).bind(tenant.as_str())).await?;
+    let disown = query("DELETE FROM policy_owners WHERE policy = $1 AND tenant = $2 RETURNING sequence");
+    let Some(disowned) = connection.row(disown.bind(id.as_str()).bind(tenant.as_str())).await? else {
+        return Ok(DeletePolicy::Absent);
+    };
     let unowned = query(
         "DELETE FROM policies WHERE policy = $1
          AND NOT EXISTS (SELECT 1 FROM policy_owners WHERE policy_owners.policy = policies.policy)",
     );
     connection.execute(unowned.bind(id.as_str())).await?;
     let bytes = Usage::of_bytes(ROW_BYTES + row.get::<i64>("bytes")?);
-    let bytes = bytes.and(labels::remove(connection, &tenant, &id).await?);
+    let of = Worded { tenant: &tenant, kind: Labelled::Policy, sequence: disowned.get("sequence")? };
+    let bytes = bytes.and(labels::remove(connection, of, &id).await?);
     quotas::change(connection, &tenant, bytes.given_back()).await?;
     audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)

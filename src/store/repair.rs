@@ -195,6 +195,11 @@ impl Repairs<'_> {
             let restore = format!("INSERT OR IGNORE INTO main.{table} SELECT * FROM backup.{table} WHERE {of} = $1");
             self.connection.execute(query(restore).bind(session)).await?;
         }
+        let words = "INSERT OR IGNORE INTO main.words SELECT words.tenant, words.kind, words.word, now.sequence
+            FROM backup.sessions AS kept JOIN main.sessions AS now ON now.session = kept.session
+            JOIN backup.words AS words ON words.tenant = kept.tenant AND words.kind = 'session'
+                 AND words.sequence = kept.sequence WHERE kept.session = $1";
+        self.connection.execute(query(words).bind(session)).await?;
         let start = self.rows_of("main", &SESSIONS, session).await?;
         let start = start.first().map(SessionRow::from_row).transpose()?;
         let rows = self.connection.rows(entries::all_of(session)).await?;

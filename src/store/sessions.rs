@@ -15,6 +15,7 @@ use super::quotas::{self, Quotas, Usage};
 use super::seen::Seen;
 use super::tenant::Tenant;
 use super::training_names::withdraw_all;
+use super::words::{self, Labelled, Worded};
 use super::{Store, StoreError, policies};
 
 /// What became of a session to open.
@@ -154,10 +155,10 @@ async fn create(
     {
         return Ok(earlier);
     }
-    let created = insert(connection, &row).await?;
-    if created != CreateSession::Created {
-        return Ok(created);
-    }
+    let sequence = match insert(connection, &row).await? {
+        Ok(sequence) => sequence,
+        Err(refused) => return Ok(refused),
+    };
     if let Some(key) = &key
         && !idempotency::take(connection, &row.tenant, key, &row.session).await?
     {
@@ -165,15 +166,17 @@ async fn create(
         let earlier = repeated(connection, &row.tenant, key).await?;
         return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
     }
+    let of = Worded { tenant: &row.tenant, kind: Labelled::Session, sequence };
+    words::add(connection, of, [words::digits(&row.session)]).await?;
     let start_bytes = quotas::length(&encode_reals(&row.initial_history)) + quotas::length(row.plan_json.as_bytes());
     let mut usage = Usage::of_session(start_bytes, to_sql(row.horizon), to_sql(row.assets));
     if !labels.is_empty() {
-        usage = usage.and(labels::put(connection, &row.tenant, &row.session, &labels).await?.1);
+        usage = usage.and(labels::put(connection, of, &row.session, &labels).await?.1);
     }
     quotas::take(connection, &row.tenant, usage, quotas).await?;
     let outcome = format!("opened under policy {}", row.policy);
     audit_chain::record(connection, (quotas, &actor), &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
-    Ok(created)
+    Ok(CreateSession::Created)
 }
 
 /// What a key used before answers; `None` for a new key.
@@ -194,17 +197,18 @@ async fn repeated(
     }
 }
 
-/// The policy stays locked until the session is there: it cannot be deleted in between.
-async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<CreateSession, Failure> {
+/// The sequence of the session, or why there is none. The policy stays locked until the session is there: it cannot be deleted in between.
+async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Result<i64, CreateSession>, Failure> {
     if !policies::lock(connection, &row.policy).await?
         || !policies::is_owned(connection, &row.tenant, &row.policy).await?
     {
-        return Ok(CreateSession::NoPolicy);
+        return Ok(Err(CreateSession::NoPolicy));
     }
     let insert = query(
         "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, room, created_ms,
                                seal, tenant, plan_json, due, history_seal, assets)
-         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11, $12, $13) ON CONFLICT (session) DO NOTHING",
+         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11, $12, $13) ON CONFLICT (session) DO NOTHING
+         RETURNING sequence",
     );
     let insert = insert
         .bind(row.session.as_str())
@@ -220,8 +224,8 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
         .bind(row.due.map(to_sql))
         .bind(history_seal(&row.initial_history))
         .bind(to_sql(row.assets));
-    let inserted = connection.execute(insert).await?;
-    Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
+    let inserted = connection.row(insert).await?.map(|row| row.get("sequence")).transpose()?;
+    Ok(inserted.ok_or(CreateSession::Exists))
 }
 
 /// The audit says how many entries went with the session.
@@ -237,12 +241,13 @@ async fn delete(
     let entries: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("entries"))?;
     let delete = query(
         "DELETE FROM sessions WHERE session = $1 AND tenant = $2
-         RETURNING CAST(octet_length(initial_history) + octet_length(plan_json) AS BIGINT) AS start_bytes, room, assets",
+         RETURNING CAST(octet_length(initial_history) + octet_length(plan_json) AS BIGINT) AS start_bytes, room, assets, sequence",
     );
     let deleted = connection.row(delete.bind(session.as_str()).bind(tenant.as_str())).await?;
     let Some(row) = deleted else { return Ok(false) };
     let usage = Usage::of_session(row.get("start_bytes")?, row.get("room")?, row.get("assets")?);
-    let usage = usage.and(labels::remove(connection, &tenant, &session).await?);
+    let of = Worded { tenant: &tenant, kind: Labelled::Session, sequence: row.get("sequence")? };
+    let usage = usage.and(labels::remove(connection, of, &session).await?);
     quotas::change(connection, &tenant, usage.given_back()).await?;
     let outcome = format!("deleted, with {entries} entries");
     audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeleteSession, &session, &outcome).await?;

@@ -26,6 +26,7 @@ mod quotas;
 mod renewal;
 mod reports;
 mod returns;
+mod search;
 mod sessions;
 mod solve_turns;
 mod store;

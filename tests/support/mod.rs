@@ -199,9 +199,13 @@ impl App {
         self.client = Client::builder().default_headers(HeaderMap::from_iter(shown)).build().expect("a client");
     }
 
-    /// Makes a key beside the service that runs over this folder.
+    /// Makes a key beside the service that runs over this folder or this database.
     pub async fn key(&self, tenant: &str, roles: &str) -> String {
-        issue_key(&KeyRing::open(self.folder()).await.expect("the keys"), tenant, roles).await
+        let ring = match &self.store {
+            Some(StoreLocation::Postgres(url)) => KeyRing::connect(url).await,
+            _ => KeyRing::open(self.folder()).await,
+        };
+        issue_key(&ring.expect("the keys"), tenant, roles).await
     }
 
     pub fn folder(&self) -> &Path {
@@ -244,10 +248,34 @@ impl App {
         self.start_again().await;
     }
 
+    /// Runs `change` on the store between a stop and a start of the service.
+    pub async fn between(&mut self, change: impl AsyncFnOnce(&Store)) {
+        self.stop().await;
+        let store = match self.store.as_ref().expect("a store") {
+            StoreLocation::Folder(folder) => Store::open(folder).await,
+            StoreLocation::Postgres(url) => Store::connect(url).await,
+        };
+        let store = store.expect("the store");
+        change(&store).await;
+        store.close().await;
+        self.start_again().await;
+    }
+
     /// Stops the service and starts one over a folder within this one.
     pub async fn move_to(&mut self, folder: &str) {
         self.stop().await;
         self.store = Some(StoreLocation::Folder(self.folder.path().join(folder)));
+        self.start_again().await;
+    }
+
+    /// Stops the service until another starts.
+    pub async fn halt(&mut self) {
+        self.stop().await;
+    }
+
+    /// Starts a service over another store, after a halt.
+    pub async fn start_over(&mut self, store: StoreLocation) {
+        self.store = Some(store);
         self.start_again().await;
     }
 

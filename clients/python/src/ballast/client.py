@@ -447,8 +447,8 @@ class _Ballast:
     ) -> AsyncIterator[wire.SessionEntry]:
         """All sessions, or those that match, each with what it is called and where it stands; newest first unless told.
 
-        ``search`` is a part of a name, of a tag, of the session's or its policy's identifier or of the policy's name,
-        whatever the case; ``tag`` is one that they have. :func:`ballast.frames.sessions` makes a table of them.
+        ``search`` is words, each the beginning of a word of the session's or its policy's name or tags, or eight digits
+        or more with which an identifier begins, whatever the case; ``tag`` is one that they have. :func:`ballast.frames.sessions` makes a table of them.
         """
         return self._listed("/sessions", "sessions", search=search, tag=tag, state=state, sort=sort)
 

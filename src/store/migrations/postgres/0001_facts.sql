@@ -147,10 +147,21 @@ CREATE TABLE labels (
     notes  TEXT NOT NULL,
     -- Each between line breaks.
     tags   TEXT NOT NULL,
-    -- The same in lower case, to be found and put in order by.
+    -- The name in lower case, to be put in order by.
     folded_name TEXT NOT NULL,
-    folded_tags TEXT NOT NULL,
+    -- Those of the name and the tags, a space before each.
+    words TEXT NOT NULL,
     PRIMARY KEY (tenant, object)
+);
+
+-- The words by which sessions and policies are found: an index that no advice rests on, so no seal covers it.
+CREATE TABLE words (
+    tenant   TEXT NOT NULL,
+    kind     TEXT NOT NULL,
+    word     TEXT COLLATE "C" NOT NULL,
+    -- Of the row of sessions or of policy_owners.
+    sequence BIGINT NOT NULL,
+    PRIMARY KEY (tenant, kind, word, sequence)
 );
 
 -- What happened in a session, in the order it was recorded.

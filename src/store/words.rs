@@ -1,0 +1,115 @@
+//! The words by which sessions and policies are found, each in a row of an index.
+//!
+//! A word is a run of letters and digits, in lower case. The words of a session or a policy are those of its name and its
+//! tags, and its identifier without what it begins with. A row is written with what it finds and goes with it; rows that are
+//! left out would hide a session from a search, and nothing else.
+
+use std::collections::BTreeSet;
+
+use super::error::Failure;
+use super::query::Connection;
+use super::quotas;
+use super::statement::Statement;
+use super::tenant::Tenant;
+
+/// What a row of the index takes beside its word, about as much over either engine.
+const ROW_BYTES: i64 = 64;
+
+/// What has words: a session or a policy of a tenant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Worded<'a> {
+    pub tenant: &'a Tenant,
+    pub kind: Labelled,
+    /// Of the row of `sessions` or of `policy_owners`.
+    pub sequence: i64,
+}
+
+/// The words of a text, each once.
+pub(super) fn words(text: &str) -> BTreeSet<String> {
+    let lower = text.to_lowercase();
+    lower.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+}
+
+/// The word of an identifier: its digits.
+pub(super) fn digits(identifier: &str) -> &str {
+    identifier.rsplit_once('_').map_or(identifier, |(_, digits)| digits)
+}
+
+/// Words as a column has them: a space before each, so that a beginning of one is found as a part.
+pub(super) fn column(words: &BTreeSet<String>) -> String {
+    words.iter().flat_map(|word| [" ", word]).collect()
+}
+
+/// Bytes that words are counted with: their column, and a row for each, as `check::TOTALS` counts them too.
+pub(super) fn bytes(words: &BTreeSet<String>) -> i64 {
+    words.iter().map(|word| 2 * (1 + quotas::length(word.as_bytes())) + ROW_BYTES).sum()
+}
+
+/// What has labels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Labelled {
+    Policy,
+    Session,
+}
+
+impl Labelled {
+    pub(super) fn as_str(self) -> &'static str {
+        match self {
+            Labelled::Policy => "policy",
+            Labelled::Session => "session",
+        }
+    }
+}
+
+/// Adds the rows of these words.
+pub(super) async fn add<'w>(
+    connection: &mut Connection<'_>,
+    of: Worded<'_>,
+    words: impl IntoIterator<Item = &'w str>,
+) -> Result<(), Failure> {
+    let mut insert = Statement::of("INSERT INTO words (tenant, kind, sequence, word) VALUES ");
+    let mut separator = "";
+    for word in words {
+        let values = [of.tenant.as_str().into(), of.kind.as_str().into(), of.sequence.into(), word.into()];
+        insert.and(&format!("{separator}(?, ?, ?, ?)"), values);
+        separator = ", ";
+    }
+    if separator.is_empty() {
+        return Ok(());
+    }
+    insert.and(" ON CONFLICT DO NOTHING", []);
+    connection.execute(insert.query()).await.map(drop)
+}
+
+/// Removes the rows of these words.
+pub(super) async fn remove<'w>(
+    connection: &mut Connection<'_>,
+    of: Worded<'_>,
+    words: impl IntoIterator<Item = &'w str>,
+) -> Result<(), Failure> {
+    let mut delete = Statement::of("DELETE FROM words");
+    let values = [of.tenant.as_str().into(), of.kind.as_str().into(), of.sequence.into()];
+    delete.and(" WHERE tenant = ? AND kind = ? AND sequence = ? AND word IN (", values);
+    let mut separator = "";
+    for word in words {
+        delete.and(&format!("{separator}?"), [word.into()]);
+        separator = ", ";
+    }
+    delete.and(")", []);
+    if separator.is_empty() { Ok(()) } else { connection.execute(delete.query()).await.map(drop) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_runs_of_letters_and_digits_in_lower_case() {
+        let found = |text: &str| words(text).into_iter().collect::<Vec<_>>();
+        assert_eq!(found("US-Equity, \u{c9}t\u{c9} 2024/us"), ["2024", "equity", "us", "\u{e9}t\u{e9}"]);
+        assert_eq!(found(" -'\u{2605}"), [""; 0]);
+        assert_eq!(column(&words("b a")), " a b");
+        assert_eq!(bytes(&words("b ab")), 2 * " ab b".len() as i64 + 2 * ROW_BYTES);
+        assert_eq!([digits("session_0a"), digits("1b")], ["0a", "1b"]);
+    }
+}
