@@ -56,6 +56,8 @@ enum Command {
     Backup(backup::Backup),
     /// Make a data folder of a backup, verified.
     Restore(backup::Restore),
+    /// Move a data folder into PostgreSQL, every row compared, while no service runs.
+    Move(backup::Move),
     /// Put one damaged thing of a data folder back from a backup, while no service runs.
     Repair(backup::Repair),
     /// Exit 0 if a running service is ready, else 1.
@@ -119,6 +121,7 @@ async fn outcome() -> ExitCode {
         Command::Check(arguments) => check::run(arguments).await,
         Command::Backup(arguments) => backup::run(arguments).await,
         Command::Restore(arguments) => backup::restore(arguments).await,
+        Command::Move(arguments) => backup::relocate(arguments).await,
         Command::Repair(arguments) => backup::repair(arguments).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {

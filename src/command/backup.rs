@@ -1,4 +1,4 @@
-//! `ballast backup` and `ballast restore`: a folder's database as one verified file, and back.
+//! `ballast backup` and `ballast restore`: a folder's database as one verified file, and back; `ballast move`: into PostgreSQL.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use ballast::service::config::StoreLocation;
 use ballast::store::{self, Damage};
 use clap::Args;
 
-use super::store_location::StoreArgs;
+use super::store_location::{Password, StoreArgs};
 
 #[derive(Debug, Args)]
 pub struct Backup {
@@ -55,6 +55,24 @@ pub struct Restore {
     store: StoreArgs,
     #[command(flatten)]
     damage: DamageArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct Move {
+    /// The folder of a service that is stopped; it stays as it is.
+    #[arg(long)]
+    from: PathBuf,
+    /// The PostgreSQL database to move to, which has no rows: postgres://user:password@host:port/database.
+    #[arg(long, env = "BALLAST_STORE", hide_env_values = true)]
+    store: Password,
+}
+
+/// # Errors
+/// A process holds the folder, a thing in it is damaged, or the database has rows or is not reached.
+pub async fn relocate(arguments: Move) -> Result<(), Box<dyn std::error::Error>> {
+    store::relocate(&arguments.from, &arguments.store.url()?, &mut |line| println!("{line}")).await?;
+    println!("moved, and sound; start the service with --store, and never again on {}", arguments.from.display());
+    Ok(())
 }
 
 /// # Errors

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use ballast::service::config::StoreLocation;
-use ballast::store::UrlError;
+use ballast::store::{PostgresUrl, UrlError};
 use clap::Args;
 
 #[derive(Debug, Args)]
@@ -18,11 +18,19 @@ pub struct StoreArgs {
 
 /// An address that may hold a password, so it does not print.
 #[derive(Clone)]
-struct Password(String);
+pub(super) struct Password(String);
 
 impl std::fmt::Debug for Password {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.write_str("..")
+    }
+}
+
+impl Password {
+    /// # Errors
+    /// The address cannot be read.
+    pub fn url(&self) -> Result<PostgresUrl, UrlError> {
+        self.0.parse()
     }
 }
 
@@ -37,7 +45,7 @@ impl StoreArgs {
     /// The address of the database cannot be read.
     pub fn location(self) -> Result<StoreLocation, UrlError> {
         match self.store.filter(|store| !store.0.is_empty()) {
-            Some(store) => Ok(StoreLocation::Postgres(store.0.parse()?)),
+            Some(store) => Ok(StoreLocation::Postgres(store.url()?)),
             None => Ok(StoreLocation::Folder(self.data)),
         }
     }

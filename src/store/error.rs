@@ -46,6 +46,9 @@ pub enum StoreError {
     /// A repair was refused.
     #[error("nothing is repaired: {reason}")]
     NotRepaired { reason: String },
+    /// A folder's rows that are not in the database they were to be moved to.
+    #[error("nothing was moved: {reason}")]
+    NotMoved { reason: String },
     /// The folder or the lock file cannot be used.
     #[error("cannot use {}", path.display())]
     Folder { path: PathBuf, source: Arc<std::io::Error> },

@@ -46,6 +46,7 @@ mod policies;
 mod postgres;
 mod query;
 mod quotas;
+mod relocation;
 mod renewals;
 mod repair;
 mod retention;
@@ -87,6 +88,7 @@ pub use overview::{
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary, Stored};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};
+pub use relocation::relocate;
 pub use renewals::Onto;
 pub use repair::{Repair, repair};
 pub use retention::{DeleteJob, Room};

@@ -23,6 +23,7 @@ mod lives;
 mod no_stale_law;
 mod overview;
 mod quotas;
+mod relocation;
 mod renewal;
 mod reports;
 mod returns;

@@ -194,6 +194,13 @@ pub(super) async fn inspect(url: &PostgresUrl) -> Result<PgConnection, StoreErro
     Ok(connection)
 }
 
+/// One connection to a database whose schema is made, or brought up to date.
+pub(super) async fn open_new(url: &PostgresUrl) -> Result<PgConnection, StoreError> {
+    let mut connection = connect(&url.options().disable_statement_logging()).await?;
+    migrate(&mut connection).await?;
+    Ok(connection)
+}
+
 /// The version of the schema; 0 where there is none yet.
 pub(super) async fn version(connection: &mut PgConnection) -> Result<i64, StoreError> {
     let table = "SELECT to_regclass('_sqlx_migrations') IS NOT NULL";

@@ -1,0 +1,227 @@
+//! A folder's rows moved into a database that replicas share.
+//!
+//! Both engines have the same tables with columns of the same names, so a row is copied by the types of its columns. All is
+//! one transaction: each row is compared with what the database answers that it stored, each table is counted, and where
+//! anything differs nothing is moved. The folder stays as it was.
+
+use std::path::Path;
+
+use futures_util::{StreamExt, TryStreamExt};
+use sqlx::sqlite::SqliteConnection;
+use sqlx::{AssertSqlSafe, Connection as _};
+
+use super::check::Inspection;
+use super::error::{Failure, StoreError};
+use super::migrations;
+use super::postgres::{self, PostgresUrl};
+use super::query::{Connection, Row, Value, query};
+use super::sqlite::opening::{DATABASE, existing, inspect, lock, opening, version};
+use super::statement::Statement;
+
+const DOING: &str = "moving the store";
+
+/// Every table, after those that it refers to, and how many of its rows are copied at a time: few where one may be large.
+const TABLES: [(&str, usize); 19] = [
+    ("jobs", 100),
+    ("job_requests", 1),
+    ("job_reports", 1),
+    ("turns", 100),
+    ("usage", 100),
+    ("checkpoints", 1),
+    ("policies", 1),
+    ("policy_owners", 100),
+    ("sessions", 100),
+    ("idempotency_keys", 100),
+    ("labels", 100),
+    ("words", 1_000),
+    ("entries", 100),
+    ("renewals", 100),
+    ("access_keys", 100),
+    ("audit", 100),
+    ("audit_chains", 100),
+    ("audit_total", 1),
+    ("heartbeat", 1),
+];
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Text,
+    Integer,
+    Real,
+    Bytes,
+    Boolean,
+}
+
+/// A value of either engine; a real number by its bits.
+#[derive(Debug, Clone, PartialEq)]
+enum Cell {
+    Null,
+    Text(String),
+    Integer(i64),
+    Real(u64),
+    Bytes(Vec<u8>),
+}
+
+struct Table {
+    name: &'static str,
+    at_once: usize,
+    columns: Vec<(String, Kind)>,
+}
+
+/// Moves the rows of the folder `dir`, which no process holds, into an empty database, telling what was moved and verified.
+///
+/// # Errors
+/// A process holds `dir`, a thing in it is damaged, the database has rows or is not reached, or it did not store what it was
+/// given; nothing is moved then.
+pub async fn relocate(dir: &Path, url: &PostgresUrl, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
+    existing(&dir.join(DATABASE))?;
+    let held = lock(dir)?;
+    Inspection::of_folder(dir).await?.run(tell).await?;
+    let mut folder = inspect(dir).await?;
+    migrations::require_newest(&migrations::sqlite(), version(&mut folder).await?)?;
+    let mut database = postgres::open_new(url).await?;
+    let mut transaction = database.begin().await.map_err(|error| Failure::postgres(error).during(DOING))?;
+    refuse_unknown_tables(&mut folder).await?;
+    let mut connection = Connection::Postgres(&mut transaction);
+    let moved = all(&mut folder, &mut connection, tell).await;
+    moved.map_err(|failure| failure.during(DOING))?;
+    transaction.commit().await.map_err(|error| Failure::postgres(error).during(DOING))?;
+    folder.close().await.map_err(opening)?;
+    Inspection::of_database(url).await?.run(tell).await?;
+    drop(held);
+    Ok(())
+}
+
+/// A table that this file does not know would be left behind.
+async fn refuse_unknown_tables(folder: &mut SqliteConnection) -> Result<(), StoreError> {
+    let tables =
+        "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%' AND substr(name, 1, 1) <> '_'";
+    let tables: Vec<String> = sqlx::query_scalar(tables).fetch_all(folder).await.map_err(opening)?;
+    match tables.into_iter().find(|table| TABLES.iter().all(|(known, _)| known != table)) {
+        Some(unknown) => Err(StoreError::NotMoved { reason: format!("nobody knows how to move the table {unknown}") }),
+        None => Ok(()),
+    }
+}
+
+async fn all(
+    folder: &mut SqliteConnection,
+    database: &mut Connection<'_>,
+    tell: &mut impl FnMut(String),
+) -> Result<(), Failure> {
+    for (name, _) in TABLES {
+        database.execute(query(format!("LOCK TABLE {name} IN ACCESS EXCLUSIVE MODE"))).await?;
+        if !database.rows(query(format!("SELECT 1 AS one FROM {name} LIMIT 1"))).await?.is_empty() {
+            return Err(Failure::Corrupt(format!("the database to move to, whose table {name} has rows")));
+        }
+    }
+    for (name, at_once) in TABLES {
+        let table = Table { name, at_once, columns: columns(database, name).await? };
+        let rows = table.copy(folder, database).await?;
+        table.go_on(folder, database).await?;
+        tell(format!("{name}: {rows} rows moved, each compared"));
+    }
+    Ok(())
+}
+
+/// The columns of a table, as the database has them.
+async fn columns(database: &mut Connection<'_>, table: &str) -> Result<Vec<(String, Kind)>, Failure> {
+    let find = query(
+        "SELECT CAST(column_name AS TEXT) AS name, CAST(data_type AS TEXT) AS type FROM information_schema.columns
+         WHERE table_schema = current_schema() AND table_name = $1 ORDER BY ordinal_position",
+    );
+    let kind = |row: &Row| {
+        let (name, kind) = (row.get::<String>("name")?, row.get::<String>("type")?);
+        let kind = match kind.as_str() {
+            "text" => Kind::Text,
+            "bigint" => Kind::Integer,
+            "double precision" => Kind::Real,
+            "bytea" => Kind::Bytes,
+            "boolean" => Kind::Boolean,
+            other => return Err(Failure::Corrupt(format!("a column of the type {other}"))),
+        };
+        Ok((name, kind))
+    };
+    database.rows(find.bind(table)).await?.iter().map(kind).collect()
+}
+
+impl Table {
+    fn names(&self) -> String {
+        self.columns.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Copies every row, and compares it with what the database stored; how many there are.
+    async fn copy(&self, folder: &mut SqliteConnection, database: &mut Connection<'_>) -> Result<usize, Failure> {
+        let select = format!("SELECT {} FROM {}", self.names(), self.name);
+        let rows = sqlx::query(AssertSqlSafe(select)).fetch(folder).map_err(Failure::sqlite);
+        let cells = rows.map(|row| self.cells(&Row::Sqlite(row?)));
+        let mut chunks = cells.try_chunks(self.at_once);
+        let mut copied = 0;
+        while let Some(chunk) = chunks.next().await {
+            let chunk = chunk.map_err(|error| error.1)?;
+            let stored = database.rows(self.insert(&chunk).query()).await?;
+            let stored = stored.iter().map(|row| self.cells(row)).collect::<Result<Vec<_>, _>>()?;
+            if stored != chunk {
+                return Err(Failure::Corrupt(format!("what the database stored of the table {}", self.name)));
+            }
+            copied += chunk.len();
+        }
+        let count = database.row(query(format!("SELECT count(*) AS rows FROM {}", self.name))).await?;
+        match count.map_or(Ok(0), |row| row.length("rows"))? {
+            count if count == copied => Ok(copied),
+            count => Err(Failure::Corrupt(format!("{count} of {copied} rows of the table {}", self.name))),
+        }
+    }
+
+    fn insert(&self, rows: &[Vec<Cell>]) -> Statement {
+        let names = self.names();
+        let mut insert = Statement::of(&format!("INSERT INTO {} ({names}) OVERRIDING SYSTEM VALUE VALUES ", self.name));
+        for (place, row) in rows.iter().enumerate() {
+            insert.and(if place == 0 { "(" } else { ", (" }, []);
+            for (place, (cell, (_, kind))) in row.iter().zip(&self.columns).enumerate() {
+                if place > 0 {
+                    insert.and(", ", []);
+                }
+                let value: Value = match cell.clone() {
+                    Cell::Null => {
+                        insert.and("NULL", []);
+                        continue;
+                    }
+                    Cell::Text(text) => text.into(),
+                    Cell::Integer(integer) => integer.into(),
+                    Cell::Real(bits) => f64::from_bits(bits).into(),
+                    Cell::Bytes(bytes) => bytes.into(),
+                };
+                insert.and(if matches!(kind, Kind::Boolean) { "? <> 0" } else { "?" }, [value]);
+            }
+            insert.and(")", []);
+        }
+        insert.and(&format!(" RETURNING {names}"), []);
+        insert
+    }
+
+    fn cells(&self, row: &Row) -> Result<Vec<Cell>, Failure> {
+        self.columns.iter().map(|(name, kind)| cell(row, name, *kind)).collect()
+    }
+
+    /// Numbers that were given out are not given out again.
+    async fn go_on(&self, folder: &mut SqliteConnection, database: &mut Connection<'_>) -> Result<(), Failure> {
+        let last = "SELECT seq FROM sqlite_sequence WHERE name = ?";
+        let last: Option<i64> =
+            sqlx::query_scalar(last).bind(self.name).fetch_optional(folder).await.map_err(Failure::sqlite)?;
+        let Some(last) = last.filter(|last| *last > 0) else { return Ok(()) };
+        let go_on = query("SELECT setval(pg_get_serial_sequence($1, 'sequence'), $2) AS last");
+        database.rows(go_on.bind(self.name).bind(last)).await.map(drop)
+    }
+}
+
+fn cell(row: &Row, name: &str, kind: Kind) -> Result<Cell, Failure> {
+    let cell = match kind {
+        Kind::Text => row.get::<Option<String>>(name)?.map(Cell::Text),
+        Kind::Integer => row.get::<Option<i64>>(name)?.map(Cell::Integer),
+        Kind::Real => row.get::<Option<f64>>(name)?.map(|real| Cell::Real(real.to_bits())),
+        Kind::Bytes => row.get::<Option<Vec<u8>>>(name)?.map(Cell::Bytes),
+        Kind::Boolean => row.get::<Option<bool>>(name)?.map(|is| Cell::Integer(is.into())),
+    };
+    Ok(cell.unwrap_or(Cell::Null))
+}

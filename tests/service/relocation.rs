@@ -1,0 +1,90 @@
+//! A folder that moves into PostgreSQL by one command.
+
+use std::process::{Command, Output};
+
+use crate::support::{App, execute, postgres, several_assets, specification};
+use reqwest::Method;
+use serde_json::json;
+
+fn relocate(app: &App, url: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    command.args(["move", "--from"]).arg(app.folder()).args(["--store", url]).output().unwrap()
+}
+
+fn complaint(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(1));
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_moves_into_a_database_and_goes_on() {
+    let Some(url) = postgres::database().await else { return };
+    let mut app = App::start().await;
+    app.train(&specification(5)).await;
+    app.open_with(json!({ "name": "One asset", "tags": ["Moved"] })).await;
+    for period in 1..=3 {
+        assert_eq!(app.observe(period, 0.01).await.0, 200);
+    }
+    let right = json!({ "correction": 1, "period": 1, "log_return": 0.05, "reason": "revised" });
+    assert_eq!(app.post(&format!("/sessions/{}/corrections", app.session), &right).await.0, 200);
+    let path = format!("/sessions/{}", app.session);
+    app.train(&several_assets(4)).await;
+    app.open().await;
+    let report = json!({ "log_returns": { "stocks": 0.01, "bonds": 0.002, "gold": -0.01 }, "confirm": true });
+    assert_eq!(app.report(1, report).await.0, 200);
+    assert_eq!(
+        app.send(Method::PATCH, &format!("/policies/{}", app.policy), Some(&json!({ "name": "All" }))).await.0,
+        200
+    );
+    let paths = [
+        path.clone(),
+        format!("{path}/history"),
+        "/sessions?search=moved".into(),
+        "/jobs".into(),
+        format!("/action?session={}", app.session),
+        "/policies".into(),
+    ];
+    let before = shown(&app, &paths).await;
+
+    assert!(complaint(&relocate(&app, &url)).contains("locked"), "the service runs");
+    app.halt().await;
+    let moved = relocate(&app, &url);
+    assert!(moved.status.success(), "{}", String::from_utf8_lossy(&moved.stderr));
+    let said = String::from_utf8(moved.stdout).unwrap();
+    assert!(said.contains("entries: 5 rows moved") && said.contains("sound"), "{said}");
+    assert!(complaint(&relocate(&app, &url)).contains("has rows"), "the database is not empty");
+
+    let store = url.parse().unwrap();
+    app.start_over(ballast::service::config::StoreLocation::Postgres(store)).await;
+    assert_eq!(shown(&app, &paths).await, before);
+    let report = json!({ "log_returns": { "stocks": 0.02, "bonds": 0.001, "gold": 0.01 }, "confirm": true });
+    assert_eq!(app.report(2, report).await.0, 200);
+    // Numbers go on: what is new is listed first.
+    app.open_with(json!({ "name": "Moved too" })).await;
+    let found = app.get("/sessions?search=moved").await.1;
+    assert_eq!(found["sessions"][0]["name"], "Moved too", "{found}");
+}
+
+async fn shown(app: &App, paths: &[String]) -> Vec<serde_json::Value> {
+    let mut shown = Vec::new();
+    for path in paths {
+        let (status, answer) = app.get(path).await;
+        assert_eq!(status, 200, "{path}: {answer}");
+        shown.push(answer);
+    }
+    shown
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_folder_moves_nothing() {
+    let Some(url) = postgres::database().await else { return };
+    let mut app = App::start().await;
+    app.train(&specification(2)).await;
+    app.open().await;
+    app.halt().await;
+    execute(app.folder(), "UPDATE sessions SET initial_wealth = 7.0").await;
+    assert!(complaint(&relocate(&app, &url)).contains("is damaged"));
+    let store = ballast::store::Store::connect(&url.parse().unwrap()).await.unwrap();
+    assert_eq!(store.count_sessions().await.unwrap(), 0);
+    store.close().await;
+}
