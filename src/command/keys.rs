@@ -37,6 +37,9 @@ pub struct Create {
     expiry: Expiry,
     #[command(flatten)]
     store: StoreArgs,
+    /// Make the database of the folder too, before the first start of its service.
+    #[arg(long)]
+    new: bool,
 }
 
 /// Until when a new key is in force.
@@ -125,16 +128,25 @@ pub async fn run(keys: Keys) -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
+/// The keys of a store that is there: a wrong folder is told of, and nothing is made in it.
 pub(super) async fn open(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
     Ok(match store.location()? {
-        StoreLocation::Folder(folder) => KeyRing::open(&folder).await?,
+        StoreLocation::Folder(folder) => KeyRing::open_existing(&folder).await?,
         StoreLocation::Postgres(url) => KeyRing::connect(&url).await?,
     })
 }
 
+/// The keys of a store, which is made if there is none.
+async fn open_new(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
+    match store.location()? {
+        StoreLocation::Folder(folder) => Ok(KeyRing::open(&folder).await?),
+        StoreLocation::Postgres(url) => Ok(KeyRing::connect(&url).await?),
+    }
+}
+
 async fn create(arguments: Create) -> Result<(), Box<dyn std::error::Error>> {
     let roles = KeyRoles::new(arguments.roles.into_iter().map(KeyRole::from).collect())?;
-    let ring = open(arguments.store).await?;
+    let ring = if arguments.new { open_new(arguments.store).await? } else { open(arguments.store).await? };
     let clock = Clock::system();
     let expires_ms = arguments.expiry.milliseconds(clock.now_milliseconds())?;
     let (key, secret) = issue(&ring, arguments.tenant.clone(), roles.clone(), expires_ms, &clock).await?;

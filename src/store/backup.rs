@@ -7,9 +7,9 @@
 //!
 //! Either way a name appears only once what it names is whole, verified and on the disk.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, Permissions};
 use std::io::{Error, ErrorKind};
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use sqlx::Connection;
@@ -42,14 +42,15 @@ impl Damage {
 /// was verified. A process may hold the folder and write.
 ///
 /// # Errors
-/// `out` or `out.partial` exists, the file or, unless that is skipped, a thing in it is damaged, or the disk fails; nothing is
+/// `out` exists, another backup writes `out.partial`, the file or, unless that is skipped, a thing in it is damaged, or the disk fails; nothing is
 /// left at `out`.
 pub async fn backup(dir: &Path, out: &Path, damage: Damage, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     refuse_existing(out)?;
     let partial = beside(out, ".partial");
-    let made = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&partial);
-    drop(made.map_err(|error| unusable(&partial, error))?);
+    let held = begin(&partial)?;
     let copied = async {
+        // Another backup may have ended since.
+        refuse_existing(out)?;
         copy(dir, &partial).await?;
         unstamp(&partial)?;
         damage.accept(Inspection::of_backup(&partial).await?.run(tell).await)?;
@@ -60,7 +61,28 @@ pub async fn backup(dir: &Path, out: &Path, damage: Damage, tell: &mut impl FnMu
         // What failed is what the caller must hear.
         let _ = std::fs::remove_file(&partial);
     }
+    drop(held);
     copied
+}
+
+/// An empty file of a backup under way, held by a lock, so that what a killed backup left is told from one that runs.
+///
+/// # Errors
+/// Another backup is writing it.
+fn begin(partial: &Path) -> Result<File, StoreError> {
+    let begin = || {
+        let file = OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(partial)?;
+        file.try_lock()?;
+        if file.metadata()?.ino() != std::fs::metadata(partial)?.ino() {
+            return Err(Error::new(ErrorKind::ResourceBusy, "another backup of this name has just ended"));
+        }
+        file.set_permissions(Permissions::from_mode(0o600))?;
+        file.set_len(0)?;
+        Ok(file)
+    };
+    let file = begin().map_err(|error| unusable(partial, error))?;
+    ["-wal", "-shm", "-journal"].iter().try_for_each(|end| remove(&beside(partial, end)))?;
+    Ok(file)
 }
 
 /// Makes `dir` a folder with the database of the backup `from`, its schema brought up to date, and verifies it, telling

@@ -120,6 +120,12 @@ impl KeyRing {
         Ok(KeyRing(Store::over(Engine::Sqlite(sqlite::Folder::open_beside(dir).await?))))
     }
 
+    /// As [`KeyRing::open`], but makes nothing: [`StoreError::Folder`] if there is no database.
+    pub async fn open_existing(dir: &Path) -> Result<KeyRing, StoreError> {
+        sqlite::opening::existing(&dir.join(sqlite::opening::DATABASE))?;
+        KeyRing::open(dir).await
+    }
+
     /// # Errors
     /// As [`Store::connect`].
     pub async fn connect(url: &PostgresUrl) -> Result<KeyRing, StoreError> {

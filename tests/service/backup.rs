@@ -190,6 +190,20 @@ async fn a_backup_replaces_nothing_and_leaves_nothing_where_it_fails() {
     assert_eq!(left, ["ballast.lock"]);
     assert!(!folder.path().join("new").exists() && !folder.path().join("new.partial").exists());
 
+    // What a killed backup left stands in nobody's way, and one that runs does.
+    let new = folder.path().join("new");
+    for left in ["new.partial", "new.partial-journal"] {
+        std::fs::write(folder.path().join(left), "left").unwrap();
+    }
+    let running = std::fs::File::open(folder.path().join("new.partial")).unwrap();
+    running.lock().unwrap();
+    let complaint = fails(&["backup", "--data", text(&data), "--out", text(&new)]);
+    assert!(complaint.contains("new.partial"), "{complaint}");
+    drop(running);
+    succeeds(&["backup", "--data", text(&data), "--out", text(&new)]);
+    assert!(!folder.path().join("new.partial").exists() && !folder.path().join("new.partial-journal").exists());
+    assert_eq!(std::os::unix::fs::MetadataExt::mode(&new.metadata().unwrap()) & 0o777, 0o600);
+
     let hint = fails(&["backup", "--store", "postgres://u@127.0.0.1:1/x", "--out", text(&nowhere)]);
     assert!(hint.contains("pg_dump"), "{hint}");
     let hint = fails(&["restore", "--store", "postgres://u@127.0.0.1:1/x", "--from", text(&out)]);

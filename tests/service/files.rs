@@ -139,14 +139,20 @@ async fn a_folder_that_had_keys_is_not_served_without() {
     let serve = ["serve", "--listen", "127.0.0.1:0"];
     let (code, said) = ballast(&[&serve[..], &["--require-keys"]].concat(), &data);
     assert!(code == Some(1) && said.contains("--require-keys") && said.contains("ballast keys create"), "{said}");
-    assert_eq!(ballast(&["keys", "create", "--role", "admin"], &data).0, Some(0));
+    for wrong in [&["keys", "create", "--role", "admin"][..], &["keys", "list"], &["audit"]] {
+        let (code, said) = ballast(wrong, &data.join("wrong"));
+        assert!(code == Some(1) && said.contains("ballast.sqlite"), "{said}");
+        assert!(!data.join("wrong").exists(), "{wrong:?} makes nothing");
+    }
+    let new = ["keys", "create", "--role", "admin", "--new"];
+    assert_eq!(ballast(&new, &data).0, Some(0));
     // The database is lost, and one without keys made in its place.
     for file in ["ballast.sqlite", "ballast.sqlite-wal", "ballast.sqlite-shm"] {
         let _ = std::fs::remove_file(data.join(file));
     }
     let (code, said) = ballast(&serve, &data);
     assert!(code == Some(1) && said.contains("ballast.keys says that the store had keys"), "{said}");
-    assert_eq!(ballast(&["keys", "create", "--role", "admin"], &data).0, Some(0));
+    assert_eq!(ballast(&new, &data).0, Some(0));
     let (child, url) = process::serve(|command| {
         command.args(["--require-keys", "--data"]).arg(&data);
     });
