@@ -1,6 +1,7 @@
 //! From what failed below to a problem document.
 
 use std::error::Error;
+use std::time::Duration;
 
 use super::problem::{Problem, ProblemKind};
 use super::telemetry;
@@ -9,6 +10,9 @@ use crate::service::error::ServiceError;
 use crate::service::gate::Doubts;
 use crate::service::metrics as names;
 use crate::store::{OverQuota, Quota, StoreError};
+
+/// After which a tenant whose own work is in the way may call again.
+const OWN_WORK: Duration = Duration::from_secs(1);
 
 impl From<ServiceError> for Problem {
     fn from(error: ServiceError) -> Self {
@@ -56,6 +60,10 @@ impl From<ServiceError> for Problem {
             }
             ServiceError::Draining | ServiceError::Busy | ServiceError::Refused(Refused::NoPlace) => {
                 problem(Kind::Overloaded)
+            }
+            ServiceError::Refused(Refused::OwnWork) => {
+                let rule = "must leave room for the next call: send it again when others of the tenant have ended";
+                problem(Kind::TooManyRequests).naming("work", "this call", rule).to_be_asked_again_in(OWN_WORK)
             }
             ServiceError::Refused(Refused::TooOften(class, TooMany { per_second, wait })) => {
                 let rule = format!("must come at most {per_second} times a second, over all keys of the tenant");

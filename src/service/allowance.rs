@@ -95,6 +95,8 @@ pub enum Refused {
     TooManyStreams { most: usize },
     #[error("as many calls that solve, train or import are under way as may be at a time")]
     NoPlace,
+    #[error("the tenant has as much work of this kind under way as it may")]
+    OwnWork,
 }
 
 /// The call was one too many.
@@ -159,9 +161,13 @@ impl Allowance {
         self.heavy_of_one
     }
 
-    /// Places for a heavy call, the tenant's own first; `None` where all are taken.
-    fn places(&self) -> Option<Places> {
-        self.heavy.iter().map(|places| places.clone().try_acquire_owned().ok()).collect()
+    /// Places for a heavy call, the tenant's own first.
+    ///
+    /// # Errors
+    /// All of either are taken.
+    fn places(&self) -> Result<Places, Refused> {
+        let taken = self.heavy.iter().zip([Refused::OwnWork, Refused::NoPlace]);
+        taken.map(|(places, refused)| places.clone().try_acquire_owned().map_err(|_| refused)).collect()
     }
 }
 
@@ -201,7 +207,7 @@ impl HeavyTurn {
     /// Takes places too: heavy work comes next.
     ///
     /// # Errors
-    /// [`Refused::TooOften`], or [`Refused::NoPlace`] where all places are taken.
+    /// [`Refused::TooOften`], or if all places are taken [`Refused::OwnWork`] or [`Refused::NoPlace`].
     pub async fn begin(&self) -> Result<(), Refused> {
         self.count()?;
         if self.places.get().is_none() {
@@ -209,7 +215,7 @@ impl HeavyTurn {
                 Some(lane) => lane.clone().acquire_owned().await.ok(),
                 None => None,
             };
-            let mut places = self.allowance.places().ok_or(Refused::NoPlace)?;
+            let mut places = self.allowance.places()?;
             places.extend(first);
             self.places.get_or_init(|| places);
         }
@@ -317,9 +323,9 @@ mod tests {
         let limits = Limits::new([0; 3], 3);
         let (north, south) = (Allowance::new(&limits), Allowance::new(&limits));
         let held = [north.places().unwrap(), north.places().unwrap()];
-        assert!(north.places().is_none());
+        assert_eq!(north.places().unwrap_err(), Refused::OwnWork);
         let last = south.places().unwrap();
-        assert!(south.places().is_none());
+        assert_eq!(south.places().unwrap_err(), Refused::NoPlace);
         drop(held);
         drop(last);
         assert_eq!(limits.heavy.available_permits(), 3);

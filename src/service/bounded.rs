@@ -11,14 +11,14 @@
 //! Checked by: the tests below and `tests/operation/interruption.rs`.
 
 use std::collections::{HashMap, VecDeque};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::runtime::Handle;
 use tokio::sync::{oneshot, watch};
 use tracing::Instrument;
 
+use super::allowance::Refused;
 use super::error::ServiceError;
 use super::spans;
 use crate::numerics::interruption::{self, Stopped, Watcher};
@@ -86,8 +86,8 @@ struct Piece {
     tenant: Tenant,
     /// Closed once the caller is gone.
     caller: watch::Receiver<()>,
-    /// Whether too many long pieces wait for this one to go on.
-    is_refused: AtomicBool,
+    /// Why this one may not go on: too many long pieces wait.
+    refused: OnceLock<ServiceError>,
     /// `None` while it waits.
     place: Mutex<Option<(Place, Instant)>>,
 }
@@ -105,7 +105,8 @@ impl Bounded {
     /// Runs `work` on a thread that may block. It ends early where the future is dropped.
     ///
     /// # Errors
-    /// [`ServiceError::Busy`] where no place became free in time; a panic of `work`.
+    /// [`ServiceError::Busy`] if no place became free in time, [`Refused::OwnWork`] if the tenant had all it may have; a panic
+    /// of `work`.
     pub async fn run<T: Send + 'static>(
         &self,
         tenant: &Tenant,
@@ -130,7 +131,7 @@ impl Bounded {
             bounded: self.clone(),
             tenant: tenant.clone(),
             caller,
-            is_refused: AtomicBool::new(false),
+            refused: OnceLock::new(),
             place: Mutex::new(Some((place, Instant::now()))),
         });
         let (done, answer) = oneshot::channel();
@@ -141,13 +142,15 @@ impl Bounded {
                     let _ = done.send(Ok(answer));
                     prepare();
                 }
-                Err(stopped) => drop(done.send(Err(stopped))),
+                Err(Stopped) => {
+                    let refused = Arc::into_inner(piece).and_then(|piece| piece.refused.into_inner());
+                    drop(done.send(Err(refused.unwrap_or(ServiceError::Busy))));
+                }
             }
-            drop(piece);
         });
         let answer = answer.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)?;
         drop(here);
-        answer.map_err(|Stopped| ServiceError::Busy)
+        answer
     }
 
     /// Pieces that wait for a place.
@@ -159,7 +162,12 @@ impl Bounded {
         let asked = self.line(Kind::First).ask(tenant);
         let Some(granted) = asked else { return Ok(self.place(Kind::First, tenant.clone())) };
         let granted = tokio::time::timeout(self.wait, granted).await;
-        granted.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)
+        let late = |_| {
+            let line = self.line(Kind::First);
+            let is_own = line.running.contains_key(tenant) && line.is_full_of(tenant);
+            if is_own { Refused::OwnWork.into() } else { ServiceError::Busy }
+        };
+        granted.map_err(late)?.map_err(ServiceError::internal)
     }
 
     fn place(&self, kind: Kind, tenant: Tenant) -> Place {
@@ -184,7 +192,7 @@ impl Drop for Place {
 
 impl Watcher for Piece {
     fn is_stopped(&self) -> bool {
-        self.is_refused.load(Ordering::Relaxed) || self.caller.has_changed().is_err()
+        self.refused.get().is_some() || self.caller.has_changed().is_err()
     }
 
     fn give_way(&self) {
@@ -201,8 +209,13 @@ impl Watcher for Piece {
                 *since = Instant::now();
                 return;
             }
-            if waiting >= LONG_WAITING || line.waiting_of(&self.tenant) >= LONG_WAITING_OF_ONE {
-                self.is_refused.store(true, Ordering::Relaxed);
+            let refused = if line.waiting_of(&self.tenant) >= LONG_WAITING_OF_ONE {
+                Some(Refused::OwnWork.into())
+            } else {
+                (waiting >= LONG_WAITING).then_some(ServiceError::Busy)
+            };
+            if let Some(refused) = refused {
+                self.refused.get_or_init(|| refused);
                 return;
             }
             line.ask(&self.tenant)
@@ -231,7 +244,12 @@ impl Piece {
 
 impl Line {
     fn may(&self, tenant: &Tenant) -> bool {
-        self.free > 0 && self.running.get(tenant).copied().unwrap_or_default() < self.of_one
+        self.free > 0 && !self.is_full_of(tenant)
+    }
+
+    /// Whether the tenant has as many places as it may.
+    fn is_full_of(&self, tenant: &Tenant) -> bool {
+        self.running.get(tenant).copied().unwrap_or_default() >= self.of_one
     }
 
     fn take(&mut self, tenant: &Tenant) {
@@ -296,7 +314,7 @@ impl Line {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicU64;
+    use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::mpsc;
 
     use super::*;
@@ -361,7 +379,10 @@ mod tests {
         let (begun, begins) = mpsc::channel();
         let first = hold(&bounded, "north", &begun, "first");
         until(|| begins.try_recv().is_ok()).await;
-        assert!(matches!(bounded.run(&tenant("north"), || ()).await, Err(ServiceError::Busy)));
+        let refused = bounded.run(&tenant("north"), || ()).await;
+        assert!(matches!(refused, Err(ServiceError::Refused(Refused::OwnWork))), "{refused:?}");
+        let refused = bounded.run(&tenant("south"), || ()).await;
+        assert!(matches!(refused, Err(ServiceError::Busy)), "{refused:?}");
         assert_eq!(bounded.waiting(), 0);
         first.release.send(()).unwrap();
         assert!(first.done.await.unwrap().unwrap());
@@ -438,7 +459,8 @@ mod tests {
         let mut all: Vec<_> = (0..LONG_WAITING_OF_ONE + 2).map(|_| busy(&bounded, "north", u64::MAX).1).collect();
         until(|| all.iter().any(tokio::task::JoinHandle::is_finished)).await;
         let first = all.iter().position(tokio::task::JoinHandle::is_finished).unwrap();
-        assert!(matches!(all.swap_remove(first).await.unwrap(), Err(ServiceError::Busy)));
+        let refused = all.swap_remove(first).await.unwrap();
+        assert!(matches!(refused, Err(ServiceError::Refused(Refused::OwnWork))), "{refused:?}");
         assert!(busy(&bounded, "south", 500).1.await.unwrap().is_ok());
         all.iter().for_each(tokio::task::JoinHandle::abort);
         all_free(&bounded, [1, 1]).await;

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::{Instant, timeout_at};
 
-use super::allowance::Allowance;
+use super::allowance::{Allowance, Refused};
 use super::error::ServiceError;
 
 /// So many turns at a time.
@@ -26,14 +27,13 @@ impl Turns {
     /// Waits for the other calls of the tenant first, so that it has one in the queue of all.
     ///
     /// # Errors
-    /// [`ServiceError::Busy`] where the turn did not come in time.
+    /// [`Refused::OwnWork`] if other calls of the tenant did not end in time, [`ServiceError::Busy`] if those of others did not.
     pub(super) async fn of(&self, tenant: &Allowance) -> Result<Turn, ServiceError> {
-        let both = async {
-            let own = tenant.lists().acquire_owned().await?;
-            Ok::<_, tokio::sync::AcquireError>(Turn([own, self.places.clone().acquire_owned().await?]))
-        };
-        let turn = tokio::time::timeout(self.wait, both).await;
-        turn.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)
+        let end = Instant::now() + self.wait;
+        let own = timeout_at(end, tenant.lists().acquire_owned()).await;
+        let own = own.map_err(|_| Refused::OwnWork)?.map_err(ServiceError::internal)?;
+        let place = timeout_at(end, self.places.clone().acquire_owned()).await;
+        Ok(Turn([own, place.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)?]))
     }
 }
 
@@ -66,8 +66,10 @@ mod tests {
 
     #[tokio::test]
     async fn who_waits_too_long_is_told_to_come_again() {
-        let (turns, north) = (Turns::new(1, Duration::from_millis(5)), Allowance::new(&Limits::default()));
+        let (turns, [north, south]) =
+            (Turns::new(1, Duration::from_millis(5)), [(); 2].map(|()| Allowance::new(&Limits::default())));
         let _first = turns.of(&north).await.unwrap();
-        assert!(matches!(turns.of(&north).await, Err(ServiceError::Busy)));
+        assert!(matches!(turns.of(&north).await, Err(ServiceError::Refused(Refused::OwnWork))));
+        assert!(matches!(turns.of(&south).await, Err(ServiceError::Busy)));
     }
 }
