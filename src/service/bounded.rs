@@ -29,7 +29,7 @@ const MOMENT: Duration = Duration::from_millis(100);
 /// How long a piece has a place for long work while others wait for one.
 const SHIFT: Duration = Duration::from_millis(250);
 /// Long pieces that may wait for such a place, each on a thread of its own.
-pub(super) const LONG_WAITING: usize = 32;
+pub(super) const LONG_WAITING: usize = 16;
 /// Those of one tenant.
 const LONG_WAITING_OF_ONE: usize = 8;
 

@@ -96,6 +96,7 @@ async fn an_entry_is_counted_with_what_it_takes_whatever_assets_are_called() {
     assert_eq!(status, 200, "{corrected}");
     let bytes = entry_bytes(app.folder()).await;
     assert_eq!(bytes.len(), 3);
+    println!("{bytes:?} bytes: all of a period of 30 assets, its returns alone, and a correction");
     assert!(bytes[..2].iter().all(|bytes| *bytes < 4000), "{bytes:?}");
     assert!(bytes[2] < 2 * (1536 + 30 * 88), "{bytes:?}");
     // What is read of them is what was answered.
