@@ -8,6 +8,7 @@ mod audit;
 mod backtests;
 mod bodies;
 mod bounds;
+mod certificate_expiry;
 mod connections;
 mod conversation;
 pub mod dashboard;

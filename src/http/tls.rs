@@ -19,8 +19,9 @@ use rustls::version::{TLS12, TLS13};
 use thiserror::Error;
 use tokio_rustls::TlsAcceptor;
 
+use super::certificate_expiry::expiry;
 use crate::service::config::TlsFiles;
-use crate::service::metrics::CERTIFICATE_LOADS;
+use crate::service::metrics::{CERTIFICATE_EXPIRES, CERTIFICATE_LOADS};
 
 /// A certificate put in place counts within this time.
 const POLL: Duration = Duration::from_secs(2);
@@ -109,6 +110,9 @@ impl Certificate {
                 if current.cert != key.cert {
                     metrics::counter!(CERTIFICATE_LOADS, "outcome" => "taken").increment(1);
                     tracing::info!(file = %self.files.certificate.display(), "another certificate is in force");
+                }
+                if let Some(expires) = key.cert.iter().filter_map(|certificate| expiry(certificate)).min() {
+                    metrics::gauge!(CERTIFICATE_EXPIRES).set(expires as f64);
                 }
                 *current = Arc::new(key);
                 Some(pair)

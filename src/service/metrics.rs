@@ -19,6 +19,8 @@ pub const JOBS: &str = "ballast_jobs";
 pub const CONNECTIONS: &str = "ballast_connections";
 pub const CONNECTIONS_REFUSED: &str = "ballast_connections_refused_total";
 pub const CERTIFICATE_LOADS: &str = "ballast_certificate_loads_total";
+/// When the certificate in force, or one of its chain, expires.
+pub const CERTIFICATE_EXPIRES: &str = "ballast_certificate_expiry_timestamp_seconds";
 pub const SESSIONS: &str = "ballast_sessions";
 pub const TURNS_WAITING: &str = "ballast_turns_waiting";
 pub const MEMORY: &str = "ballast_memory_bytes";
@@ -98,6 +100,14 @@ pub fn describe() {
     describe_counter!(
         CERTIFICATE_LOADS,
         "Certificates read anew, by outcome: taken, or refused and the one before kept."
+    );
+    for outcome in ["taken", "refused"] {
+        counter!(CERTIFICATE_LOADS, "outcome" => outcome).increment(0);
+    }
+    describe_gauge!(
+        CERTIFICATE_EXPIRES,
+        Unit::Seconds,
+        "When the certificate in force, or one of its chain, expires, in seconds since 1970."
     );
     describe_gauge!(JOBS, "Jobs in the store, by state.");
     describe_gauge!(SESSIONS, "Sessions in the store.");

@@ -4,9 +4,11 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::support::certificates::Authority;
 use crate::support::patience::until;
 use crate::support::{App, specification};
 use ballast::service::clock::Clock;
+use ballast::service::config::TlsFiles;
 use ballast::service::keys;
 use ballast::store::KeyRing;
 use serde_json::{Value, json};
@@ -53,13 +55,22 @@ async fn exposition() -> String {
     assert_eq!(app.action().await.0, 200);
     assert_eq!(app.get("/sessions/nobody").await.0, 404);
     assert_eq!(app.post("/what-if", &json!({ "session": app.session })).await.0, 200);
+    // The metrics are those of the process: another service in it has a certificate.
+    let certificate = Authority::new().certificate("127.0.0.1");
+    let files = TlsFiles { certificate: app.folder().join("cert.pem"), key: app.folder().join("key.pem") };
+    std::fs::write(&files.certificate, &certificate.pem).unwrap();
+    std::fs::write(&files.key, &certificate.key).unwrap();
+    let _encrypted = App::configured(|config| config.tls = Some(files)).await;
     let ring = KeyRing::open(app.folder()).await.unwrap();
     let (tenant, roles) = ("north".parse().unwrap(), "admin".parse().unwrap());
     let expires_ms = Some(Clock::system().now_milliseconds() + 3_600_000);
     let (_, secret) = keys::issue(&ring, tenant, roles, expires_ms, &Clock::system()).await.unwrap();
     ring.close().await;
     app.hold(secret.reveal());
-    let counts = async || (app.get("/no-such-path").await.0 == 404 && keyless(&app).await == 401).then_some(());
+    let counts = async || {
+        let is_measured = app.get("/metrics").await.1.as_str().is_some_and(|page| page.contains("certificate_expiry"));
+        (app.get("/no-such-path").await.0 == 404 && keyless(&app).await == 401 && is_measured).then_some(())
+    };
     until("the key to count", counts).await;
     app.client.get(format!("{}/metrics", app.url)).send().await.unwrap().text().await.unwrap()
 }
