@@ -13,3 +13,4 @@ mod memory;
 mod process;
 mod renewal_scale;
 mod replicas;
+mod rolling;
