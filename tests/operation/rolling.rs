@@ -160,10 +160,11 @@ async fn no_call_fails_while_replicas_are_restarted_in_turn() {
         let ended = async || replica.0.0.try_wait().unwrap();
         assert!(until("the replica to end", ended).await.success());
         let next = start(&store);
-        let mut backends = backends.lock().unwrap();
-        backends.retain(|address| *address != replica.1);
-        backends.push(next.1.clone());
-        drop(backends);
+        {
+            let mut backends = backends.lock().unwrap();
+            backends.retain(|address| *address != replica.1);
+            backends.push(next.1.clone());
+        }
         until("the new replica to be ready", async || is_ready(&next.1).await.then_some(())).await;
         // The balancer has seen it.
         tokio::time::sleep(2 * LOOK).await;
