@@ -45,7 +45,7 @@ export async function service() {
   };
   const keyOf = async (tenant, ...roles) => {
     const given = roles.flatMap((role) => ["--role", role]);
-    return (await run(BINARY, ["keys", "create", "--data", folder, "--tenant", tenant, ...given])).stdout.trim();
+    return (await run(BINARY, ["keys", "create", "--new", "--data", folder, "--tenant", tenant, ...given])).stdout.trim();
   };
   return { url, stop, key: (...roles) => keyOf("default", ...roles), keyOf, kill: () => end("SIGKILL"), start: () => start(new URL(url).host) };
 }

@@ -13,7 +13,7 @@ from ballast import Ballast, Forbidden, Unauthenticated
 
 def key(folder: Path, *roles: str) -> str:
     given = [argument for role in roles for argument in ("--role", role)]
-    command = [str(BINARY), "keys", "create", "--data", str(folder), *given]
+    command = [str(BINARY), "keys", "create", "--new", "--data", str(folder), *given]
     return subprocess.run(command, text=True, capture_output=True, check=True).stdout.strip()
 
 
