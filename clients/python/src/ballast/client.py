@@ -448,7 +448,8 @@ class _Ballast:
         """All sessions, or those that match, each with what it is called and where it stands; newest first unless told.
 
         ``search`` is words, each the beginning of a word of the session's or its policy's name or tags, or eight digits
-        or more with which an identifier begins, whatever the case; ``tag`` is one that they have. :func:`ballast.frames.sessions` makes a table of them.
+        or more with which an identifier begins, whatever the case; ``tag`` is one that they have.
+        :func:`ballast.frames.sessions` makes a table of them.
         """
         return self._listed("/sessions", "sessions", search=search, tag=tag, state=state, sort=sort)
 
