@@ -60,7 +60,7 @@ pub enum Counted {
 /// What is asked of a list of sessions; all of them, as they were opened, where nothing is given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionQuery {
-    /// Beginnings of words of the session or of its policy, in any order and whatever the case: see [`super::search`].
+    /// Beginnings of words of the session or of its policy, in any order and whatever the case.
     pub search: Option<String>,
     /// A whole tag.
     pub tag: Option<String>,
