@@ -109,7 +109,7 @@ fn mean_owed(price: f64, periods: usize) -> f64 {
 fn by_the_library(seller: &Seller) -> Result<(f64, f64), Box<dyn Error>> {
     let specification: Specification = serde_json::from_value(json!({
         "problem": { "framework": "static", "horizon": PERIODS, "rate_per_step": RATE, "history": HISTORY,
-            "radius": { "rule": "fixed", "radius": RADIUS }, "support": { "min": SUPPORT[0], "max": SUPPORT[1] } },
+            "radius": { "rule": "fixed", "radius": RADIUS }, "support": { "rule": "between", "min": SUPPORT[0], "max": SUPPORT[1] } },
         // Wide enough for the design to reach wherever the adversary can.
         "design": { "count": 200, "sampling_law":
             { "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.0, "variance": 0.03 }] } }

@@ -74,6 +74,16 @@ def moment_features(returns, w, count):
     return list(features.values())[:count]
 
 
+def least_return(problem, returns, w):
+    """The lowest log-return that the adversary may use: given, or the lower of so many times the worst and five deviations."""
+    support = problem.get("support") or {"rule": "none"}
+    if support["rule"] == "worst_seen":
+        m = mean(returns, w)
+        s = math.sqrt(mean([(z - m) ** 2 for z in returns], w))
+        return max(min(support["factor"] * min(returns), m - 5 * s, min(returns)), -20.0)
+    return support.get("min", -math.inf)
+
+
 def merton_features(problem, returns, w, radius):
     utility, bank = problem["utility"], 1 + problem["rate_per_step"]
     rho = {
@@ -81,7 +91,7 @@ def merton_features(problem, returns, w, radius):
         "power": lambda: utility["risk_aversion"],
         "log": lambda: 1.0,
     }[utility["kind"]]()
-    lowest = (problem.get("support") or {"min": -math.inf})["min"]
+    lowest = least_return(problem, returns, w)
     c = cap(returns, w, radius, lowest)
     capped = [math.exp(min(z, c)) / bank for z in returns]
     e = mean(capped, w) - 1
@@ -218,8 +228,9 @@ def evaluate(policy, question):
     deviation = math.sqrt(predicted_variance(solution["value"]["hyperparameters"], points, x))
     band = [min(max(end / share, low), high) for end in predictions(solution["policy"], points, x)]
     # A radius of 0, which a fixed rule may have, ruins nobody.
+    unbounded = (problem.get("support") or {"rule": "none"})["rule"] == "none"
     has_ball = problem["framework"] in ("adaptive", "static") and problem["radius"].get("radius") != 0
-    ruined = has_ball and problem.get("support") is None and problem["utility"]["kind"] == "power" and max(band) >= 1.0
+    ruined = has_ball and unbounded and problem["utility"]["kind"] == "power" and max(band) >= 1.0
     return {
         "allocation": into([band[0], max(band[-1], band[0])], holding),
         "floor_gain": gain,

@@ -10,6 +10,7 @@ use ballast::control::request::specification::{ProblemSpecification, default_see
 use ballast::service::advise::Advise;
 use clap::Args;
 
+use super::caution::{self, CautionArgs};
 use super::record::{Record, show};
 use super::returns::Returns;
 
@@ -19,6 +20,11 @@ mod words;
 pub struct AdviseArgs {
     #[command(flatten)]
     record: Record,
+    #[command(flatten)]
+    caution: CautionArgs,
+    /// Of the simulations
+    #[arg(long, default_value_t = default_seed())]
+    seed: u64,
     /// Periods in which the weight of a return halves; all weigh the same unless given
     #[arg(long)]
     half_life: Option<f64>,
@@ -53,7 +59,7 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
     let returns = arguments.record.read()?;
     let count = returns.rows().len();
     let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count, &arguments.record))?;
-    let told = || words::told(&advised, arguments.wealth, returns.noun());
+    let told = || words::told(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
     Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
 }
 
@@ -62,13 +68,13 @@ impl AdviseArgs {
         let problem = ProblemSpecification {
             trading_cost: self.trading_cost,
             learning: self.half_life.map_or_else(Learning::default, |half_life| Learning::Decay { half_life }),
-            ..self.record.problem(returns)
+            ..self.caution.applied(self.record.problem(returns))
         };
         Advise {
             problem,
             wealth: Some(self.wealth),
             holding: Some(self.holding),
-            seed: default_seed(),
+            seed: self.seed,
             sensitivity: self.sensitivity,
         }
     }
@@ -84,7 +90,7 @@ fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
         );
         return FieldError::new(record.source(), format!("{count} returns"), rule);
     }
-    match OPTIONS.iter().find(|(field, _)| *field == error.field) {
+    match OPTIONS.iter().chain(&caution::OPTIONS).find(|(field, _)| *field == error.field) {
         Some((_, option)) => FieldError { field: (*option).into(), ..error },
         None => error,
     }

@@ -15,13 +15,16 @@ use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::pool::{PoolError, TrainingPool};
 use ballast::control::progress::Watch;
 use ballast::control::request::backtest::{BacktestRequest, Rates, defaults};
+use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::centre::CentreSpecification;
+use ballast::control::request::support::Support;
 use ballast::http::{dashboard, decode};
 use ballast::report::{self, FileError};
 use clap::Args;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::caution;
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
 use progress::Parts;
 
@@ -53,6 +56,12 @@ pub struct BacktestArgs {
     /// Multiple of the radius of every ball; 1 unless given
     #[arg(long)]
     scale: Option<f64>,
+    /// Share of every radius that is acted on: bold, balanced, cautious, found anew for every training, or paper, all of it
+    #[arg(long, value_parser = caution::level)]
+    caution: Option<CautionLevel>,
+    /// Returns that are thought possible: so many times the worst and the best seen, or none for any at all, which is the default
+    #[arg(long, value_parser = caution::support)]
+    support: Option<Support>,
     /// What the balls are centred on, as `problem.centre` of a request: '{"kind": "smoothed", "bandwidth": 0.01}'; the returns seen
     /// unless given
     #[arg(long, value_parser = centre)]
@@ -199,6 +208,8 @@ impl BacktestArgs {
             horizon: self.horizon,
             alpha: if self.alpha.is_empty() { defaults::alpha() } else { self.alpha.clone() },
             scale: self.scale.unwrap_or_else(defaults::scale),
+            caution: self.caution.unwrap_or_else(defaults::caution),
+            support: self.support.unwrap_or_else(defaults::support),
             centre: self.centre.clone().unwrap_or_default(),
             risk_aversion: self.risk_aversion,
             trading_cost: self.trading_cost()?,

@@ -6,6 +6,7 @@ pub mod audit;
 pub mod backtest;
 pub mod backup;
 pub mod bench;
+mod caution;
 pub mod check;
 mod compare;
 pub mod coverage;

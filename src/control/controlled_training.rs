@@ -10,10 +10,12 @@ use crate::control::error::{FieldError, TrainError};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::progress::Watch;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::completion::DEFAULT_COUNT;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, Specification, SurrogateTarget, UtilitySpecification};
+use crate::control::request::support::Support;
 use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitted::ValueSurrogate;
@@ -48,15 +50,16 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         let mut specification = specification.clone();
         specification.problem.utility = UtilitySpecification::Log {};
         specification.problem.trading_cost = 0.0;
+        specification.problem.caution = Some(CautionLevel::Paper);
         specification.problem.contributions = Contributions::default();
         specification.surrogate.target = SurrogateTarget::FloorGain;
         let specification = specification.completed()?;
         if specification.design.initial_laws == InitialLaws::Resampled {
             return Err(FieldError::new("design.initial_laws", "resampled", "must be given here").into());
         }
-        if !problem.has_floor() && specification.problem.support.is_none() {
+        if !problem.has_floor() && specification.problem.support_rule() == (Support::None {}) {
             let rule = "must be given for a problem without a floor";
-            return Err(FieldError::new("problem.support", "null", rule).into());
+            return Err(FieldError::new("problem.support", "none", rule).into());
         }
         let laws = Problem::new(&specification);
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});

@@ -1,4 +1,4 @@
-//! What is kept ready, weighed in bytes: bridges, factors and prepared policies share one bound.
+//! What is kept ready, weighed in bytes: bridges, factors, levels of caution and prepared policies share one bound.
 //!
 //! Everything here can be made again to the same bits from its [`Key`], so dropping it costs time and nothing else.
 //! Bridges depend on sample size, number of paths and seed alone, and a factor on its design and scales alone: policies
@@ -34,6 +34,8 @@ pub enum Key {
     },
     /// The factor behind a predicted deviation, by the hash of what it is made of.
     Factor([u8; 32]),
+    /// The levels of caution of a record, by the hash of all that they are found from.
+    Levels([u8; 32]),
     /// A prepared policy, by the name its owner knows it under.
     Policy(Arc<str>),
 }
@@ -44,6 +46,7 @@ impl Key {
         match self {
             Key::Bridges { .. } => Part::Bridges,
             Key::Factor(_) => Part::Factors,
+            Key::Levels(_) => Part::Levels,
             Key::Policy(_) => Part::Policies,
         }
     }
@@ -56,13 +59,15 @@ pub enum Part {
     Bridges,
     /// Factors behind predicted deviations.
     Factors,
+    /// Levels of caution.
+    Levels,
     /// Prepared policies.
     Policies,
 }
 
 impl Part {
     /// Every part.
-    pub const ALL: [Part; 3] = [Part::Bridges, Part::Factors, Part::Policies];
+    pub const ALL: [Part; 4] = [Part::Bridges, Part::Factors, Part::Levels, Part::Policies];
 }
 
 /// A thing and what it weighs.

@@ -52,6 +52,7 @@
 
 pub mod assets;
 pub mod bellman;
+pub mod caution;
 pub mod controlled_training;
 pub mod error;
 pub mod estimate;

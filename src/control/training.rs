@@ -62,7 +62,7 @@ impl Training {
     /// # Errors
     /// As [`Self::new`].
     pub fn among(specification: &Specification, kept: Kept, measured: Arc<Summaries>) -> Result<Self, TrainError> {
-        let specification = specification.clone().completed()?;
+        let specification = specification.clone().completed()?.resolved(&kept);
         let design = Design::new(&specification);
         Ok(Training { design, problem: Problem::with(&specification, kept), measured })
     }

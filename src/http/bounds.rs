@@ -9,6 +9,7 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 use crate::control::evaluation::assets::MOST_WINDOWS;
 use crate::control::request::assets::{ASSETS, DATES, LARGEST_FACTOR, NAME_LENGTH};
 use crate::control::request::backtest;
+use crate::control::request::caution;
 use crate::control::request::centre_rules::{ASSUMED_WEIGHT, BANDWIDTH};
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
@@ -17,6 +18,7 @@ use crate::control::request::rules::{
     ACCURACY, COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE,
     RATE, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
+use crate::control::request::support::{FACTOR, LIMIT};
 use crate::service::plan::MOST_RENEWALS;
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
 use crate::service::reports::REPORTS;
@@ -60,6 +62,10 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
+        ("Support worst_seen", "factor", within(FACTOR)),
+        ("Support between", "min", within((-LIMIT, LIMIT))),
+        ("Support between", "max", within((-LIMIT, LIMIT))),
+        ("CautionLevel", "scale", within((0.0, caution::LARGEST_SCALE))),
         ("RadiusRule bridge", "alpha", probability.clone()),
         ("RadiusRule calibrated", "alpha", within((1e-2, 0.999))),
         ("RadiusRule concentration", "alpha", probability),
@@ -136,7 +142,6 @@ fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("FundSpecification", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
         ("AssetsProblem", "assets", names),
         ("AssetsProblem", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
-        ("LowestReturn", "min", log_return),
     ];
     rules.into_iter()
 }

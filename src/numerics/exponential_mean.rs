@@ -12,7 +12,6 @@ pub struct ExponentialMean<'a> {
     law: &'a EmpiricalDistribution,
     /// `sums[j]`: sums of w e^z and of w (e^z - 1)^2 over the first j atoms, w their weights.
     sums: Vec<[f64; 2]>,
-    lowest: f64,
 }
 
 /// Mean and variance of e^Z under the law with the worst mean.
@@ -25,28 +24,29 @@ pub struct WorstExponential {
 }
 
 impl<'a> ExponentialMean<'a> {
-    /// `lowest` bounds the support from below; minus infinity where nothing does. Cost O(n).
-    pub fn of(law: &'a EmpiricalDistribution, lowest: f64) -> Self {
+    /// Cost O(n).
+    pub fn of(law: &'a EmpiricalDistribution) -> Self {
         let mut sums = vec![[0.0; 2]];
         let mut total = [0.0; 2];
         for (atom, weight) in law.atoms().iter().zip(law.weights()) {
             total = added(total, *atom, *weight);
             sums.push(total);
         }
-        ExponentialMean { law, sums, lowest }
+        ExponentialMean { law, sums }
     }
 
-    /// Over the ball of the law itself. Cost O(values above the cap).
-    pub fn worst(&self, radius: f64) -> WorstExponential {
-        self.capped(None, radius)
+    /// Over the ball of the law itself. `lowest` bounds the support from below; minus infinity where nothing does. Cost O(values
+    /// above the cap).
+    pub fn worst(&self, radius: f64, lowest: f64) -> WorstExponential {
+        self.capped(None, radius, lowest)
     }
 
     /// Over the ball of the law with `value` added. Cost O(values above the cap).
-    pub fn worst_with(&self, value: f64, radius: f64) -> WorstExponential {
-        self.capped(Some(value), radius)
+    pub fn worst_with(&self, value: f64, radius: f64, lowest: f64) -> WorstExponential {
+        self.capped(Some(value), radius, lowest)
     }
 
-    fn capped(&self, extra: Option<f64>, radius: f64) -> WorstExponential {
+    fn capped(&self, extra: Option<f64>, radius: f64, lowest: f64) -> WorstExponential {
         let (atoms, weights) = (self.law.atoms(), self.law.weights());
         // Of a weight of the law, and of the extra value's.
         let (kept, more) = if extra.is_some() { (self.law.retention(), 1.0) } else { (1.0, 0.0) };
@@ -74,7 +74,7 @@ impl<'a> ExponentialMean<'a> {
                 above += kept * weights[left];
             }
         }
-        let cap = (cap - budget / above).max(self.lowest.min(cap));
+        let cap = (cap - budget / above).max(lowest.min(cap));
         let below = self.sums[left].map(|sum| kept * sum);
         let below = extra_left.map_or(below, |extra| added(below, extra, more));
         let [mean, square] = added(below, cap, above).map(|sum| sum / size);
@@ -105,7 +105,7 @@ mod tests {
     }
 
     fn is_the_exact_worst_law(law: &EmpiricalDistribution, radius: f64, extra: Option<f64>) {
-        let mean = ExponentialMean::of(law, f64::NEG_INFINITY);
+        let mean = ExponentialMean::of(law);
         let mut with = law.clone();
         extra.into_iter().for_each(|value| with.push(value));
         let mut support: Vec<f64> = (-15_000..=6_000).map(|k| f64::from(k) * 1e-4).collect();
@@ -119,7 +119,8 @@ mod tests {
         let payoff: Vec<f64> = support.iter().map(|z| z.exp()).collect();
         let ball = WassersteinBall { support: &support, masses: &masses, radius };
         let expected = ball.worst_expectation(&payoff).0;
-        let found = extra.map_or_else(|| mean.worst(radius), |value| mean.worst_with(value, radius));
+        let lowest = f64::NEG_INFINITY;
+        let found = extra.map_or_else(|| mean.worst(radius, lowest), |value| mean.worst_with(value, radius, lowest));
         // The grid misses the cap by at most its spacing, of which the chord of e^z is second order.
         assert!((found.mean - expected).abs() < 2e-9, "{radius} {extra:?}: {found:?} against {expected}");
         let moves = ball.worst_law(&payoff).moves;
@@ -132,8 +133,8 @@ mod tests {
     #[test]
     fn the_support_bounds_the_cap() {
         let law = EmpiricalDistribution::new(&[0.1, 0.3]);
-        let mean = ExponentialMean::of(&law, 0.05);
-        assert_eq!(mean.worst(10.0).mean, 0.05_f64.exp());
-        assert_eq!(mean.worst(0.0).mean, (0.1_f64.exp() + 0.3_f64.exp()) / 2.0);
+        let mean = ExponentialMean::of(&law);
+        assert_eq!(mean.worst(10.0, 0.05).mean, 0.05_f64.exp());
+        assert_eq!(mean.worst(0.0, 0.05).mean, (0.1_f64.exp() + 0.3_f64.exp()) / 2.0);
     }
 }

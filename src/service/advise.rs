@@ -11,6 +11,7 @@ use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
+use crate::control::policy::levels::LevelsAdvised;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
@@ -46,6 +47,9 @@ pub struct Advised {
     pub worst_case: WorstCase,
     /// What to know before the advice is followed.
     pub caution: Vec<Caution>,
+    /// The levels of caution, where one of them is followed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub levels: Option<LevelsAdvised>,
     /// How near it is to changing, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<Sensitivity>,
@@ -74,7 +78,7 @@ impl Advise {
         let checked = self.checked()?;
         let investor = OnePeriod::new(&checked.specification, Kept::default());
         checked.check_sensitivity(&investor)?;
-        checked.answered(&investor)
+        checked.answered(&investor.resolved())
     }
 
     fn checked(mut self) -> Result<Checked, FieldError> {
@@ -101,9 +105,10 @@ impl Checked {
     fn answered(&self, investor: &OnePeriod) -> Result<Advised, FieldError> {
         let (advice, worst_case) = investor.advise(self.holding)?;
         let sensitivity = self.asks_sensitivity.then(|| investor.sensitivity(self.holding, &advice)).transpose()?;
+        let levels = investor.levels(self.holding)?;
         let (caution, problem) = (cautions(&advice, sensitivity.as_ref()), &self.specification.problem);
         let (annualised, warnings) = (problem.annualised(), problem.warnings());
-        Ok(Advised { advice, worst_case, caution, sensitivity, annualised, warnings })
+        Ok(Advised { advice, worst_case, caution, levels, sensitivity, annualised, warnings })
     }
 }
 
@@ -116,6 +121,6 @@ impl Sessions {
         checked.check_sensitivity(&investor)?;
         let shown = checked.specification.problem.history.len();
         let room = self.memory.answers(shown * ATOM_BYTES).await?;
-        Ok(Large { value: self.resolving.run(tenant, move || checked.answered(&investor)).await??, room })
+        Ok(Large { value: self.resolving.run(tenant, move || checked.answered(&investor.resolved())).await??, room })
     }
 }

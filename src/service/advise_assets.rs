@@ -65,7 +65,7 @@ impl Sessions {
         }
         let fund = self.policies.one_period(&problem.fund(seed)?)?;
         let solving = move || {
-            let advice = AssetsAdvice::of(&problem, fund.problem(), fund.radius()?, seed);
+            let advice = AssetsAdvice::of(&problem, &fund)?;
             let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
             Ok::<_, ServiceError>(AssetsAdvised { advice, annualised, warnings })
         };

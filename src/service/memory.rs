@@ -227,6 +227,7 @@ impl Memory {
             let part = match part {
                 Part::Bridges => "bridges",
                 Part::Factors => "factors",
+                Part::Levels => "levels",
                 Part::Policies => "prepared_policies",
             };
             gauge!(names::MEMORY, "part" => part).set(bytes as f64);

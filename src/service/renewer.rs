@@ -30,7 +30,8 @@ use super::sessions::{Name, Sessions};
 use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
 use crate::control::request::assets::AssetsProblem;
-use crate::control::request::specification::{Interval, Specification};
+use crate::control::request::specification::Specification;
+use crate::control::request::support::Interval;
 use crate::store::{Actor, JobRow, JobState, SessionTraining, Store};
 
 /// Between two looks at jobs that train next policies.

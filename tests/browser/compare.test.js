@@ -76,7 +76,7 @@ test("a session's page has the return of the comparison, whatever money came and
 test("policies that differ are never said to be the same", async () => {
   const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
   const design = { count: 40 };
-  const bounded = await trained(ballast.url, { problem: { ...problem, support: { min: -0.4, max: 0.4 } }, design });
+  const bounded = await trained(ballast.url, { problem: { ...problem, support: { rule: "between", min: -0.4, max: 0.4 } }, design });
   const calibrated = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, rule: "calibrated" } }, design });
   for (const [policy, what] of [[bounded, /They differ in moves assumed possible; everything else/], [calibrated, /They differ in caution; everything else/]]) {
     await tick("policies", [careful, policy]);

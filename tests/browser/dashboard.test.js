@@ -79,7 +79,7 @@ test("a training from a file, watched to its end", async () => {
   await page.getByLabel("Investor").selectOption("own");
   await page.getByLabel("Utility", { exact: true }).selectOption("exponential");
   await page.getByLabel("Relative risk aversion").fill("1");
-  await page.getByLabel("Caution, times").fill("0.2");
+  await page.getByLabel("Radius, times").fill("0.2");
   await page.getByLabel("Design points").fill("400");
   await page.getByText("Every field, as JSON").click();
   const request = JSON.parse(await page.getByLabel("Training request as JSON").inputValue());

@@ -12,7 +12,7 @@ const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 
 let policy, report, evaluation;
 
 before(async () => {
-  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY };
+  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, caution: "paper", support: { rule: "none" } };
   const design = { count: 40 };
   policy = await trained(ballast.url, { problem, design });
   const { specification } = await call(ballast.url, `/policies/${policy}`);

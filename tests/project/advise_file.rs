@@ -154,5 +154,5 @@ fn the_pages_show_what_commands_print() {
             shown += 1;
         }
     }
-    assert_eq!(shown, 6);
+    assert_eq!(shown, 7);
 }

@@ -18,7 +18,7 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 28] = [
+const DOCUMENTS: [&str; 31] = [
     "control/assets/advice.rs",
     "control/evaluation/assets/report.rs",
     "control/evaluation/backtest_report.rs",
@@ -27,6 +27,7 @@ const DOCUMENTS: [&str; 28] = [
     "control/evaluation/report.rs",
     "control/policy/advice.rs",
     "control/policy/caution.rs",
+    "control/policy/levels.rs",
     "control/policy/sensitivity/mod.rs",
     "control/policy/worst_case.rs",
     "control/progress.rs",
@@ -34,6 +35,7 @@ const DOCUMENTS: [&str; 28] = [
     "control/request/assets.rs",
     "control/request/backtest.rs",
     "control/request/backtest_assets.rs",
+    "control/request/caution.rs",
     "control/request/centre.rs",
     "control/request/contributions.rs",
     "control/request/evaluation.rs",
@@ -44,6 +46,7 @@ const DOCUMENTS: [&str; 28] = [
     "control/request/sampling_law.rs",
     "control/request/fund.rs",
     "control/request/specification.rs",
+    "control/request/support.rs",
     "control/request/terms.rs",
     "control/request/warnings.rs",
     "control/solved_step.rs",

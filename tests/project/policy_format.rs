@@ -40,7 +40,7 @@ fn policies() -> Vec<Value> {
     let six = || json!({ "moment_count": 6 });
     // The ball of some states reaches past the lowest return that there can be, which is still better than this bank.
     let mut bounded = policy("adaptive", power(), json!({ "rule": "fixed", "radius": 0.056 }), json!({}));
-    bounded["problem"]["support"] = json!({ "min": -0.04, "max": 0.3 });
+    bounded["problem"]["support"] = json!({ "rule": "between", "min": -0.04, "max": 0.3 });
     bounded["problem"]["rate_per_step"] = json!(-0.045);
     let mut known = policy("known_law", power(), Value::Null, json!({}));
     known["problem"]["law"] = json!({ "kind": "gaussian_mixture",

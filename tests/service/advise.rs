@@ -98,7 +98,10 @@ async fn what_cannot_be_advised_is_refused_by_field_and_nothing_is_stored() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_relative_risk_aversion_is_of_the_wealth_at_the_start() {
     let mut app = App::start().await;
-    let problem = |utility: Value| json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "radius": { "rule": "fixed", "radius": 0.003 } });
+    let problem = |utility: Value| {
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "radius": { "rule": "fixed", "radius": 0.003 },
+        "support": { "rule": "none" } })
+    };
     let relative = || problem(json!({ "kind": "exponential", "risk_aversion_relative": 5 }));
     let absolute = |risk_aversion: f64| problem(json!({ "kind": "exponential", "risk_aversion": risk_aversion }));
     let mut found = Vec::new();
@@ -173,9 +176,10 @@ async fn several_assets_are_advised_by_name_as_solved_directly() {
         };
         let mut problem = json!({ "assets": names, "ground_norm": case["norm"], "history": case["returns"], "utility": utility,
             "rate_per_step": case["rate_per_step"], "radius": { "rule": "fixed", "radius": case["radius"] } });
-        if !case["floor"].is_null() {
-            problem["support"] = json!({ "min": case["floor"] });
-        }
+        problem["support"] = match case["floor"].is_null() {
+            true => json!({ "rule": "none" }),
+            false => json!({ "rule": "between", "min": case["floor"], "max": 5.0 }),
+        };
         let (status, advised) = app.post("/advise", &json!({ "problem": problem, "wealth": case["wealth"] })).await;
         assert_eq!(status, 200, "{advised}");
         let number = |field: &str| advised[field].as_f64().unwrap();
@@ -210,10 +214,11 @@ async fn the_crash_is_what_a_floor_at_the_lowest_return_takes_away() {
     let mut taken = 0.0_f64;
     for norm in ["scaled_one", "sup"] {
         let mut problem = json!({ "assets": ["left", "right"], "ground_norm": norm, "history": rows, "rate_per_step": 0.0,
-            "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "fixed", "radius": 0.004 } });
+            "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "fixed", "radius": 0.004 },
+            "support": { "rule": "none" } });
         let (status, advised) = app.post("/advise", &json!({ "problem": problem })).await;
         assert_eq!(status, 200, "{advised}");
-        problem["support"] = json!({ "min": lowest });
+        problem["support"] = json!({ "rule": "between", "min": lowest, "max": 5.0 });
         let floored = app.post("/advise", &json!({ "problem": problem })).await.1;
         assert_eq!(floored["without_crash"], Value::Null, "{floored}");
         let number = |of: &Value, field: &str| of[field].as_f64().unwrap();
@@ -275,8 +280,8 @@ async fn what_is_wrong_with_several_assets_is_named() {
         (with(&|p| p["history"][3] = json!([0.01, 9.0])), "problem.history[3][1]"),
         (with(&|p| p["history"] = json!([[0.01, 0.02]])), "problem.history"),
         (with(&|p| p["history"] = json!([[0.01, 0.02], [0.03, 0.02]])), "problem.history, bonds"),
-        (with(&|p| p["support"] = json!({ "min": 0.0 })), "problem.support.min"),
-        (with(&|p| p["support"] = json!({ "min": -9.0 })), "problem.support.min"),
+        (with(&|p| p["support"] = json!({ "rule": "between", "min": -1.0, "max": 0.0 })), "problem.history[0][0]"),
+        (with(&|p| p["support"] = json!({ "rule": "between", "min": -29.0, "max": 5.0 })), "problem.support.min"),
         (with(&|p| p["ground_norm"] = json!("two")), "problem.ground_norm"),
         (with(&|p| p["rate_per_step"] = json!(-2.0)), "problem.rate_per_step"),
         (with(&|p| p["radius"] = json!({ "rule": "chi_square", "alpha": 0.5 })), "problem.radius.rule"),

@@ -96,9 +96,12 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/radius", json!({"rule": "concentration", "C": 2.0, "c": 0.0}), "problem.radius.c"),
         ("/problem/radius", json!({"rule": "root_n", "kappa": -1.0}), "problem.radius.kappa"),
         ("/problem/radius", json!({"rule": "fixed", "radius": -1.0}), "problem.radius.radius"),
-        ("/problem/support", json!({"min": -30.0, "max": 1.0}), "problem.support.min"),
-        ("/problem/support", json!({"min": 1.0, "max": 0.0}), "problem.support.max"),
-        ("/problem/support", json!({"min": 1.0, "max": 1.0}), "problem.support.max"),
+        ("/problem/support", json!({"rule": "worst_seen", "factor": 0.5}), "problem.support.factor"),
+        ("/problem/caution", json!({"scale": -0.1}), "problem.caution.scale"),
+        ("/problem/levels", found_levels(1.5), "problem.levels"),
+        ("/problem/support", json!({"rule": "between", "min": -30.0, "max": 1.0}), "problem.support.min"),
+        ("/problem/support", json!({"rule": "between", "min": 1.0, "max": 0.0}), "problem.support.max"),
+        ("/problem/support", json!({"rule": "between", "min": 1.0, "max": 1.0}), "problem.support.max"),
         ("/problem/law", mixture(1.0, 0.0, 0.01), "problem.law"),
         ("/problem/history", json!([0.1]), "problem.history"),
         ("/problem/history", json!([0.1, 0.1, 0.1]), "problem.history"),
@@ -164,6 +167,13 @@ fn described_fields() -> BTreeSet<String> {
     fields
 }
 
+/// What a policy holds of levels, with this share of the radius.
+fn found_levels(scale: f64) -> Value {
+    let level = json!({ "scale": scale, "regrets": [0.0, 0.0, 0.0], "spared": 0.0 });
+    json!({ "premiums": [0.0, 0.001, 0.002], "premium_seen": 0.001, "standard_error": 0.001,
+        "bold": level, "balanced": level, "cautious": level, "paper": level })
+}
+
 #[test]
 fn the_list_covers_every_field() {
     let walked: BTreeSet<String> = faults()
@@ -173,10 +183,13 @@ fn the_list_covers_every_field() {
         .collect();
     // The discriminators are walked by `a_wrong_kind_is_refused`, and what is said of several assets by
     // `tests/service/funds.rs::what_is_wrong_of_several_assets_is_named`.
+    // What was found of levels is checked as a whole.
+    let found =
+        ["balanced", "bold", "cautious", "paper", "premium_seen", "premiums", "regrets", "spared", "standard_error"];
     let elsewhere = ["kind", "rule", "assets", "composition", "fund", "given", "ground_norm", "radius_factor"];
     let missing: Vec<_> = described_fields()
         .into_iter()
-        .filter(|field| !walked.contains(field) && !elsewhere.contains(&field.as_str()))
+        .filter(|field| !walked.contains(field) && ![&elsewhere[..], &found].concat().contains(&field.as_str()))
         .collect();
     assert!(missing.is_empty(), "no fault for {missing:?}");
 }
@@ -222,7 +235,7 @@ const DECIDED_TOGETHER: [&str; 20] = [
     "problem.centre.law",
     "problem.centre.kind",
     "problem.centre.law",
-    "problem.support.min",
+    "problem.levels",
     "problem.support.max",
     "problem.support.max",
     "problem.law",
@@ -531,6 +544,8 @@ fn faulty_walk_forwards() -> Vec<(&'static str, Value, &'static str)> {
         ("alpha", json!([0.1, 0.2, 0.3, 0.4]), "alpha"),
         ("alpha", json!([0.1, 0.1]), "alpha[1]"),
         ("alpha", json!([0.1, 1.0]), "alpha[1]"),
+        ("caution", json!({ "scale": -0.5 }), "caution.scale"),
+        ("support", json!({ "rule": "worst_seen", "factor": 11.0 }), "support.factor"),
         ("scale", json!(-0.1), "scale"),
         ("centre", json!({ "kind": "smoothed", "bandwidth": 2.0 }), "centre.bandwidth"),
         ("centre", json!({ "kind": "volatility_scaled", "half_life": 12.0 }), "centre.kind"),

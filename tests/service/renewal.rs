@@ -11,9 +11,11 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
+use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::framework::Framework;
 use ballast::control::request::learning::Learning;
+use ballast::control::request::support::Support;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
@@ -351,7 +353,7 @@ fn months(year: u32, window: usize, lived: usize) -> Vec<Period> {
 }
 
 /// Ten years through HTTP, renewed by itself every year, with the rates that the bank paid, and a correction made and undone:
-/// what was advised and what became of wealth are those of the walk-forward, bit for bit.
+/// at a level of caution that is found anew every year. What was advised and what became of wealth are those of the walk-forward, bit for bit.
 #[tokio::test(flavor = "multi_thread")]
 async fn ten_years_of_a_live_session_equal_the_backtest() {
     const LIVED: usize = 120;
@@ -360,6 +362,8 @@ async fn ten_years_of_a_live_session_equal_the_backtest() {
         every: 12,
         horizon: 13,
         scale: 1.0,
+        caution: CautionLevel::Balanced,
+        support: Support::WorstSeen { factor: 2.0 },
         centre: CentreSpecification::Empirical {},
         risk_aversion: 3.0,
         trading_cost: 0.0,

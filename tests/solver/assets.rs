@@ -58,7 +58,7 @@ fn direct_solutions_are_met() {
         let law = AssetsLaw {
             returns: &returns,
             radius: case["radius"].as_f64().unwrap(),
-            floor: case["floor"].as_f64().unwrap_or(f64::NEG_INFINITY),
+            floors: vec![case["floor"].as_f64().unwrap_or(f64::NEG_INFINITY); returns[0].len()],
         };
         let ground = ground(case["norm"].as_str().unwrap(), &returns);
         let step = AssetsStep::new(law, ground, utility(case), case["rate_per_step"].as_f64().unwrap(), WHOLE);
@@ -94,7 +94,13 @@ const POWER: RelativeUtility = RelativeUtility::Power { eta: 3.0 };
 const UTILITIES: [RelativeUtility; 3] = [POWER, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }];
 
 fn step(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64, floor: f64) -> AssetsStep {
-    AssetsStep::new(AssetsLaw { returns, radius, floor }, ground.clone(), utility, 0.002, WHOLE)
+    AssetsStep::new(
+        AssetsLaw { returns, radius, floors: vec![floor; returns[0].len()] },
+        ground.clone(),
+        utility,
+        0.002,
+        WHOLE,
+    )
 }
 
 fn without_floor(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64) -> AssetsStep {
@@ -112,7 +118,7 @@ fn identical_columns_are_one_asset() {
             let even = Ground::Weighted(vec![1.0 / assets as f64; assets]);
             for ground in [Ground::Sup, even] {
                 let radius = case["radius"].as_f64().unwrap();
-                let law = AssetsLaw { returns: &returns, radius, floor: f64::NEG_INFINITY };
+                let law = AssetsLaw { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
                 let rate = case["rate_per_step"].as_f64().unwrap();
                 let step = AssetsStep::new(law, ground, utility(case), rate, WHOLE);
                 let solution = step.solve(None);
@@ -149,7 +155,7 @@ fn a_static_policy_promises_the_gain_of_one_step_for_every_period_left() {
         let fund: Vec<f64> = solution.allocation.iter().map(|share| share / total).collect();
         let specification: Specification = serde_json::from_value(json!({ "problem": { "framework": "static",
             "horizon": HORIZON, "rate_per_step": 0.002, "utility": utility, "history": fund_returns(&returns, &fund),
-            "radius": { "rule": "fixed", "radius": 0.003 } } }))
+            "radius": { "rule": "fixed", "radius": 0.003 }, "support": { "rule": "none" } } }))
         .unwrap();
         let advisor = Advisor::new(Training::new(&specification).unwrap().run(&Watch::unwatched()).unwrap());
         let lived = [0.03, -0.08, 0.01, 0.0, 0.05, -0.02];
@@ -331,7 +337,7 @@ fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
     let total = ActionInterval { lowest: 0.3, highest: 0.7 };
     for floor in [-0.3, f64::NEG_INFINITY] {
         for utility in UTILITIES {
-            let law = AssetsLaw { returns: &returns, radius: 0.01, floor };
+            let law = AssetsLaw { returns: &returns, radius: 0.01, floors: vec![floor; 3] };
             let step = AssetsStep::new(law, ground.clone(), utility, 0.002, total);
             let solution = step.solve(None);
             certified(&solution);
@@ -365,7 +371,7 @@ fn a_window_at_which_the_crash_comes_and_goes_is_certified() {
     };
     let radius = 1.3 * (0..12).map(deviation).sum::<f64>() / 12.0 / 240.0_f64.sqrt();
     for ground in [Ground::Weighted(inverse_volatility(returns)), Ground::Sup] {
-        let law = AssetsLaw { returns, radius, floor: f64::NEG_INFINITY };
+        let law = AssetsLaw { returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
         let solution = AssetsStep::new(law, ground, POWER, 0.003, WHOLE).solve(None);
         certified(&solution);
         assert!(solution.value > BP, "{solution:?}");
@@ -378,7 +384,7 @@ fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
     let weights = inverse_volatility(&returns);
     let total = ActionInterval { lowest: 0.2, highest: 0.2 };
     let apart = |radius: f64| {
-        let law = AssetsLaw { returns: &returns, radius, floor: f64::NEG_INFINITY };
+        let law = AssetsLaw { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
         let step = AssetsStep::new(law, Ground::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
         let solution = step.solve(None);
         certified(&solution);

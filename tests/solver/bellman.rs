@@ -17,13 +17,15 @@ use serde_json::{Value, json};
 const HISTORY: [f64; 8] = [0.031, -0.044, 0.062, 0.043, -0.018, 0.027, 0.055, -0.009];
 const RADII: [f64; 6] = [0.0, 0.001, 0.004, 0.01, 0.03, 0.1];
 
+fn support_of(bounds: Option<[f64; 2]>) -> Value {
+    bounds.map_or(json!({ "rule": "none" }), |[min, max]| json!({ "rule": "between", "min": min, "max": max }))
+}
+
 /// A part of wealth is always in the bank, so that every loss is bounded.
 fn problem(radius: f64, utility: &Value, support: Option<[f64; 2]>) -> Problem {
     let mut request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.002, "history": HISTORY, "utility": utility,
         "action_interval": [0.0, 0.95], "radius": { "rule": "fixed", "radius": radius } } });
-    if let Some([min, max]) = support {
-        request["problem"]["support"] = json!({ "min": min, "max": max });
-    }
+    request["problem"]["support"] = support_of(support);
     Problem::new(&serde_json::from_value::<Specification>(request).unwrap().completed().unwrap())
 }
 
@@ -126,9 +128,7 @@ fn a_certified_value_is_that_over_all_returns_where_steps_follow() {
     let problem = |radius: f64, support: Option<[f64; 2]>| {
         let mut request = json!({ "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "action_interval": [0.0, 0.95],
             "utility": { "kind": "power", "risk_aversion": 4.0 }, "radius": { "rule": "fixed", "radius": radius } } });
-        if let Some([min, max]) = support {
-            request["problem"]["support"] = json!({ "min": min, "max": max });
-        }
+        request["problem"]["support"] = support_of(support);
         Problem::new(&serde_json::from_value::<Specification>(request).unwrap().completed().unwrap())
     };
     for radius in RADII {
@@ -144,7 +144,7 @@ fn a_certified_value_is_that_over_all_returns_where_steps_follow() {
 fn a_certificate_goes_down_to_a_total_loss_where_trading_costs() {
     let request = |cost: f64, radius: f64| {
         json!({ "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "action_interval": [0.0, 0.95],
-            "trading_cost": cost, "utility": { "kind": "power", "risk_aversion": 4.0 },
+            "trading_cost": cost, "utility": { "kind": "power", "risk_aversion": 4.0 }, "support": { "rule": "none" },
             "radius": { "rule": "fixed", "radius": radius } } })
     };
     for radius in RADII {

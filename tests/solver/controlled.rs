@@ -33,14 +33,17 @@ fn compared(problem: Value, count: usize, holding: f64) -> (f64, f64) {
 #[test]
 fn the_investor_s_problem_is_solved_alike_by_the_general_solver() {
     let ball = || json!({ "rule": "root_n", "kappa": 0.01 });
-    let bounded = || json!({ "min": -0.4, "max": 0.4 });
+    let bounded = || json!({ "rule": "between", "min": -0.4, "max": 0.4 });
     let power = || json!({ "kind": "power", "risk_aversion": 20.0 });
     let known =
         || json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.006, "variance": 0.002 }] });
     for (problem, holding) in [
-        (json!({ "framework": "adaptive", "utility": power() }), 0.0),
+        (json!({ "framework": "adaptive", "utility": power(), "support": bounded() }), 0.0),
         (json!({ "framework": "static", "support": bounded(), "utility": power() }), 0.0),
-        (json!({ "framework": "adaptive", "utility": power(), "contributions": 8.0 }), 0.0),
+        (
+            json!({ "framework": "adaptive", "utility": power(), "support": { "rule": "none" }, "contributions": 8.0 }),
+            0.0,
+        ),
         (
             json!({ "framework": "static", "support": bounded(), "utility": { "kind": "exponential", "risk_aversion": 0.15 } }),
             0.0,

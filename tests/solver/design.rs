@@ -66,7 +66,7 @@ fn simulated_states_keep_to_the_history_the_support_and_the_returns_accepted() {
     request["design"]["sampling_law"] =
         json!({ "kind": "student_t", "location": 0.0, "scale": 1.0, "degrees_of_freedom": 2.1 });
     let free = Design::new(&specification(request.clone()));
-    request["problem"]["support"] = json!({ "min": -0.3, "max": 0.2 });
+    request["problem"]["support"] = json!({ "rule": "between", "min": -0.3, "max": 0.2 });
     let bounded = Design::new(&specification(request));
     let mut widest = 0.0_f64;
     for index in 0..200 {

@@ -42,8 +42,8 @@ fn merge(into: &mut Value, from: Value) {
 
 /// A comparison small enough for a test: four steps, tiny designs, few bridges.
 fn small(rest: Value) -> Value {
-    let mut request =
-        paper(json!({ "problem": { "horizon": 4, "radius": { "rule": "bridge", "paths": 200 } }, "paths": 100 }));
+    let mut request = paper(json!({ "problem": { "horizon": 4, "radius": { "rule": "bridge", "paths": 200 },
+            "support": { "rule": "none" } }, "paths": 100 }));
     merge(&mut request, rest);
     request
 }

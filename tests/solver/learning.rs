@@ -90,6 +90,7 @@ fn settled(horizon: usize, count: usize) -> Value {
     let record: Vec<f64> = (0..24).map(|k| 0.01 + 0.03 * f64::from(k * 7 % 13 - 6) / 6.0).collect();
     let mut asked = request(horizon, bridge(), json!({ "kind": "decay", "half_life": 2.5 }));
     asked["problem"]["history"] = json!(record);
+    asked["problem"]["support"] = json!({ "rule": "none" });
     asked["design"] = json!({ "count": count, "initial_laws": "resampled" });
     asked
 }

@@ -7,6 +7,7 @@ mod support;
 mod accuracy;
 mod assets;
 mod bellman;
+mod caution;
 mod centre;
 mod contributions;
 mod control;

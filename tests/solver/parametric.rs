@@ -336,7 +336,7 @@ async fn a_live_session_equals_the_simulator_and_tells_the_worst_mean_and_varian
 #[tokio::test(flavor = "multi_thread")]
 async fn other_rules_and_bounds_are_refused_by_name() {
     let app = App::start().await;
-    let bounds = json!({ "min": -1.0, "max": 1.0 });
+    let bounds = json!({ "rule": "between", "min": -1.0, "max": 1.0 });
     for (framework, name, value, field, shown) in [
         ("parametric_static", "radius", json!({ "rule": "bridge" }), "problem.radius.rule", "bridge"),
         ("parametric_adaptive", "radius", json!({ "rule": "root_n", "kappa": 1.0 }), "problem.radius.rule", "root_n"),

@@ -20,7 +20,7 @@ fn problems() -> Vec<Value> {
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(4.0), "radius": bridge(0.5) }),
         json!({ "history": HISTORY, "utility": power(4.0), "radius": bridge(0.8), "rate_per_step": 0.006 }),
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(9.0), "radius": { "rule": "root_n", "kappa": 0.03 },
-            "framework": "static", "support": { "min": -0.11, "max": 0.1 }, "action_interval": [0.0, 0.6] }),
+            "framework": "static", "support": { "rule": "between", "min": -0.11, "max": 0.1 }, "action_interval": [0.0, 0.6] }),
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": { "kind": "exponential", "risk_aversion": 0.03 }, "contributions": -3.0,
             "radius": { "rule": "concentration", "alpha": 0.3, "C": 1.0, "c": 900.0 }, "trading_cost": 0.004 }),
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(5.0), "framework": "parametric_static",
@@ -266,7 +266,8 @@ fn codes(answer: &Value) -> Vec<&str> {
 async fn a_record_of_ten_years_may_hang_on_one_month() {
     let app = App::start().await;
     let record = months("1962-07", 120);
-    let problem = json!({ "history": record, "rate_per_step": 0.002, "utility": { "kind": "exponential", "risk_aversion": 0.01 } });
+    let problem = json!({ "history": record, "rate_per_step": 0.002, "caution": "paper",
+        "support": { "rule": "none" }, "utility": { "kind": "exponential", "risk_aversion": 0.01 } });
     let advised = asked(&app, &json!({ "problem": problem, "sensitivity": true })).await;
     let range = &advised["sensitivity"]["without_one"];
     let told = number(&advised["allocation"]);

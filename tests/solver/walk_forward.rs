@@ -10,8 +10,10 @@ use ballast::control::policy::advisor::Advisor;
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::pool::TrainingPool;
 use ballast::control::progress::Watch;
+use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::framework::Framework;
+use ballast::control::request::support::Support;
 use ballast::control::training::Training;
 
 const YEAR: usize = 4;
@@ -20,6 +22,8 @@ const WALK: WalkForward = WalkForward {
     every: YEAR,
     horizon: YEAR,
     scale: 1.0,
+    caution: CautionLevel::Paper,
+    support: Support::None {},
     centre: CentreSpecification::Empirical {},
     risk_aversion: 3.0,
     trading_cost: 0.0,

@@ -80,6 +80,7 @@ pub fn several_assets(horizon: usize) -> Value {
             "horizon": horizon,
             "rate_per_step": 0.001,
             "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 0.2 },
+            "support": { "rule": "none" },
             "history": ROWS
         },
         "design": { "count": 20 }
@@ -94,7 +95,8 @@ pub fn specification(horizon: usize) -> Value {
             "rate_per_step": 0.002,
             "utility": { "kind": "exponential", "risk_aversion": 0.01 },
             "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002],
-            "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 }
+            "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 },
+            "support": { "rule": "none" }
         },
         "design": { "count": 20 }
     })

@@ -5,9 +5,14 @@ use ballast::control::policy::advisor::Advisor;
 use ballast::control::progress::Watch;
 use ballast::control::request::specification::Specification;
 use ballast::control::training::Training;
-use serde_json::Value;
+use serde_json::{Value, json};
 
-pub fn specification(value: Value) -> Specification {
+/// Of a problem that is the paper's where it says nothing else.
+pub fn specification(mut value: Value) -> Specification {
+    let problem = value["problem"].as_object_mut().expect("a problem");
+    if !problem.get("framework").is_some_and(|name| name.as_str().expect("a name").starts_with("parametric")) {
+        problem.entry("support").or_insert_with(|| json!({ "rule": "none" }));
+    }
     serde_json::from_value::<Specification>(value).unwrap().completed().unwrap()
 }
 

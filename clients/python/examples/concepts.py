@@ -102,9 +102,17 @@ def read(ballast: Ballast, file: str, **choices: Any) -> tuple[dict[str, list[fl
 
 
 def advised(ballast: Ballast, record: list[float], rate: float, trading_cost: float = 0.0) -> wire.Advised:
-    """As `ballast advise` asks."""
+    """As `ballast advise --caution paper --support none` asks."""
     utility: wire.UtilitySpecification = {"kind": "power", "risk_aversion": 3.0}
-    return ballast.advise(record, kind="log", rate_per_step=rate, utility=utility, trading_cost=trading_cost)
+    return ballast.advise(
+        record,
+        kind="log",
+        rate_per_step=rate,
+        utility=utility,
+        trading_cost=trading_cost,
+        caution="paper",
+        support={"rule": "none"},
+    )
 
 
 def ball(ballast: Ballast, market: list[float], rate: float) -> Picture:
@@ -261,6 +269,7 @@ def industries(ballast: Ballast) -> Picture:
             assets=names,
             utility=utility,
             radius={"rule": "bridge", "scale": scale},
+            support={"rule": "none"},
         )
         for scale in (0.0, 1.0)
     )

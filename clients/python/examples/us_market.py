@@ -36,6 +36,7 @@ def main() -> None:
             initial_wealth=INITIAL_WEALTH,
             utility={"kind": "power", "risk_aversion": 3.0},
             radius={"rule": "bridge", "alpha": 0.1},
+            support={"rule": "none"},
             design={"count": arguments.count},
         ).session(watch=ProgressPrinter())
         rows = []

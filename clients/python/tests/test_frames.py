@@ -50,7 +50,7 @@ def test_a_session_is_a_frame_with_and_without_its_corrections(session: Session)
 
 
 def test_the_worst_case_is_a_transport(ballast: Ballast, session: Session) -> None:
-    advised = ballast.advise(RETURNS, kind="log", rate_per_step=0.002)
+    advised = ballast.advise(RETURNS, kind="log", rate_per_step=0.002, caution="paper")
     answers: list[frames.Explained] = [advised, session.action(explain="worst_case")]
     for advice in answers:
         moves = frames.worst_case(advice)
@@ -59,7 +59,8 @@ def test_the_worst_case_is_a_transport(ballast: Ballast, session: Session) -> No
         seen = moves.groupby("atom")["mass"].sum()
         assert sorted(seen.index) == sorted(RETURNS) and seen.tolist() == pytest.approx([0.1] * 10)
         distance = (moves["mass"] * (moves["atom"] - moves["moved_to"]).abs()).sum()
-        assert 0.0 < distance <= advice["radius"] * (1 + 1e-9)
+        assert 0.0 <= distance <= advice["radius"] * (1 + 1e-9)
+    assert (frames.worst_case(advised)["atom"] > frames.worst_case(advised)["moved_to"]).any()
     pd.testing.assert_frame_equal(session.worst_case(), frames.worst_case(session.action(explain="worst_case")))
     with pytest.raises(ValueError, match="ask for it with explain='worst_case'"):
         frames.worst_case(session.action())
@@ -77,13 +78,15 @@ def test_allocations_have_the_names_of_the_assets(ballast: Ballast) -> None:
     figures = frames.figures(advised)
     assert figures["total"] == advised["total"] and figures["sample_size"] == len(RETURNS)
     # Part of the caution is for a crash that nobody has seen.
-    assert figures["without_crash"] == advised.get("without_crash") and figures["without_crash"] >= figures["total"]
+    assert (
+        figures["without_crash"] == advised.get("without_crash") and figures["without_crash"] > figures["total"] - 1e-6
+    )
     assert {"bound", "floor", "radius", "radius_factor"} <= set(figures.index) and "allocation" not in figures
     one = frames.figures(ballast.advise(RETURNS, kind="log", rate_per_step=0.0))
     assert one["allocation"] >= 0.0 and "certainty_equivalent" in one and "without_crash" not in one
     means = frames.worst_means(advised)
     assert means.loc["stocks", "seen"] == pytest.approx(table["stocks"].mean())
-    assert (means["worst"] <= means["seen"]).all()
+    assert (means["worst"] <= means["seen"] + 1e-12).all()
 
 
 def test_a_session_of_several_assets_is_a_frame_for_each_figure(ballast: Ballast, session: Session) -> None:

@@ -112,6 +112,7 @@ def test_a_session_that_renews_itself_is_replayed_as_the_walk_forward_walks(ball
         horizon=every + 1,
         utility={"kind": "power", "risk_aversion": 3.0},
         radius={"rule": "bridge", "alpha": 0.5},
+        support={"rule": "none"},
         design={"count": count},
         seed=seed,
     ).session(wealth=100.0, renew={"every": every, "window": window})

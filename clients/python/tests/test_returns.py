@@ -238,17 +238,17 @@ def test_what_a_quant_has_is_read_by_the_service(ballast: Ballast, tmp_path: Pat
         with pytest.raises(UnclearReturns, match=r"kind='log': 24 (monthly )?log-returns as fractions"):
             ballast.advise(returns, **said)
         found = ballast.advise(returns, kind="simple", **said)
-        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9), returns
+        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-6), returns
     for returns in (table["fund"], pd.Series(RECORD, MONTHS.to_timestamp(), name="fund"), pl.Series("fund", RECORD)):
         found = ballast.advise(returns, **said)
-        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9), returns
+        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-6), returns
     days = pd.period_range("2004-12", periods=25, freq="M")
     for priced in (prices, pd.Series(prices, days, name="close")):
         found = ballast.advise(priced, choices={"kind": "price"}, **said)
-        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9)
+        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-6)
     # The column of the bank says what it pays.
     for source in (table, path, path.read_text()):
-        assert ballast.advise(source, **ONCE)["allocation"] == pytest.approx(plain["allocation"], abs=1e-9)
+        assert ballast.advise(source, **ONCE)["allocation"] == pytest.approx(plain["allocation"], abs=1e-6)
     specification = ballast.train(path, horizon=2, design={"count": 20}, **ONCE).policy().detail()["specification"]
     assert specification["problem"]["rate_per_step"] == BANK[-1]
     assert specification["problem"].get("periods_per_year") == 12

@@ -371,7 +371,7 @@ def test_every_field_of_a_specification_is_an_argument() -> None:
     }
     problem, whole = wire.ProblemSpecification.__annotations__, wire.Specification.__annotations__
     of_whole = set(whole) - {"problem", "fund"}
-    assert arguments == (set(problem) - {"history"}) | of_whole | set(wire.Relabel.__annotations__)
+    assert arguments == (set(problem) - {"history", "levels"}) | of_whole | set(wire.Relabel.__annotations__)
 
 
 def test_every_field_of_an_opening_is_an_argument(ballast: Ballast, session: Session) -> None:

@@ -1,5 +1,7 @@
 //! An advice for one period in plain words and a small table.
 
+mod caution;
+
 use std::fmt::Write;
 
 use ballast::control::policy::advice::{Advice, AdviceSource};
@@ -11,8 +13,8 @@ use ballast::service::advise::Advised;
 /// Less than this is not traded: what is printed would not show it.
 const SMALLEST_TRADE: f64 = 5e-4;
 
-/// What to do, why, and the figures.
-pub fn told(advised: &Advised, wealth: f64, noun: &str) -> String {
+/// What to do, why, and the figures, those of the caution a year of so many `periods`.
+pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String {
     let advice = &advised.advice;
     let mut text = format!("{} {}\n", hold(advice, noun), trade(advice, wealth));
     if advice.source == AdviceSource::Unsolved {
@@ -22,6 +24,9 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str) -> String {
     for (name, figure, meaning) in figures(advice, wealth, noun) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {name:<22}{figure:>14}  {meaning}");
+    }
+    if let Some(levels) = &advised.levels {
+        text += &format!("\n{}", caution::told(levels, periods));
     }
     for sentence in near(advised, noun) {
         text += &format!("\n{sentence}");
@@ -84,10 +89,11 @@ fn trade(advice: &Advice, wealth: f64) -> String {
     format!("{verb} for {}: {held} is held now.", money(change * wealth))
 }
 
-fn why(Advised { advice, worst_case, .. }: &Advised, noun: &str) -> String {
+fn why(Advised { advice, worst_case, levels, .. }: &Advised, noun: &str) -> String {
     let among = format!("Against the worst law in the ball around the {} returns", advice.sample_size);
     if advice.allocation <= 0.0 {
-        return format!("{among}, nothing beats the bank.");
+        let premium = levels.as_ref().map_or(String::new(), |levels| format!("\n{}", caution::premium(levels, noun)));
+        return format!("{among}, nothing beats the bank.{premium}");
     }
     format!(
         "{among}, that is worth {} for certain at the end of the {noun};\nthe bank alone reaches {}. {}",
@@ -202,7 +208,7 @@ mod tests {
 
     #[test]
     fn what_to_do_stands_first() {
-        let told = |history: &[f64], holding, cost| told(&advised(history, holding, cost), 2000.0, "week");
+        let told = |history: &[f64], holding, cost| told(&advised(history, holding, cost), 2000.0, "week", 52.0);
         let falling = told(&[-0.01, -0.03], 0.5, 0.0);
         let first = "Hold nothing in the risky asset through the coming week: keep all wealth in the bank. Sell for \
                      1000.00: 50.0 % is held now.\nAgainst the worst law in the ball around the 2 returns, nothing beats \

@@ -36,6 +36,8 @@ impl BacktestArgs {
             ("--count", self.count.map(|count| count.to_string())),
             ("--cost-blind", self.cost_blind.then(|| "given".to_owned())),
             ("--scale", self.scale.map(|scale| scale.to_string())),
+            ("--caution", self.caution.map(|caution| caution.name().to_owned())),
+            ("--support", self.support.map(|_| "given".to_owned())),
             ("--centre", self.centre.as_ref().map(|centre| centre.name().to_owned())),
         ];
         if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {

@@ -159,6 +159,6 @@ fn step(window: &[Vec<f64>], sup: bool) -> (AssetsStep, f64) {
     let radius = RADIUS * (0..assets).map(deviation).sum::<f64>() / assets as f64 / count.sqrt();
     let ground = if sup { Ground::Sup } else { Ground::Weighted(inverse_volatility(window)) };
     let utility = RelativeUtility::new(UtilitySpecification::relative(RISK_AVERSION), 1.0);
-    let law = AssetsLaw { returns: window, radius, floor: f64::NEG_INFINITY };
+    let law = AssetsLaw { returns: window, radius, floors: vec![f64::NEG_INFINITY; assets] };
     (AssetsStep::new(law, ground, utility, RATE, ActionInterval { lowest: 0.0, highest: 1.0 }), radius)
 }

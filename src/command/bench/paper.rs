@@ -32,6 +32,7 @@ pub fn problem(sample_size: usize, horizon: usize) -> ProblemSpecification {
         utility: UtilitySpecification::exponential(0.01),
         ..ProblemSpecification::of(history(sample_size, 1), 0.002)
     }
+    .as_in_the_paper()
 }
 
 /// The request of the paper with a history of `sample_size` draws.

@@ -85,6 +85,8 @@ pub async fn train(api: &ApiClient, record: Value, horizon: usize, count: usize)
         "initial_wealth": INITIAL_WEALTH,
         "utility": { "kind": "power", "risk_aversion": RISK_AVERSION },
         "radius": { "rule": "bridge", "alpha": ALPHA },
+        "caution": "paper",
+        "support": { "rule": "none" },
     });
     if let (Some(problem), Value::Object(record)) = (problem.as_object_mut(), record) {
         problem.extend(record);

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use super::AssetsSolution;
 use crate::control::policy::caution::Caution;
+use crate::control::policy::levels::LevelsAdvised;
 
 /// What to hold of several assets through the coming period.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -31,6 +32,9 @@ pub struct AssetsAdvice {
     /// Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs low: by little
     /// where assets move together, by more than a tenth for a dozen that are independent.
     pub radius_factor: f64,
+    /// The levels of caution, where one of them is followed: found for the fund of inverse volatilities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub levels: Option<LevelsAdvised>,
     /// Number of dates seen.
     pub sample_size: usize,
     /// What the law behind `bound` makes of each asset, which is the worst law where the two sides meet.

@@ -2,17 +2,24 @@
 
 use super::advice::{AssetsAdvice, named, worst_means};
 use super::{AssetsLaw, AssetsStep};
+use crate::control::error::FieldError;
 use crate::control::policy::caution::Caution;
+use crate::control::policy::levels::LevelsAdvised;
+use crate::control::policy::one_period::OnePeriod;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::fund::CompositionRule;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
+use crate::control::request::support::{Extent, Support};
 use crate::numerics::fund_bridges::FundBridges;
 
 /// Paths of the joint factor: its standard error is then a hundredth of it.
 const FACTOR_PATHS: usize = 1000;
+/// Returns up to which what each level would hold is solved too: a fraction of a second.
+const SOLVED_BY_LEVEL: usize = 6000;
 
 /// Of the radius of all funds at once over that of one; 1 where there is one, and under rules that look at the sample size alone.
 pub fn radius_factor(problem: &AssetsProblem, fund: &ProblemSpecification, seed: u64) -> f64 {
@@ -31,16 +38,20 @@ pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
 
 /// The step of `problem`, whose fund has the completed problem `fund`, had `rows` been seen, in a ball of this radius.
 pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
-    step_above(floor(problem), problem, fund, rows, radius)
+    step_above(floors(fund.support_rule(), rows), problem, fund, rows, radius)
 }
 
-/// What no log-return is moved below.
-fn floor(problem: &AssetsProblem) -> f64 {
-    problem.support.map_or(f64::NEG_INFINITY, |support| support.min)
+/// Of each asset, what no log-return is moved below.
+pub fn floors(support: Support, rows: &[Vec<f64>]) -> Vec<f64> {
+    let of = |asset: usize| {
+        let extent = Extent::of(rows.iter().map(|row| row[asset]));
+        support.around(extent).map_or(f64::NEG_INFINITY, |support| support.min)
+    };
+    (0..rows.first().map_or(0, Vec::len)).map(of).collect()
 }
 
 fn step_above(
-    floor: f64,
+    floors: Vec<f64>,
     problem: &AssetsProblem,
     fund: &ProblemSpecification,
     rows: &[Vec<f64>],
@@ -48,7 +59,7 @@ fn step_above(
 ) -> AssetsStep {
     let [lowest, highest] = fund.action_interval;
     AssetsStep::new(
-        AssetsLaw { returns: rows, radius, floor },
+        AssetsLaw { returns: rows, radius, floors },
         problem.ground_norm.at(rows),
         utility(fund),
         fund.rate_per_step,
@@ -57,23 +68,40 @@ fn step_above(
 }
 
 impl AssetsAdvice {
-    /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the
-    /// seed of its simulations.
-    /// Cost: that of [`AssetsStep::solve`], twice where a return may fall below those seen, and of the joint factor under `bridge`
+    /// The advice for `problem`, whose fund of inverse volatilities is `fund`.
+    /// Cost: that of its levels of caution, where one is followed, and that of [`AssetsStep::solve`], twice where a return may fall below those seen, and of the joint factor under `bridge`
     /// and `calibrated`.
     /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
-    pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
+    ///
+    /// # Errors
+    /// The history of the fund breaks a rule, which a completed one does not.
+    pub fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
         let rows = &problem.history;
-        let radius_factor = radius_factor(problem, fund, seed);
-        let radius = radius_factor * of_fund;
+        let radius_factor = radius_factor(problem, fund.problem(), fund.seed());
+        let fund = fund.within(radius_factor).resolved();
+        let (radius, whole) = (fund.radius()?, fund.at(CautionLevel::Paper).radius()?);
+        let fund = fund.problem();
         let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve(None);
         let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let without_crash = (floor(problem) < lowest)
-            .then(|| step_above(lowest, problem, fund, rows, radius).solve(Some(&solution)).allocation.iter().sum());
+        let crashes = floors(fund.support_rule(), rows).into_iter().any(|floor| floor < lowest);
+        let without_crash = crashes.then(|| {
+            step_above(vec![lowest; problem.assets.len()], problem, fund, rows, radius)
+                .solve(Some(&solution))
+                .allocation
+                .iter()
+                .sum()
+        });
+        let levels = fund.levels.as_ref().zip(fund.caution).map(|(found, followed)| {
+            let at = |level: CautionLevel| {
+                let share = found.of(level).filter(|_| rows.len() * problem.assets.len() <= SOLVED_BY_LEVEL)?.scale;
+                Some(step(problem, fund, rows, share * whole).solve(Some(&solution)).allocation.iter().sum())
+            };
+            LevelsAdvised::of(found, followed, at)
+        });
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
-        AssetsAdvice {
+        Ok(AssetsAdvice {
             allocation: named(&problem.assets, &solution.allocation),
             composition: named(&problem.assets, &composition),
             total: solution.allocation.iter().sum(),
@@ -85,10 +113,11 @@ impl AssetsAdvice {
             radius_factor,
             sample_size: rows.len(),
             worst_means: worst_means(&problem.assets, rows, &solution),
+            levels,
             caution: Caution::short_record(rows.len(), rows.len() as f64)
                 .into_iter()
                 .chain(solution.caution())
                 .collect(),
-        }
+        })
     }
 }

@@ -186,7 +186,7 @@ impl Branches {
         let rest = (1.0 - allocation.iter().sum::<f64>()).max(0.0);
         let (mut positions, mut floors) = ([0.0; super::MOST_ASSETS], [0.0; super::MOST_ASSETS]);
         for (index, (&share, &growth)) in allocation.iter().zip(growths).enumerate() {
-            (positions[index], floors[index]) = (share * growth, share * step.least_growth.min(growth));
+            (positions[index], floors[index]) = (share * growth, share * step.least_growths[index].min(growth));
         }
         let count = allocation.len();
         let phases = levelling.phases(rest, &positions[..count], &floors[..count], &step.ground);
@@ -199,7 +199,7 @@ impl Branches {
                 wealth += position;
                 let growth = match share > 0.0 {
                     true => position / share,
-                    false => step.unheld(growths[index], level),
+                    false => step.unheld(index, growths[index], level),
                 };
                 let moves = follows && position < positions[index] && position > floors[index];
                 moving += if moves { position } else { 0.0 };

@@ -29,8 +29,8 @@ impl Interior<'_> {
                         *sum += weight * excess;
                     }
                     if assets < others.len() {
-                        for (sum, growth) in others.iter_mut().zip(self.whole.growth(atom)) {
-                            *sum += weight * (self.whole.unheld(*growth, found.level) - 1.0);
+                        for (asset, growth) in self.whole.growth(atom).iter().enumerate() {
+                            others[asset] += weight * (self.whole.unheld(asset, *growth, found.level) - 1.0);
                         }
                     }
                 }
@@ -64,7 +64,8 @@ impl Interior<'_> {
             let growths = self.whole.growth(atom);
             for branch in self.branches.of(atom).skip(1) {
                 let level = self.branches.all[branch].level;
-                let mut moved: Vec<f64> = growths.iter().map(|growth| self.whole.unheld(*growth, level)).collect();
+                let unheld = |(asset, growth): (usize, &f64)| self.whole.unheld(asset, *growth, level);
+                let mut moved: Vec<f64> = growths.iter().enumerate().map(unheld).collect();
                 let held = self.held.iter().zip(self.branches.excess(branch));
                 held.for_each(|(&asset, excess)| moved[asset] = excess + 1.0);
                 for (sum, (moved, growth)) in moves.iter_mut().zip(moved.iter().zip(growths)) {

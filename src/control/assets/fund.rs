@@ -11,7 +11,7 @@
 //! equal part of that each period left, must be more than what the trade costs beyond that of staying.
 
 use super::advice::{OneStep, named, worst_means};
-use super::advising::radius_factor;
+use super::advising::{floors, radius_factor};
 use super::composition::guarded;
 use super::{AssetsLaw, AssetsSolution, AssetsStep};
 use crate::control::error::FieldError;
@@ -21,10 +21,8 @@ use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::fund::FundSpecification;
-use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{
-    DesignSpecification, InitialLaws, Interval, ProblemSpecification, Specification, SurrogateSpecification,
+    DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification,
 };
 use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
@@ -56,18 +54,16 @@ impl AssetsProblem {
         self.check()?;
         let plain = Specification { design, surrogate, ..Specification::of(self.of_fund(), seed) }.completed()?;
         let radius_factor = radius_factor(self, &plain.problem, seed);
-        let support = self.support.map(|support| Interval { min: support.min, max: LOG_RETURN });
-        let radius = Some(scaled(plain.problem.radius_rule(), radius_factor));
+        let radius = Some(plain.problem.radius_rule().scaled(radius_factor));
         let fund = FundSpecification {
             assets: self.assets.clone(),
             ground_norm: self.ground_norm,
             composition: self.composition.clone(),
-            support: self.support,
             radius_factor,
             history: self.history.clone(),
         };
         let design = DesignSpecification { initial_laws: InitialLaws::Resampled, ..plain.design };
-        let problem = ProblemSpecification { radius, support, ..plain.problem };
+        let problem = ProblemSpecification { radius, ..plain.problem };
         Specification { problem, design, fund: Some(Box::new(fund)), ..plain }.completed()
     }
 
@@ -87,21 +83,11 @@ impl AssetsProblem {
             trading_cost: problem.trading_cost,
             contributions: problem.contributions.clone(),
             utility: problem.utility,
-            radius: Some(scaled(problem.radius_rule(), fund.radius_factor.recip())),
-            support: fund.support,
+            radius: Some(problem.radius_rule().scaled(fund.radius_factor.recip())),
+            caution: problem.caution,
+            support: problem.support,
             history,
         })
-    }
-}
-
-/// The rule of a radius so many times as large, of those that have a joint factor.
-fn scaled(rule: RadiusRule, factor: f64) -> RadiusRule {
-    match rule {
-        RadiusRule::Bridge { alpha, paths, scale } => RadiusRule::Bridge { alpha, paths, scale: scale * factor },
-        RadiusRule::Calibrated { alpha, paths, scale } => {
-            RadiusRule::Calibrated { alpha, paths, scale: scale * factor }
-        }
-        rule => rule,
     }
 }
 
@@ -169,7 +155,7 @@ impl Fund {
             let law = AssetsLaw {
                 returns: &self.rows,
                 radius: advisor.radius(&even),
-                floor: fund.support.map_or(f64::NEG_INFINITY, |support| support.min),
+                floors: floors(problem.support_rule(), &self.rows),
             };
             let utility = RelativeUtility::new(problem.utility, state.wealth * (1.0 + problem.rate_per_step));
             let [lowest, highest] = problem.action_interval;

@@ -53,8 +53,8 @@ pub struct AssetsStep {
     /// `e^(z_i) / (1 + r)`, atom after atom.
     growths: Vec<f64>,
     masses: Vec<f64>,
-    /// No growth over the bank is moved below it; 0 where there is no floor.
-    least_growth: f64,
+    /// Of each asset, below which no growth over the bank is moved; 0 where there is no floor.
+    least_growths: Vec<f64>,
     ground: Ground,
     radius: f64,
     utility: RelativeUtility,
@@ -62,14 +62,14 @@ pub struct AssetsStep {
 }
 
 /// The law of the coming returns and the set around it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct AssetsLaw<'a> {
     /// Log-returns of all assets, at most thirty, date by date; at least one date.
     pub returns: &'a [Vec<f64>],
     /// In log-return, at least 0.
     pub radius: f64,
-    /// No log-return is moved below it; minus infinity where there is no floor.
-    pub floor: f64,
+    /// Of each asset, below which no log-return is moved; minus infinity where there is no floor.
+    pub floors: Vec<f64>,
 }
 
 /// An allocation and what the search for it found.
@@ -112,7 +112,7 @@ impl AssetsStep {
             assets: law.returns.first().map_or(0, Vec::len),
             growths: law.returns.iter().flatten().map(|log_return| log_return.exp() / bank).collect(),
             masses: vec![1.0 / count as f64; law.returns.len()],
-            least_growth: law.floor.exp() / bank,
+            least_growths: law.floors.iter().map(|floor| floor.exp() / bank).collect(),
             ground,
             radius: law.radius,
             utility,
@@ -219,6 +219,7 @@ impl AssetsStep {
         AssetsStep {
             assets: held.len(),
             growths: (0..self.atoms()).flat_map(|atom| of(self.growth(atom))).collect(),
+            least_growths: of(&self.least_growths),
             masses: self.masses.clone(),
             ground: match &self.ground {
                 Ground::Sup => Ground::Sup,
@@ -231,9 +232,10 @@ impl AssetsStep {
     /// The growth of what is not held once positions are lowered to a level: it moves for nothing where all move together, and
     /// does not move where each is paid for.
     #[inline(always)]
-    fn unheld(&self, growth: f64, level: f64) -> f64 {
+    fn unheld(&self, asset: usize, growth: f64, level: f64) -> f64 {
         let moved = if self.ground.is_sup() { growth * level } else { growth };
-        let held_up = if moved > self.least_growth { moved } else { self.least_growth };
+        let least = self.least_growths[asset];
+        let held_up = if moved > least { moved } else { least };
         if held_up < growth { held_up } else { growth }
     }
 

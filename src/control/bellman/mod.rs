@@ -211,8 +211,9 @@ fn best_response<F: Field, T>(
         // Other holdings are brought to the ends of the band, and what they are worth is told as well.
         let ends = [band.low, band.high].into_iter().filter(|end| *end != trade.action);
         let mut ends = ends.map(|end| dynamics.trade_to(holding, end));
-        worst.certified = worst.certified && ends.all(|end| pricing.worst(end).certified);
-        if worst.certified || !set.has_window() || growths == WINDOW_GROWTHS {
+        // Where a support bounds the returns, nothing lies beyond what was looked at.
+        worst.certified = !set.has_window() || worst.certified && ends.all(|end| pricing.worst(end).certified);
+        if worst.certified || growths == WINDOW_GROWTHS {
             return then(pricing.as_ref(), BestResponse { band, trade, worst });
         }
         (reach, growths) = (reach.doubled(), growths + 1);

@@ -12,6 +12,7 @@ use crate::control::problem::state::State;
 use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
+use crate::control::request::support::{Extent, Support};
 use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
@@ -116,7 +117,7 @@ impl Problem {
         let problem = &self.specification.problem;
         let has_ball = matches!(problem.framework, Framework::Adaptive | Framework::Static) && radius > 0.0;
         let is_power = matches!(problem.utility, UtilitySpecification::Power { .. });
-        has_ball && is_power && problem.support.is_none() && allocation >= 1.0
+        has_ball && is_power && problem.support_rule() == (Support::None {}) && allocation >= 1.0
     }
 
     /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The
@@ -145,7 +146,7 @@ impl Problem {
     pub fn uncertainty_set_within(&self, state: &State, radius: f64) -> UncertaintySet {
         match self.learns() {
             true => self.learned_set(&state.law, radius),
-            false => self.frozen().set.clone().with_radius(radius, self.specification.problem.support),
+            false => self.frozen().set.clone().with_radius(radius, self.specification.problem.support_rule()),
         }
     }
 
@@ -184,7 +185,7 @@ impl Problem {
             let measure = self.sets.measure(&history);
             let set = match problem.framework.is_parametric() {
                 true => self.learned_set(&history, measure.radius),
-                false => UncertaintySet::around(Centre::frozen(problem), measure.radius, problem.support),
+                false => UncertaintySet::around(Centre::frozen(problem), measure.radius, problem.support_rule()),
             };
             Frozen { set, measure }
         })
@@ -194,7 +195,7 @@ impl Problem {
     fn learned_set(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
         let problem = &self.specification.problem;
         if !problem.framework.is_parametric() {
-            return UncertaintySet::around(self.centring.centre(law), radius, problem.support);
+            return UncertaintySet::around(self.centring.centre(law), radius, problem.support_rule());
         }
         let moments = CentralMoments::of(law);
         let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance().max(SMALLEST_VARIANCE) };
@@ -233,9 +234,10 @@ impl Problem {
 
     /// The same of one law within each of `radii`.
     fn summaries(&self, law: &EmpiricalDistribution, radii: &[Radii]) -> Vec<LawSummary> {
-        let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law, self.lowest_return()));
+        let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law));
+        let lowest = self.lowest_return(extent(law, moments, None));
         let of_returns = |radius: f64| self.sets.of_returns(radius, law.effective_size());
-        radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(of_returns(radii.radius)))).collect()
+        radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(of_returns(radii.radius), lowest))).collect()
     }
 
     /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one total wealth.
@@ -248,10 +250,12 @@ impl Problem {
             let features = |&log_return: &f64| self.selection.of(total, &without_ball(before.with(log_return)));
             return returns.iter().map(features).collect();
         }
-        let (mean, [size, _]) = (ExponentialMean::of(law, self.lowest_return()), law.effective_sizes_ahead());
+        let (mean, [size, _]) = (ExponentialMean::of(law), law.effective_sizes_ahead());
         let features = |(&log_return, radii): (&f64, Radii)| {
-            let worst = mean.worst_with(log_return, self.sets.of_returns(radii.radius, size));
-            self.selection.of(total, &self.summary(before.with(log_return), radii, worst))
+            let moments = before.with(log_return);
+            let lowest = self.lowest_return(extent(law, moments, Some(log_return)));
+            let worst = mean.worst_with(log_return, self.sets.of_returns(radii.radius, size), lowest);
+            self.selection.of(total, &self.summary(moments, radii, worst))
         };
         returns.iter().zip(self.sets.radii_with(law, returns)).map(features).collect()
     }
@@ -262,9 +266,18 @@ impl Problem {
         LawSummary { moments, radii, robust_excess: mean / bank - 1.0, robust_variance: variance / (bank * bank) }
     }
 
-    fn lowest_return(&self) -> f64 {
-        self.specification.problem.support.map_or(f64::NEG_INFINITY, |support| support.min)
+    /// Below which no return seen is moved.
+    fn lowest_return(&self, law: Extent) -> f64 {
+        self.specification.problem.support_rule().around(law).map_or(f64::NEG_INFINITY, |support| support.min)
     }
+}
+
+/// That of a law of these moments, with one more return where there is one.
+fn extent(law: &EmpiricalDistribution, moments: CentralMoments, added: Option<f64>) -> Extent {
+    let atoms = law.atoms();
+    let seen = [atoms.first(), atoms.last()].map(|end| end.copied().or(added).unwrap_or_default());
+    let ends = added.map_or(seen, |z| [seen[0].min(z), seen[1].max(z)]);
+    Extent { ends, mean: moments.mean(), variance: moments.variance() }
 }
 
 /// The floor gain from `step` of the highest allocation where every period earns `best_return`:

@@ -57,6 +57,8 @@ impl Backtest {
             every: given(request.every),
             horizon: given(request.horizon),
             scale: request.scale,
+            caution: request.caution,
+            support: request.support,
             centre: request.centre.clone(),
             risk_aversion: request.risk_aversion,
             trading_cost: if request.cost_blind { 0.0 } else { request.trading_cost },
@@ -193,7 +195,9 @@ fn renamed(error: FieldError, returns: &str) -> FieldError {
         "problem.history" => returns.to_owned(),
         // Of the bridges of a window.
         "problem.radius.paths" => "window".to_owned(),
-        other if other.starts_with("problem.centre") => other.trim_start_matches("problem.").to_owned(),
+        other if ["centre", "caution", "support"].iter().any(|part| other.starts_with(&format!("problem.{part}"))) => {
+            other.trim_start_matches("problem.").to_owned()
+        }
         other => other.rsplit('.').next().unwrap_or(other).to_owned(),
     };
     FieldError { field, ..error }

@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::evaluation::names::StrategyKind;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
+use crate::control::request::support::Support;
 
 /// Name and version of the report's form.
 pub const FORMAT: &str = "ballast-backtest-1";
@@ -49,6 +51,10 @@ pub struct BacktestChoices {
     pub alpha: Vec<f64>,
     /// Multiple of the radius of every ball.
     pub scale: f64,
+    /// Share of every radius that was acted on.
+    pub caution: CautionLevel,
+    /// What the adversary could use.
+    pub support: Support,
     /// What the balls are centred on.
     pub centre: CentreSpecification,
     /// Relative.

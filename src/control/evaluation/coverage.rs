@@ -186,7 +186,8 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
                 utility: question.utility,
                 centre: centre.clone(),
                 ..ProblemSpecification::of(record.clone(), question.rate_per_step)
-            };
+            }
+            .as_in_the_paper();
             let distance = prepared.distance(&Centre::frozen(&problem));
             let of_rule = |rule: &RadiusRule| {
                 let problem = ProblemSpecification { radius: Some(*rule), ..problem.clone() };

@@ -14,12 +14,14 @@ use crate::control::policy::advisor::Advisor;
 use crate::control::pool;
 use crate::control::problem::actions::Band;
 use crate::control::progress::Watch;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
+use crate::control::request::support::Support;
 use crate::control::training::{Summaries, Training};
 
 /// One period of the real world.
@@ -80,6 +82,10 @@ pub struct WalkForward {
     pub horizon: usize,
     /// Multiple of the radius of every ball.
     pub scale: f64,
+    /// Share of every radius that is acted on.
+    pub caution: CautionLevel,
+    /// What the adversary may use.
+    pub support: Support,
     /// Of the balls, and the law that plug-in takes as true.
     pub centre: CentreSpecification,
     /// Relative risk aversion: log utility at 1, power utility above.
@@ -161,6 +167,8 @@ impl WalkForward {
                 utility: self.utility(),
                 centre: self.centre.clone(),
                 radius: Some(RadiusRule::scaled_bridge(alpha, self.scale)),
+                caution: matches!(framework, Framework::Adaptive | Framework::Static).then_some(self.caution),
+                support: Some(self.support),
                 ..ProblemSpecification::of(
                     past.iter().map(|period| period.log_return).collect(),
                     past.last().map_or(0.0, |last| last.bank_return),
@@ -223,7 +231,9 @@ impl WalkForward {
         if matches!(strategy, Strategy::CostBlind { .. }) {
             specification.problem.trading_cost = 0.0;
         }
-        let training = Training::among(&specification, common.kept.clone(), common.measured.clone())?;
+        // A level has another share of the radius at each miscoverage, so that nothing is measured in common.
+        let measured = if self.caution.is_found() { Arc::default() } else { common.measured.clone() };
+        let training = Training::among(&specification, common.kept.clone(), measured)?;
         let policy = training.run_by_steps(watch, solved)?;
         let advisor = Advisor::with(policy, common.kept.clone());
         let returns: Vec<f64> = lived.iter().map(|period| period.log_return).collect();

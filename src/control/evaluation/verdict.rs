@@ -220,6 +220,8 @@ impl BacktestReport {
                 horizon: walk.horizon,
                 alpha: request.alpha.clone(),
                 scale: request.scale,
+                caution: request.caution,
+                support: request.support,
                 centre: request.centre.clone(),
                 risk_aversion: request.risk_aversion,
                 trading_cost: request.trading_cost,

@@ -10,6 +10,7 @@ use crate::control::error::{FieldError, PolicyError};
 use crate::control::kept::Kept;
 use crate::control::problem::actions::Band;
 use crate::control::problem::dynamics::Dynamics;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::{FORMAT, StepDiagnostics, StepSolution};
@@ -99,6 +100,11 @@ impl Policy {
         }
         if self.specification.clone().completed()? != self.specification {
             return Err(FieldError::new("specification", "an object with holes", "must be completed"));
+        }
+        let problem = &self.specification.problem;
+        if problem.caution.is_some_and(CautionLevel::is_found) != problem.levels.is_some() {
+            let rule = "must be what the level of caution was found from, or absent where it is none";
+            return Err(FieldError::new("specification.problem.levels", "null or an object", rule));
         }
         let horizon = self.specification.problem.horizon;
         if self.steps.len() != horizon {

@@ -4,6 +4,7 @@ pub mod advice;
 pub mod advisor;
 pub mod caution;
 mod document;
+pub mod levels;
 pub mod one_period;
 pub mod prepared;
 pub mod sensitivity;

@@ -4,11 +4,13 @@
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use super::document::Policy;
+use super::levels::LevelsAdvised;
 use super::sensitivity::{Sensitivity, check_learning};
 use super::worst_case::WorstCase;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::problem::state::State;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::solved_step::StepSolution;
@@ -25,6 +27,47 @@ impl OnePeriod {
     pub fn new(specification: &Specification, kept: Kept) -> Self {
         let policy = Policy::new(specification.clone(), vec![StepSolution::unsolved(0)]);
         OnePeriod { advisor: Advisor::with(policy, kept.clone()), kept }
+    }
+
+    /// The same with the levels of his caution found, where it is one of them. Cost: as [`Specification::resolved`].
+    #[must_use]
+    pub fn resolved(&self) -> Self {
+        OnePeriod::new(&self.advisor.specification().clone().resolved(&self.kept), self.kept.clone())
+    }
+
+    /// The same at another level of those found.
+    #[must_use]
+    pub fn at(&self, level: CautionLevel) -> Self {
+        self.of(ProblemSpecification { caution: Some(level), ..self.problem().clone() })
+    }
+
+    /// The same with its radius so many times as large, where it is simulated.
+    #[must_use]
+    pub fn within(&self, factor: f64) -> Self {
+        let radius = Some(self.problem().radius_rule().scaled(factor));
+        self.of(ProblemSpecification { radius, ..self.problem().clone() })
+    }
+
+    fn of(&self, problem: ProblemSpecification) -> Self {
+        let specification = Specification { problem, ..self.advisor.specification().clone() };
+        OnePeriod::new(&specification, self.kept.clone())
+    }
+
+    /// Of its simulations.
+    pub fn seed(&self) -> u64 {
+        self.advisor.specification().seed
+    }
+
+    /// What each level would advise, where they were found. Cost: four robust steps.
+    ///
+    /// # Errors
+    /// As [`Self::advise`].
+    pub fn levels(&self, holding: f64) -> Result<Option<LevelsAdvised>, FieldError> {
+        let problem = self.problem();
+        let (Some(found), Some(followed)) = (&problem.levels, problem.caution) else { return Ok(None) };
+        let state = self.state(holding)?;
+        let at = |level: CautionLevel| Some(self.at(level).advisor.advise(0, &state, AdviceMode::Resolve).allocation);
+        Ok(Some(LevelsAdvised::of(found, followed, at)))
     }
 
     /// Bytes of the bridges that its radius asks for.
@@ -52,11 +95,12 @@ impl OnePeriod {
         let state = self.state(holding)?;
         let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).found_rule());
         let of = |record: &[f64]| {
-            let problem = ProblemSpecification { history: record.to_vec(), radius, ..self.problem().clone() };
-            let specification = Specification { problem, ..self.advisor.specification().clone() };
+            // The share of its level is in the rule found.
+            let caution = Some(CautionLevel::Paper);
+            let problem = ProblemSpecification { history: record.to_vec(), radius, caution, ..self.problem().clone() };
             let law = self.problem().learning.law(record);
             let state = State { law, ..state };
-            OnePeriod::new(&specification, self.kept.clone()).advisor.advise(0, &state, AdviceMode::Resolve).allocation
+            self.of(problem).advisor.advise(0, &state, AdviceMode::Resolve).allocation
         };
         Ok(self.advisor.sensitivity_by(0, &state, &self.problem().history, advice, &of))
     }

@@ -2,7 +2,8 @@
 
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::sampling_law::{MixtureComponent, SamplingLaw};
-use crate::control::request::specification::{Interval, ProblemSpecification};
+use crate::control::request::specification::ProblemSpecification;
+use crate::control::request::support::Interval;
 use crate::numerics::law::ContinuousLaw;
 
 /// The law behind a problem's name for it.
@@ -24,6 +25,6 @@ pub fn continuous_law(law: &SamplingLaw, problem: &ProblemSpecification) -> Cont
 /// A return the rest of the project accepts: within the support and the limit on log-returns.
 pub fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
     let limit = LOG_RETURN;
-    let Interval { min, max } = problem.support.unwrap_or(Interval { min: -limit, max: limit });
+    let Interval { min, max } = problem.support_rule().given().unwrap_or(Interval { min: -limit, max: limit });
     log_return.clamp(min.max(-limit), max.min(limit))
 }

@@ -5,13 +5,16 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::caution::CautionLevel;
+use super::caution_rules::check_support;
 use super::contributions::Contributions;
 use super::framework::Framework;
-use super::fund::{CompositionRule, FundSpecification, GroundNorm, LowestReturn};
+use super::fund::{CompositionRule, FundSpecification, GroundNorm};
 use super::learning::Learning;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::{InitialLaws, ProblemSpecification, Specification, UtilitySpecification, defaults};
+use super::support::{Interval, Support};
 use super::text::check_text;
 use crate::control::error::FieldError;
 use crate::numerics::fund_bridges::fund_returns;
@@ -65,9 +68,12 @@ pub struct AssetsProblem {
     /// Default: `bridge`. That of the fund of inverse volatilities, made wide enough for all funds at once.
     #[serde(default)]
     pub radius: Option<RadiusRule>,
-    /// Below which the adversary moves no log-return. Without it an asset may lose all.
+    /// The share of the radius that is acted on, found for the fund of inverse volatilities. Default: as of one asset.
     #[serde(default)]
-    pub support: Option<LowestReturn>,
+    pub caution: Option<CautionLevel>,
+    /// The log-returns of each asset that the adversary may use. Default: as of one asset.
+    #[serde(default)]
+    pub support: Option<Support>,
     /// Log-returns, date by date, oldest first; each date has one for each asset.
     pub history: Vec<Vec<f64>>,
 }
@@ -106,6 +112,8 @@ impl AssetsProblem {
             contributions: self.contributions.clone(),
             utility: self.utility,
             radius: self.radius,
+            caution: self.caution,
+            support: self.support,
             ..ProblemSpecification::of(returns, self.rate_per_step)
         }
     }
@@ -149,7 +157,7 @@ pub fn check_rows(
     named: &str,
     rows: &[Vec<f64>],
     assets: &[String],
-    support: Option<LowestReturn>,
+    support: Option<Support>,
 ) -> Result<(), FieldError> {
     if !DATES.contains(&rows.len()) {
         let rule = format!("must hold {} to {} dates", DATES.start(), DATES.end());
@@ -168,12 +176,14 @@ pub fn check_rows(
         let column: Vec<f64> = rows.iter().map(|row| row[asset]).collect();
         Learning::Equal {}.check_deviation(&format!("{named}, {name}"), &column)?;
     }
-    let Some(LowestReturn { min }) = support else { return Ok(()) };
-    rules::log_return("problem.support.min", min)?;
-    let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-    if min > lowest {
-        let rule = format!("must be at most {lowest}, the lowest log-return of the history");
-        return Err(FieldError::new("problem.support.min", min, rule));
+    let Some(support) = support else { return Ok(()) };
+    check_support(support)?;
+    let Some(Interval { min, max }) = support.given() else { return Ok(()) };
+    for (date, row) in rows.iter().enumerate() {
+        if let Some(asset) = row.iter().position(|z| !(min..=max).contains(z)) {
+            let rule = format!("must lie in problem.support, [{min}, {max}]");
+            return Err(FieldError::new(format!("{named}[{date}][{asset}]"), row[asset], rule));
+        }
     }
     Ok(())
 }
@@ -229,7 +239,7 @@ pub(super) fn check_fund(
         return Err(FieldError::new("problem.centre.kind", problem.centre.name(), rule));
     }
     check_names("fund.assets", &fund.assets)?;
-    check_rows("fund.history", &fund.history, &fund.assets, fund.support)?;
+    check_rows("fund.history", &fund.history, &fund.assets, problem.support)?;
     check_composition("fund.composition", &fund.composition, fund.assets.len())?;
     rules::within("fund.radius_factor", fund.radius_factor, 1.0, LARGEST_FACTOR)?;
     let returns = fund_returns(&fund.history, &inverse_volatility(&fund.history));

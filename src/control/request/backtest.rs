@@ -5,11 +5,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
 use crate::control::request::rules::{self, COUNT, HISTORY_LENGTH, HORIZON, RATE, TRADING_COST, whole, within};
 use crate::control::request::specification::default_seed;
+use crate::control::request::support::Support;
 
 /// Periods of a record.
 pub const PERIODS: std::ops::RangeInclusive<usize> = 3..=20_000;
@@ -62,6 +64,12 @@ pub struct BacktestRequest {
     /// Multiple of the radius of every ball.
     #[serde(default = "defaults::scale")]
     pub scale: f64,
+    /// The share of every radius that is acted on: a level is found anew for every training.
+    #[serde(default = "defaults::caution")]
+    pub caution: CautionLevel,
+    /// The log-returns that the adversary may use.
+    #[serde(default = "defaults::support")]
+    pub support: Support,
     /// What the balls are centred on, and what “Trusts the record” takes for the law.
     #[serde(default)]
     pub centre: CentreSpecification,
@@ -94,6 +102,8 @@ pub enum Rates {
 
 /// What stands for fields that are left out.
 pub mod defaults {
+    use super::{CautionLevel, Support};
+
     /// Levels.
     pub fn alpha() -> Vec<f64> {
         vec![0.05, 0.1, 0.5]
@@ -101,6 +111,14 @@ pub mod defaults {
     /// As the bridge says.
     pub fn scale() -> f64 {
         1.0
+    }
+    /// The whole radius, as in the paper.
+    pub fn caution() -> CautionLevel {
+        CautionLevel::Paper
+    }
+    /// All, as in the paper.
+    pub fn support() -> Support {
+        Support::None {}
     }
     /// Relative risk aversion.
     pub fn risk_aversion() -> f64 {

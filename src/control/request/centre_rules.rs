@@ -6,7 +6,8 @@ use crate::control::request::framework::Framework;
 use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, sampling_law, within};
 use crate::control::request::sampling_law::SamplingLaw;
-use crate::control::request::specification::{InitialLaws, Interval, ProblemSpecification};
+use crate::control::request::specification::{InitialLaws, ProblemSpecification};
+use crate::control::request::support::Interval;
 
 /// Standard deviations of the error that smooths.
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
@@ -50,7 +51,7 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
             within("problem.centre.weight", *weight, ASSUMED_WEIGHT.0, ASSUMED_WEIGHT.1)?;
             match (law, history) {
                 (Some(law), None) => assumed_law(law),
-                (None, Some(history)) => assumed_history(history, problem.support),
+                (None, Some(history)) => assumed_history(history, problem.support_rule().given()),
                 (law, _) => {
                     let value = if law.is_some() { "given with history" } else { "null" };
                     let rule = "must be given, or history in its place: exactly one of them";

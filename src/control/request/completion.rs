@@ -5,7 +5,8 @@ use crate::control::request::assets::check_fund;
 use crate::control::request::centre_rules::check_centre;
 use crate::control::request::rules;
 use crate::control::request::sampling_law::SamplingLaw;
-use crate::control::request::specification::{Interval, Specification};
+use crate::control::request::specification::Specification;
+use crate::control::request::support::Interval;
 
 /// Design points per step where the law is part of the state, at most: the paper's count.
 pub const DEFAULT_COUNT: usize = 1000;
@@ -21,13 +22,17 @@ impl Specification {
     /// The first field, in the order of the request, that breaks its rule.
     pub fn completed(mut self) -> Result<Self, FieldError> {
         rules::check(&self)?;
+        self.problem.check_caution()?;
+        self.problem.check_support()?;
         check_centre(&self.problem, self.design.initial_laws)?;
         self.fund.as_ref().map_or(Ok(()), |fund| check_fund(fund, &self.problem, self.design.initial_laws))?;
         let learns = self.problem.framework.learns();
         let wealth = self.problem.initial_wealth;
         self.problem.contributions = self.problem.contributions.canonical();
         self.problem.utility = self.problem.utility.absolute(wealth);
+        self.problem.caution = self.problem.caution_level();
         self.problem.radius = Some(self.problem.radius_rule());
+        self.problem.support = Some(self.problem.support_rule()).filter(|_| !self.problem.framework.is_parametric());
         if learns && self.design.count.is_none() {
             self.design.accuracy.get_or_insert(DEFAULT_ACCURACY);
         }

@@ -103,6 +103,7 @@ impl EvaluationRequest {
             let value = self.problem.framework.name();
             return Err(FieldError::new("problem.framework", value, "must be left out: frameworks names them"));
         }
+        self.problem = self.problem.as_in_the_paper();
         let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
         self.problem.law.get_or_insert(sampling_law);
         let completed = self.specification(Framework::KnownLaw, None).completed()?.problem;
@@ -213,6 +214,10 @@ impl EvaluationRequest {
         if framework.is_parametric() {
             // The region of the same level.
             problem.radius = self.problem.radius_rule().alpha().map(|alpha| RadiusRule::ChiSquare { alpha });
+            problem.support = None;
+        }
+        if !matches!(framework, Framework::Adaptive | Framework::Static) {
+            problem.caution = None;
         }
         if !framework.learns() {
             // One input needs no more: the paper's count for a state that is wealth alone.
@@ -234,6 +239,7 @@ impl EvaluationRequest {
     pub fn accepts(&self, framework: Framework, found: &Specification) -> Result<(), FieldError> {
         let mut wanted = self.specification(framework, None).completed()?.problem;
         wanted.periods_per_year = found.problem.periods_per_year;
+        wanted.levels.clone_from(&found.problem.levels);
         if !framework.is_frozen() {
             wanted.history.clone_from(&found.problem.history);
         }

@@ -7,12 +7,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use super::assets::AssetsProblem;
+use super::caution::CautionLevel;
 use super::contributions::Contributions;
 use super::framework::Framework;
-use super::fund::{CompositionRule, GroundNorm, LowestReturn};
+use super::fund::{CompositionRule, GroundNorm};
 use super::learning::Learning;
 use super::rules;
 use super::specification::{ProblemSpecification, Specification, default_seed};
+use super::support::Interval;
 use crate::control::error::FieldError;
 
 /// Returns of a record: of fewer, resampling tells nothing.
@@ -100,8 +102,8 @@ pub struct FrontierQuestion {
     pub resamples: usize,
     /// Periods in a row that are drawn together.
     pub block: usize,
-    /// Between which all log-returns lie.
-    pub support: (f64, f64),
+    /// Between which all log-returns lie, where that is given.
+    pub support: Option<Interval>,
 }
 
 impl FrontierRequest {
@@ -118,7 +120,7 @@ impl FrontierRequest {
             let rule = format!("must hold {} to {} periods", RETURNS.start(), RETURNS.end());
             return Err(FieldError::new("problem.history", format!("{count} periods"), rule));
         }
-        let (assets, fund) = match &self.problem {
+        let (assets, mut fund) = match &self.problem {
             FrontierProblem::Assets(assets) => (assets.clone(), assets.fund(self.seed)?),
             FrontierProblem::Asset(problem) => {
                 check_static(problem)?;
@@ -126,6 +128,8 @@ impl FrontierRequest {
                 (as_assets(&fund.problem), fund)
             }
         };
+        // Shares of the whole radius are what is tried.
+        fund.problem.caution = Some(CautionLevel::Paper);
         let drawn = count * assets.assets.len() * self.scales.len();
         if drawn * resamples > MOST_DRAWN {
             let rule = format!(
@@ -137,18 +141,11 @@ impl FrontierRequest {
         let block = self.block.unwrap_or_else(|| (count as f64).cbrt().round() as usize);
         rules::whole("block", block, &(1..=count / 2))?;
         (self.resamples, self.block) = (Some(resamples), Some(block));
-        let highest = match &mut self.problem {
-            FrontierProblem::Asset(problem) => {
-                problem.utility = fund.problem.utility;
-                problem.support.map(|support| support.max)
-            }
-            FrontierProblem::Assets(problem) => {
-                problem.utility = fund.problem.utility;
-                None
-            }
-        };
-        let lowest = assets.support.map(|support| support.min);
-        let support = (lowest.unwrap_or(f64::NEG_INFINITY), highest.unwrap_or(f64::INFINITY));
+        match &mut self.problem {
+            FrontierProblem::Asset(problem) => problem.utility = fund.problem.utility,
+            FrontierProblem::Assets(problem) => problem.utility = fund.problem.utility,
+        }
+        let support = fund.problem.support_rule().given();
         Ok(FrontierQuestion { request: self, assets, fund, resamples, block, support })
     }
 
@@ -223,7 +220,8 @@ pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSp
         action_interval: problem.action_interval,
         utility: problem.utility,
         radius: problem.radius,
-        support: problem.support.map(|support| LowestReturn { min: support.min }),
+        caution: problem.caution,
+        support: problem.support,
         history,
     }
 }

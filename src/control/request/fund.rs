@@ -15,9 +15,6 @@ pub struct FundSpecification {
     pub ground_norm: GroundNorm,
     /// How the shares of the assets in what is held are chosen.
     pub composition: CompositionRule,
-    /// Below which the adversary moves no log-return.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub support: Option<LowestReturn>,
     /// What the radius of one fund was multiplied by, for laws of all funds to lie in their balls at once: the scale of the
     /// problem's radius holds it. 1 under rules that look at the sample size alone.
     pub radius_factor: f64,
@@ -59,12 +56,4 @@ impl GroundNorm {
             GroundNorm::Sup => Ground::Sup,
         }
     }
-}
-
-/// The lowest log-return of any asset.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LowestReturn {
-    /// In log-return; at most the lowest of the history.
-    pub min: f64,
 }

@@ -95,6 +95,18 @@ impl RadiusRule {
         RadiusRule::Bridge { alpha, paths: defaults::paths(), scale }
     }
 
+    /// The rule of a radius so many times as large, of those that are simulated.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            RadiusRule::Bridge { alpha, paths, scale } => RadiusRule::Bridge { alpha, paths, scale: scale * factor },
+            RadiusRule::Calibrated { alpha, paths, scale } => {
+                RadiusRule::Calibrated { alpha, paths, scale: scale * factor }
+            }
+            rule => rule,
+        }
+    }
+
     /// Simulated paths, 0 under rules that simulate none.
     pub fn paths(&self) -> usize {
         match *self {

@@ -7,8 +7,9 @@ use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{
-    InitialLaws, Interval, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
+    InitialLaws, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
+use crate::control::request::support::Interval;
 use crate::control::request::withdrawals;
 
 /// Ends of `design.accuracy`, in basis points.
@@ -88,13 +89,6 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     utility(problem)?;
     problem.learning.check()?;
     radius(&problem.radius_rule(), problem)?;
-    if let Some(support) = problem.support {
-        if problem.framework.is_parametric() {
-            let rule = "must be absent in the parametric frameworks: a normal law has no bounds";
-            return Err(FieldError::new("problem.support", "an object", rule));
-        }
-        interval("problem.support", support, -20.0, 20.0)?;
-    }
     match (&problem.law, problem.framework) {
         (None, Framework::KnownLaw) => {
             return Err(FieldError::new("problem.law", "null", "must be given in the known_law framework"));
@@ -107,10 +101,6 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         (None, _) => {}
     }
     history("problem.history", &problem.history, problem.learning)?;
-    if let (Some(support), Some((index, value))) = (problem.support, outside(&problem.history, problem.support)) {
-        let rule = format!("must lie in problem.support, [{}, {}]", support.min, support.max);
-        return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
-    }
     Ok(())
 }
 
@@ -128,11 +118,6 @@ fn contributions(problem: &ProblemSpecification) -> Result<(), FieldError> {
         }
     }
     withdrawals::check_start(problem, "problem.initial_wealth", problem.initial_wealth)
-}
-
-fn outside(history: &[f64], support: Option<Interval>) -> Option<(usize, f64)> {
-    let support = support?;
-    history.iter().copied().enumerate().find(|&(_, z)| z < support.min || z > support.max)
 }
 
 fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
@@ -339,7 +324,8 @@ fn open_above_zero(field: &str, value: f64, high: f64) -> Result<(), FieldError>
     Err(FieldError::new(field, value, format!("must be a number in (0, {high}]")))
 }
 
-fn interval(field: &str, interval: Interval, low: f64, high: f64) -> Result<(), FieldError> {
+/// Checks that an interval lies in `[low, high]` and has a length.
+pub fn interval(field: &str, interval: Interval, low: f64, high: f64) -> Result<(), FieldError> {
     within(&format!("{field}.min"), interval.min, low, high)?;
     within(&format!("{field}.max"), interval.max, low, high)?;
     if interval.max > interval.min {

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::request::caution::{CautionLevel, CautionLevels};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
@@ -13,6 +14,7 @@ use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::support::{Interval, Support};
 
 /// A whole training job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -80,10 +82,16 @@ pub struct ProblemSpecification {
     /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<RadiusRule>,
-    /// Bounds on the log-returns the adversary may use; without it the certified window decides. Refused by the
-    /// parametric frameworks: a normal law has none.
+    /// The share of the radius that is acted on. Default: `balanced`, and `paper` where a `radius` is given. For the radius rules `bridge` and `calibrated` alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub support: Option<Interval>,
+    pub caution: Option<CautionLevel>,
+    /// What the levels are and cost on this record: found, never asked for. What a request says here is found anew.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levels: Option<Box<CautionLevels>>,
+    /// The log-returns that the adversary may use. Default: `worst_seen`. Refused by the parametric frameworks: a normal law has no
+    /// bounds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub support: Option<Support>,
     /// The return law of the `known_law` framework; refused by the others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law: Option<SamplingLaw>,
@@ -165,6 +173,8 @@ impl ProblemSpecification {
             learning: Learning::default(),
             centre: CentreSpecification::default(),
             radius: None,
+            caution: None,
+            levels: None,
             support: None,
             law: None,
             history,
@@ -180,16 +190,11 @@ impl ProblemSpecification {
     pub fn radius_rule(&self) -> RadiusRule {
         self.radius.unwrap_or_else(|| RadiusRule::default_of(self.framework))
     }
-}
 
-/// A closed interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Interval {
-    /// The lower end.
-    pub min: f64,
-    /// The upper end.
-    pub max: f64,
+    /// The support rule given, or the default.
+    pub fn support_rule(&self) -> Support {
+        self.support.unwrap_or_default()
+    }
 }
 
 /// Which states the surrogates are trained on.

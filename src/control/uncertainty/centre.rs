@@ -4,7 +4,8 @@ use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::sampling_law::SamplingLaw;
-use crate::control::request::specification::{Interval, ProblemSpecification};
+use crate::control::request::specification::ProblemSpecification;
+use crate::control::request::support::{Extent, Interval};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::volatility::rescaled;
 
@@ -167,6 +168,11 @@ impl Centre {
     /// The highest atom.
     pub fn highest(&self) -> f64 {
         self.atoms.last().copied().unwrap_or_default()
+    }
+
+    /// What a support around it is found from.
+    pub fn extent(&self) -> Extent {
+        Extent { ends: [self.lowest(), self.highest()], mean: self.mean(), variance: self.variance() }
     }
 
     /// Per step, as the variance.

@@ -9,7 +9,7 @@ pub mod measured;
 pub mod radius;
 
 use self::centre::Centre;
-use crate::control::request::specification::Interval;
+use crate::control::request::support::{Interval, Support};
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 
 /// Log-returns closer than this are one.
@@ -60,13 +60,18 @@ impl Reach {
 }
 
 impl UncertaintySet {
-    /// The ball around `centre`; the centre alone without a radius.
-    pub fn around(centre: Centre, radius: f64, support: Option<Interval>) -> Self {
-        if radius > 0.0 { UncertaintySet::Ball { centre, radius, support } } else { UncertaintySet::Point(centre) }
+    /// The ball around `centre` on the support that the rule has there; the centre alone without a radius.
+    pub fn around(centre: Centre, radius: f64, support: Support) -> Self {
+        if radius > 0.0 {
+            let support = support.around(centre.extent());
+            UncertaintySet::Ball { centre, radius, support }
+        } else {
+            UncertaintySet::Point(centre)
+        }
     }
 
     /// The set of the same centre with another radius, in the same unit.
-    pub fn with_radius(self, radius: f64, support: Option<Interval>) -> Self {
+    pub fn with_radius(self, radius: f64, support: Support) -> Self {
         match self {
             UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => {
                 UncertaintySet::around(centre, radius, support)

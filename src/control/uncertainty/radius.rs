@@ -75,7 +75,7 @@ impl RadiusEstimator {
     pub fn new(specification: &Specification, kept: Kept) -> Self {
         let rule = match specification.problem.framework {
             Framework::KnownLaw | Framework::PlugIn => RadiusRule::Fixed { radius: 0.0 },
-            _ => specification.problem.radius_rule(),
+            _ => specification.problem.radius_in_force(),
         };
         let (rule, calibrated) = match rule {
             RadiusRule::Calibrated { alpha, paths, scale } => (RadiusRule::Bridge { alpha, paths, scale }, true),

@@ -62,8 +62,12 @@ const ROW_OF = {
 const MIXES = { one_step: "Best against the worst market", equal: "Equal shares", inverse_volatility: "By inverse volatility" };
 const mix = (composition) => MIXES[composition] ?? composition.given.map((share) => percent(share, 0)).join(", ");
 const moves = (support) => {
-  const end = (log, word) => (log === undefined ? [] : [`${word} ${percent(Math.expm1(log), 1)}`]);
-  return support ? [...end(support.min, "down to"), ...end(support.max, "up to")].join(", ") : "Any";
+  const end = (log) => percent(Math.expm1(log), 1);
+  const said = {
+    worst_seen: ({ factor }) => `${factor} times the worst seen`,
+    between: ({ min, max }) => `down to ${end(min)}, up to ${end(max)}`,
+  };
+  return said[support?.rule]?.(support) ?? "Any";
 };
 const NORMS = { scaled_one: "Each asset by its own volatility", sup: "All assets at once" };
 
@@ -97,7 +101,7 @@ export function rows(asked) {
     row("Wealth at the start", ({ initial_wealth }) => wealth(initial_wealth), less(({ initial_wealth }) => initial_wealth, (value) => signed(value, wealth))),
     { name: "Money added", cells: [added[0], added[1] === added[0] && changed("contributions") ? `${added[1]} (other amounts or periods)` : added[1]] },
     row("Share allowed outside the bank", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
-    row("Moves assumed possible", ({ support }, { fund }) => moves(fund?.support ?? support)),
+    row("Moves assumed possible", ({ support }) => moves(support)),
     row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
     row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
     { name: "Record", cells: [record(one), `${record(other)}${changed("history") && record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },

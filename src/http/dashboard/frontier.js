@@ -66,7 +66,7 @@ export function asking({ problem: asked, fund }, history, initial_wealth) {
 }
 
 /** What is asked of several assets; the scale of the radius before it was made wide enough for all their funds. */
-function several({ assets, ground_norm, support, radius_factor }, radius) {
+function several({ assets, ground_norm, radius_factor }, radius) {
   const scale = radius.scale && radius.scale / radius_factor;
-  return { assets, ground_norm, support, radius: { ...radius, scale } };
+  return { assets, ground_norm, radius: { ...radius, scale } };
 }

@@ -151,6 +151,14 @@ export function meant(form, { noun, job, warnings, problem }, yes) {
   question.focus();
 }
 
+/** The level of caution and its share of the radius, where that is not all of it. */
+function levelInWords({ caution, levels }) {
+  const share = caution?.scale ?? levels?.[caution]?.scale;
+  if (share === undefined) return "";
+  const level = typeof caution === "string" ? `${caution}, ` : "";
+  return `${level}${percent(share, 0)} of `;
+}
+
 /** How cautious a policy is, in a few words. */
 export function caution(problem) {
   const { radius } = problem;
@@ -158,7 +166,8 @@ export function caution(problem) {
   const { alpha, scale = 1 } = radius;
   const by = { calibrated: ", calibrated", concentration: " by the concentration bound" }[radius.rule] ?? "";
   const confidence = alpha === undefined ? radiusRule(radius) : `${percentName(1 - alpha)} confidence${by}`;
-  return scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`;
+  const acted = levelInWords(problem);
+  return `${acted}${scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`}`;
 }
 
 /** What the ball is centred on, where that is not the law of the returns seen. */

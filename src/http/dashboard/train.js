@@ -6,7 +6,7 @@ import { draft } from "./draft.js";
 import { fieldset, refusal, sending } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
-import { meant } from "./specification.js";
+import { hasBall, meant } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
 /** What the form starts from; what is null is to be filled in, or may be left out. */
@@ -21,6 +21,7 @@ const initial = () => ({
     contributions: 0,
     utility: { ...UTILITY.power },
     radius: { rule: "bridge", alpha: 0.1, scale: 1 },
+    caution: "balanced",
     history: [],
   },
   design: { count: 500 },
@@ -32,13 +33,15 @@ const REDRAWN = ["problem.framework", "problem.periods_per_year"];
 
 /** The request that a policy was trained by; of several assets by their names. */
 export function requestOf(specification) {
-  if (!specification.fund) return structuredClone(specification);
-  const { radius_factor, support, ...named } = specification.fund;
-  const { framework, learning, centre, radius, support: ofFund, ...problem } = specification.problem;
+  if (!specification.fund) {
+    const { levels, ...problem } = specification.problem;
+    return structuredClone({ ...specification, problem });
+  }
+  const { radius_factor, ...named } = specification.fund;
+  const { framework, learning, centre, levels, radius, ...problem } = specification.problem;
   const scale = radius.scale === undefined ? {} : { scale: Number((radius.scale / radius_factor).toPrecision(12)) };
   const { accuracy, count } = specification.design;
-  const bounded = support ? { support } : {};
-  return structuredClone({ problem: { ...problem, ...named, ...bounded, radius: { ...radius, ...scale } }, design: { accuracy, count }, seed: specification.seed });
+  return structuredClone({ problem: { ...problem, ...named, radius: { ...radius, ...scale } }, design: { accuracy, count }, seed: specification.seed });
 }
 
 /** Takes returns into a request: those of several columns are of assets by these names. None are there yet where nothing is read. */
@@ -90,7 +93,10 @@ export async function view(query, leaving) {
   });
   const fields = trainFields((path, value) => {
     put(request, path, value);
-    if (path === "problem.framework") request.problem.radius = radiusFor(value, request.problem.radius);
+    if (path === "problem.framework") {
+      request.problem.radius = radiusFor(value, request.problem.radius);
+      request.problem.caution = hasBall({ framework: value }) ? (request.problem.caution ?? "balanced") : undefined;
+    }
     if (REDRAWN.includes(path) || path.startsWith("problem.utility")) fields.show(request);
     written();
   });

@@ -21,6 +21,14 @@ const HALF_LIFE = "problem.learning.half_life";
 /** What proposes the shares of several assets. */
 const COMPOSITION = "problem.composition";
 const COMPOSITIONS = { one_step: "Anew each period, against the worst market", inverse_volatility: "Less of what varies more", equal: "All alike" };
+/** How much of the statistical doubt is acted on. */
+const CAUTION = "problem.caution";
+const CAUTIONS = {
+  balanced: "Balanced: least to regret, whatever the premium is",
+  bold: "Bold: nearer to the record",
+  cautious: "Cautious: nearer to no premium",
+  paper: "All that the confidence asks for",
+};
 /** The choice of an investor that no preset is. */
 const OWN = "own";
 
@@ -127,7 +135,13 @@ export function trainFields(changed) {
     changed: (value) => changed("problem.framework", value),
   });
   const confidence = field("problem.radius.alpha", "Confidence, %", "More guards against more: usual is 90 %.", "confidence");
-  const caution = field("problem.radius.scale", "Caution, times", "1 is what the confidence asks for; 0 trusts the record.");
+  const caution = select({
+    name: CAUTION,
+    label: "Caution",
+    note: "How much of what the record leaves open is guarded against.",
+    choices: CAUTIONS,
+    changed: (value) => changed(CAUTION, value),
+  });
   const composition = select({
     name: COMPOSITION,
     label: "How the assets are mixed",
@@ -148,6 +162,7 @@ export function trainFields(changed) {
   const kind = select({ name: "problem.utility.kind", label: "Utility", choices: UTILITIES, changed: (value) => changed("problem.utility", { ...UTILITY[value] }) });
   const paper = [
     kind,
+    field("problem.radius.scale", "Radius, times", "A factor on all caution; 0 trusts the record."),
     field("problem.utility.risk_aversion", "Risk aversion", "Exponential: per unit of wealth. Power: above 1."),
     field(
       "problem.utility.risk_aversion_relative",
@@ -164,7 +179,10 @@ export function trainFields(changed) {
     for (const part of parts) {
       const found = at(request, part.name);
       const value = found === undefined && part.name === HALF_LIFE && !request.problem?.assets ? "" : found;
-      const shown = [value ?? ""].flat().map(readings[part.name]?.show ?? ((each) => each));
+      // A share in the place of a level.
+      const share = part === caution ? value?.scale : undefined;
+      if (share !== undefined) caution.control.append(h("option", { value: share }, `${short(100 * share)} % of what the confidence asks for`));
+      const shown = [share ?? value ?? ""].flat().map(readings[part.name]?.show ?? ((each) => each));
       if (part.control !== document.activeElement) part.control.value = shown.join("; ");
       part.element.hidden = value === undefined;
     }

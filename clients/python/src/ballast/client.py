@@ -76,7 +76,8 @@ class _Ballast:
         utility: wire.UtilitySpecification | None = None,
         learning: wire.Learning | None = None,
         radius: wire.RadiusRule | None = None,
-        support: wire.Interval | None = None,
+        caution: wire.CautionLevel | None = None,
+        support: wire.Support | None = None,
         law: wire.SamplingLaw | None = None,
         centre: wire.CentreSpecification | None = None,
         design: wire.DesignSpecification | None = None,
@@ -116,6 +117,7 @@ class _Ballast:
             "utility": utility,
             "learning": learning,
             "radius": radius,
+            "caution": caution,
             "support": support,
             "law": law,
             "centre": centre,
@@ -173,7 +175,7 @@ class _Ballast:
         ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank; ``assets``
         chooses among them. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what
         the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
-        as ``ground_norm``, ``utility``, ``radius`` or ``support``.
+        as ``ground_norm``, ``utility``, ``caution``, ``radius`` or ``support``.
         """
         whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth})
@@ -275,6 +277,8 @@ class _Ballast:
         horizon: int | None = None,
         alpha: Sequence[float] | None = None,
         scale: float | None = None,
+        caution: wire.CautionLevel | None = None,
+        support: wire.Support | None = None,
         centre: wire.CentreSpecification | None = None,
         risk_aversion: float | None = None,
         trading_cost: float | None = None,
@@ -301,6 +305,8 @@ class _Ballast:
             "horizon": horizon,
             "alpha": None if alpha is None else list(alpha),
             "scale": scale,
+            "caution": caution,
+            "support": support,
             "centre": centre,
             "risk_aversion": risk_aversion,
             "trading_cost": trading_cost,

@@ -32,7 +32,8 @@ class RobustAllocation(Advised, BaseOptimization):
         radius: wire.RadiusRule | None = None,
         ground_norm: wire.GroundNorm | None = None,
         action_interval: Sequence[float] | None = None,
-        support: wire.LowestReturn | None = None,
+        caution: wire.CautionLevel | None = None,
+        support: wire.Support | None = None,
         periods_per_year: float | None = None,
         portfolio_params: dict[str, Any] | None = None,
         fallback: Any = None,
@@ -53,6 +54,7 @@ class RobustAllocation(Advised, BaseOptimization):
         self.radius = radius
         self.ground_norm = ground_norm
         self.action_interval = action_interval
+        self.caution = caution
         self.support = support
         self.periods_per_year = periods_per_year
 

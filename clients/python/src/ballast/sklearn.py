@@ -29,7 +29,16 @@ class Advised:
     weights_: NDArray[np.float64]
 
     #: Constructor's arguments that are fields of the problem.
-    _PROBLEM = ("initial_wealth", "utility", "radius", "ground_norm", "action_interval", "support", "periods_per_year")
+    _PROBLEM = (
+        "initial_wealth",
+        "utility",
+        "radius",
+        "ground_norm",
+        "action_interval",
+        "caution",
+        "support",
+        "periods_per_year",
+    )
 
     def _fit(self, X: Any) -> None:
         table: NDArray[np.float64] = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
@@ -63,8 +72,8 @@ class RobustAllocation(Advised, BaseEstimator):
     a period is ``rate_per_step``, or the last number of the column ``bank`` of ``X``, which is then no asset: its
     name in a DataFrame, its place in an array. Exactly one of the two is given. ``url`` is where the service listens;
     its key comes from ``BALLAST_KEY``. ``initial_wealth``, ``utility``, ``radius``, ``ground_norm``,
-    ``action_interval``, ``support`` and ``periods_per_year`` are fields of the problem of ``POST /advise``; what is
-    left out the service chooses.
+    ``action_interval``, ``caution``, ``support`` and ``periods_per_year`` are fields of the problem of
+    ``POST /advise``; what is left out the service chooses.
 
     After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: in the assets what is advised, in the
     column ``bank`` the rest. Without such a column the rest is in the bank all the same, and the weights sum to less
@@ -82,7 +91,8 @@ class RobustAllocation(Advised, BaseEstimator):
         radius: wire.RadiusRule | None = None,
         ground_norm: wire.GroundNorm | None = None,
         action_interval: Sequence[float] | None = None,
-        support: wire.LowestReturn | None = None,
+        caution: wire.CautionLevel | None = None,
+        support: wire.Support | None = None,
         periods_per_year: float | None = None,
     ) -> None:
         self.url = url
@@ -93,6 +103,7 @@ class RobustAllocation(Advised, BaseEstimator):
         self.radius = radius
         self.ground_norm = ground_norm
         self.action_interval = action_interval
+        self.caution = caution
         self.support = support
         self.periods_per_year = periods_per_year
 

@@ -239,6 +239,28 @@ CautionCode: TypeAlias = Literal["short_record", "one_return", "not_certified", 
 """The reasons."""
 
 
+class CautionLevel1(TypedDict):
+    """This share, whatever is seen: 0 takes the record for the truth."""
+
+    scale: float
+    """This share, whatever is seen: 0 takes the record for the truth."""
+
+
+CautionLevel: TypeAlias = Literal["paper"] | Literal["bold"] | Literal["balanced"] | Literal["cautious"] | CautionLevel1
+"""The share of the radius that is acted on: a level by its name, or a number."""
+
+
+class CautionScale(TypedDict):
+    """A share of the radius and its price in the three worlds. Losses are in log certainty equivalent per step."""
+
+    scale: float
+    """Share of the radius."""
+    regrets: list[float]
+    """Loss beside the best share in each of the three worlds: without a premium, with half, and with the whole."""
+    spared: float
+    """Spared beside taking the record for the truth, in the world without a premium."""
+
+
 class CentreSpecification1(TypedDict):
     """The law of the returns seen."""
 
@@ -576,11 +598,37 @@ class LeftOut(TypedDict):
     """The share of wealth that would be advised."""
 
 
-class LowestReturn(TypedDict):
-    """The lowest log-return of any asset."""
+class LevelAdvised(TypedDict):
+    """A level, its share of the radius, its price, and what it would hold."""
 
-    min: float
-    """In log-return; at most the lowest of the history."""
+    level: CautionLevel
+    """Its name."""
+    scale: float
+    """Share of the radius."""
+    regrets: list[float]
+    """Loss of log certainty equivalent per step beside the best share of the radius, in the three worlds."""
+    spared: float
+    """Spared per step in the world without a premium, beside taking the record for the truth."""
+    allocation: NotRequired[float | None]
+    """Share of wealth that it would hold; null where that would take long to find, of several assets in long records."""
+
+
+class LevelsAdvised(TypedDict):
+    """The levels of caution on a record."""
+
+    followed: CautionLevel
+    """The one followed."""
+    premium_seen: float
+    """Mean simple return of the record beyond the bank, per step."""
+    standard_error: float
+    """Its standard error."""
+    premiums: list[float]
+    """
+    The same beyond the bank in the three worlds that losses are told for: none, half, and the whole of the premium seen, or of 0
+    where it is negative, plus its standard error.
+    """
+    levels: list[LevelAdvised]
+    """From the boldest to the paper's."""
 
 
 class MixtureComponent(TypedDict):
@@ -984,6 +1032,40 @@ StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in",
 """A kind of strategy that walks through a record, which decides its colour and its sentences."""
 
 
+class Support1(TypedDict):
+    """
+    From `min(factor z_min, m - 5 s)` to `max(factor z_max, m + 5 s)`, z_min and z_max the worst and the best log-return of the
+    law in the middle, m and s its mean and standard deviation; never narrower than from z_min to z_max.
+    """
+
+    factor: NotRequired[float]
+    """Multiple of the worst and the best log-return, 1 to 10."""
+    rule: Literal["worst_seen"]
+
+
+class Support2(TypedDict):
+    """All log-returns: the paper's."""
+
+    rule: Literal["none"]
+
+
+class Support3(TypedDict):
+    """Those between two bounds, whatever is seen."""
+
+    min: float
+    """The lowest."""
+    max: float
+    """The highest."""
+    rule: Literal["between"]
+
+
+Support: TypeAlias = Support1 | Support2 | Support3
+"""
+The log-returns that the laws in a ball may give mass to. Part of the law, as its radius is: under `worst_seen` it follows the
+returns seen so far.
+"""
+
+
 class SurrogateDiagnostics(TypedDict):
     """A fitted surrogate in figures."""
 
@@ -1305,7 +1387,8 @@ class AssetsProblem(TypedDict):
     utility: NotRequired[UtilitySpecification]
     """Of wealth at the horizon."""
     radius: NotRequired[RadiusRule | None]
-    support: NotRequired[LowestReturn | None]
+    caution: NotRequired[CautionLevel | None]
+    support: NotRequired[Support | None]
     history: list[HistoryItem]
     """Log-returns, date by date, oldest first; each date has one for each asset."""
 
@@ -1334,6 +1417,28 @@ class Caution(TypedDict):
     """For programs."""
     sentence: str
     """For people."""
+
+
+class CautionLevels(TypedDict):
+    """The shares of the radius that the levels act on, and what each costs, found from the record."""
+
+    premiums: list[float]
+    """
+    Mean simple returns beyond the bank, per step, that the three worlds are supposed to have: none, half, and one of the
+    premium seen, or 0 where it is negative, plus its standard error.
+    """
+    premium_seen: float
+    """Premium seen: the mean simple return of the record beyond the bank, per step."""
+    standard_error: float
+    """Its standard error."""
+    bold: CautionScale
+    """Least worst regret, double regret in the world of the whole premium."""
+    balanced: CautionScale
+    """Least worst regret."""
+    cautious: CautionScale
+    """Least worst regret, double regret in the world without a premium."""
+    paper: CautionScale
+    """The whole radius."""
 
 
 class CentreSpecification4(TypedDict):
@@ -1469,7 +1574,6 @@ class FundSpecification(TypedDict):
     """What moving a law costs the adversary."""
     composition: CompositionRule
     """How the shares of the assets in what is held are chosen."""
-    support: NotRequired[LowestReturn | None]
     radius_factor: float
     """
     What the radius of one fund was multiplied by, for laws of all funds to lie in their balls at once: the scale of the
@@ -1631,7 +1735,9 @@ class ProblemSpecification(TypedDict):
     centre: NotRequired[CentreSpecification]
     """What the ball is centred on. `known_law` and the parametric frameworks, which have no ball, take no other than the default."""
     radius: NotRequired[RadiusRule | None]
-    support: NotRequired[Interval | None]
+    caution: NotRequired[CautionLevel | None]
+    levels: NotRequired[CautionLevels | None]
+    support: NotRequired[Support | None]
     law: NotRequired[SamplingLaw | None]
     history: list[HistoryItem3]
     """The log-returns observed before the start, at least two of them distinct."""
@@ -1946,6 +2052,7 @@ class Advised(Advice):
     worst_case: WorstCase
     caution: list[Caution]
     """What to know before the advice is followed."""
+    levels: NotRequired[LevelsAdvised | None]
     sensitivity: NotRequired[Sensitivity | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
@@ -1990,6 +2097,7 @@ class AssetsAdvice(TypedDict):
     Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs low: by little
     where assets move together, by more than a tenth for a dozen that are independent.
     """
+    levels: NotRequired[LevelsAdvised | None]
     sample_size: int
     """Number of dates seen."""
     worst_means: dict[str, WorstMean]
@@ -2048,6 +2156,10 @@ class BacktestChoices(TypedDict):
     """Levels of the adaptive strategies."""
     scale: float
     """Multiple of the radius of every ball."""
+    caution: CautionLevel
+    """Share of every radius that was acted on."""
+    support: Support
+    """What the adversary could use."""
     centre: CentreSpecification
     """What the balls are centred on."""
     risk_aversion: float
@@ -2115,6 +2227,10 @@ class BacktestRequest(TypedDict):
     """Levels of the adaptive strategies; the static one takes the second, or the only one."""
     scale: NotRequired[float]
     """Multiple of the radius of every ball."""
+    caution: NotRequired[CautionLevel]
+    """The share of every radius that is acted on: a level is found anew for every training."""
+    support: NotRequired[Support]
+    """The log-returns that the adversary may use."""
     centre: NotRequired[CentreSpecification]
     """What the balls are centred on, and what “Trusts the record” takes for the law."""
     risk_aversion: NotRequired[float]

@@ -1,6 +1,7 @@
 //! What to hold of several assets, by rule.
 
 use super::AssetsBacktest;
+use crate::control::assets::advising::floors;
 use crate::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
 use crate::control::error::TrainError;
 use crate::control::evaluation::names::{StrategyKind, caution_in_words};
@@ -8,6 +9,7 @@ use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
 use crate::control::request::fund::GroundNorm;
+use crate::control::request::support::Support;
 use crate::numerics::least_variance::least_variance;
 use crate::numerics::levelling::inverse_volatility;
 
@@ -150,7 +152,7 @@ fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: Groun
     let rate = backtest.record.bank[period - 1];
     // Under power and log utility wealth changes nothing.
     let utility = RelativeUtility::new(backtest.utility(), 1.0 + rate);
-    let law = AssetsLaw { returns: rows, radius, floor: f64::NEG_INFINITY };
+    let law = AssetsLaw { returns: rows, radius, floors: floors(Support::None {}, rows) };
     AssetsStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
 }
 

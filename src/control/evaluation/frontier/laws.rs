@@ -6,6 +6,7 @@ use rand_distr::StandardNormal;
 use super::report::Bootstrap;
 use crate::control::error::FieldError;
 use crate::control::request::learning::SMALLEST_DEVIATION;
+use crate::control::request::support::Interval;
 use crate::numerics::streams::stream;
 
 /// Atoms of a smoothed law, about; every return seen is spread over as many, two at least.
@@ -32,7 +33,7 @@ impl RecordLaw {
     /// thumb, `(4 / ((d + 2) n))^(1 / (d + 4))`. What lies beyond `support` is moved to its end, which moves means and variances.
     ///
     /// Source: Silverman (1986), Density estimation, sections 4.3.2 and 6.4.1. Checked by: `means_and_variances_stay`.
-    pub(super) fn smoothed(rows: &[Vec<f64>], support: (f64, f64), seed: u64) -> Self {
+    pub(super) fn smoothed(rows: &[Vec<f64>], support: Option<Interval>, seed: u64) -> Self {
         let (count, width) = (rows.len(), rows.first().map_or(0, Vec::len));
         let (size, dimension) = (count as f64, width as f64);
         let bandwidth = (4.0 / ((dimension + 2.0) * size)).powf(1.0 / (dimension + 4.0));
@@ -61,7 +62,10 @@ impl RecordLaw {
         for row in &mut spread {
             for (asset, value) in row.iter_mut().enumerate() {
                 let mean = means[asset];
-                *value = (mean + (*value - mean) * deviations[asset] / wider[asset]).clamp(support.0, support.1);
+                *value = mean + (*value - mean) * deviations[asset] / wider[asset];
+                if let Some(Interval { min, max }) = support {
+                    *value = value.clamp(min, max);
+                }
             }
         }
         RecordLaw { rows: spread, bandwidth }
@@ -136,7 +140,7 @@ mod tests {
     fn means_and_variances_stay() {
         for width in [1, 3] {
             let rows = rows(60, width);
-            let law = RecordLaw::smoothed(&rows, (f64::NEG_INFINITY, f64::INFINITY), 5);
+            let law = RecordLaw::smoothed(&rows, None, 5);
             let ((means, deviations), (smooth_means, smooth_deviations)) = (moments(&rows), moments(&law.rows));
             assert_eq!(law.rows.len(), 60 * 16);
             for asset in 0..width {
@@ -149,7 +153,7 @@ mod tests {
             let mean = even.rows.iter().map(|row| row[width - 1].exp()).sum::<f64>() / even.rows.len() as f64;
             assert!((mean - 1.01).abs() < 1e-14 * 960.0);
             assert!((moments(&even.rows).1[0] / deviations[0] - 1.0).abs() < 1e-12);
-            let within = RecordLaw::smoothed(&rows, (-0.005, 0.005), 5);
+            let within = RecordLaw::smoothed(&rows, Some(Interval { min: -0.005, max: 0.005 }), 5);
             assert!(within.rows.iter().flatten().all(|value| value.abs() <= 0.005));
         }
     }

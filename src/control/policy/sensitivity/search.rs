@@ -9,7 +9,8 @@ use crate::control::pool;
 use crate::control::problem::state::State;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules;
-use crate::control::request::specification::{Interval, ProblemSpecification, Specification};
+use crate::control::request::specification::{ProblemSpecification, Specification};
+use crate::control::request::support::Interval;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::summary::interpolated_quantile;
 
@@ -295,7 +296,7 @@ impl Asked<'_> {
     /// Between which returns any may be supposed.
     fn bounds(&self) -> [f64; 2] {
         let Interval { min, max } =
-            self.problem.support.unwrap_or(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
+            self.problem.support_rule().given().unwrap_or(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
         [min.max(-rules::LOG_RETURN), max.min(rules::LOG_RETURN)]
     }
 }

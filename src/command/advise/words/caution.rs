@@ -1,0 +1,82 @@
+//! The levels of caution, in a sentence and a table.
+
+use std::fmt::Write;
+
+use ballast::control::policy::levels::{LevelAdvised, LevelsAdvised};
+
+use super::percent;
+
+/// What the record paid beyond the bank, and how well that is known.
+pub fn premium(LevelsAdvised { premium_seen, standard_error, .. }: &LevelsAdvised, noun: &str) -> String {
+    let (seen, error) = (percent(premium_seen.abs(), 2), percent(*standard_error, 2));
+    match *premium_seen > 0.0 {
+        true => format!("The record beat the bank by {seen} a {noun}; the chance error of that is {error}."),
+        false => format!("The record paid {seen} a {noun} less than the bank; the chance error of that is {error}."),
+    }
+}
+
+/// What the level followed costs and spares in a year of so many periods, and what the others would.
+pub fn told(levels: &LevelsAdvised, periods: f64) -> String {
+    let a_year = |loss: f64| format!("{:.2} %", 100.0 * periods * loss.max(0.0));
+    let mut text = String::new();
+    if let Some(LevelAdvised { level, scale, regrets, spared, .. }) =
+        levels.levels.iter().find(|level| level.level == levels.followed)
+    {
+        let saved = if *spared < 0.0 { "costs" } else { "spares" };
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "Caution is {}: {} of the radius is acted on. If the premium is what the record shows and a standard error more,\n\
+             this costs {} a year beside the best share; if there is none, it {saved} {} a year beside trusting the record.\n",
+            level.name(),
+            percent(*scale, 0),
+            a_year(regrets[2]),
+            a_year(spared.abs()),
+        );
+    }
+    let [none, half, whole] = levels.premiums.map(|premium| percent(periods * premium, 1));
+    let _ = writeln!(text, "  {:<10}{:>9}{:>9}   costs a year if the premium is a year", "caution", "share", "hold");
+    let _ = writeln!(text, "  {:<28}   {none:>8}{half:>9}{whole:>9}", "");
+    for LevelAdvised { level, scale, regrets, allocation, .. } in &levels.levels {
+        let mark = if *level == levels.followed { "<" } else { "" };
+        let held = allocation.map_or("-".to_owned(), |share| percent(share, 1));
+        let [none, half, whole] = regrets.map(a_year);
+        let (name, share) = (level.name(), percent(*scale, 0));
+        let _ = writeln!(text, "  {name:<10}{share:>9}{held:>9}   {none:>8}{half:>9}{whole:>9}  {mark}");
+    }
+    text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n") + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use ballast::control::request::caution::CautionLevel;
+
+    use super::*;
+
+    #[test]
+    fn the_level_followed_is_told_with_its_price_and_the_others_beside() {
+        let level = |level, scale, allocation| LevelAdvised {
+            level,
+            scale,
+            regrets: [0.0001, 0.0002, 0.0003],
+            spared: 0.0004,
+            allocation: Some(allocation),
+        };
+        let levels = LevelsAdvised {
+            followed: CautionLevel::Balanced,
+            premium_seen: 0.005,
+            standard_error: 0.001,
+            premiums: [0.0, 0.003, 0.006],
+            levels: vec![
+                level(CautionLevel::Bold, 0.1, 0.7),
+                level(CautionLevel::Balanced, 0.2, 0.6),
+                level(CautionLevel::Paper, 1.0, 0.0),
+            ],
+        };
+        let told = told(&levels, 12.0);
+        // A regret of 0.0003 a month is 0.36 % a year, 0.0004 are 0.48 %.
+        assert!(told.contains("20 % of the radius") && told.contains("0.36 %") && told.contains("0.48 %"), "{told}");
+        let line = told.lines().find(|line| line.contains("balanced  ")).unwrap();
+        assert!(line.ends_with('<') && line.contains("60.0 %") && line.contains("0.12 %"), "{told}");
+    }
+}

@@ -1,0 +1,54 @@
+//! What each level of caution would advise, and what it costs.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::control::request::caution::{CautionLevel, CautionLevels};
+
+/// The levels of caution on a record.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct LevelsAdvised {
+    /// The one followed.
+    pub followed: CautionLevel,
+    /// Mean simple return of the record beyond the bank, per step.
+    pub premium_seen: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// The same beyond the bank in the three worlds that losses are told for: none, half, and the whole of the premium seen, or of 0
+    /// where it is negative, plus its standard error.
+    pub premiums: [f64; 3],
+    /// From the boldest to the paper's.
+    pub levels: Vec<LevelAdvised>,
+}
+
+/// A level, its share of the radius, its price, and what it would hold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct LevelAdvised {
+    /// Its name.
+    pub level: CautionLevel,
+    /// Share of the radius.
+    pub scale: f64,
+    /// Loss of log certainty equivalent per step beside the best share of the radius, in the three worlds.
+    pub regrets: [f64; 3],
+    /// Spared per step in the world without a premium, beside taking the record for the truth.
+    pub spared: f64,
+    /// Share of wealth that it would hold; null where that would take long to find, of several assets in long records.
+    pub allocation: Option<f64>,
+}
+
+impl LevelsAdvised {
+    /// Of levels that were found, of which `allocation` is advised at a share of the radius.
+    pub fn of(
+        found: &CautionLevels,
+        followed: CautionLevel,
+        mut allocation: impl FnMut(CautionLevel) -> Option<f64>,
+    ) -> Self {
+        let levels = CautionLevel::FOUND.into_iter().chain([CautionLevel::Paper]).filter_map(|level| {
+            let found = found.of(level)?;
+            let allocation = allocation(level);
+            Some(LevelAdvised { level, scale: found.scale, regrets: found.regrets, spared: found.spared, allocation })
+        });
+        let CautionLevels { premium_seen, standard_error, premiums, .. } = *found;
+        LevelsAdvised { followed, premium_seen, standard_error, premiums, levels: levels.collect() }
+    }
+}

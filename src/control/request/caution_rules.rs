@@ -1,0 +1,98 @@
+//! What a problem says of caution and of the returns that are thought possible, and the rules of both.
+
+use super::caution::{CautionLevel, LARGEST_SCALE};
+use super::framework::Framework;
+use super::radius_rule::RadiusRule;
+use super::rules;
+use super::specification::ProblemSpecification;
+use super::support::{FACTOR, Interval, LIMIT, Support};
+use crate::control::error::FieldError;
+
+impl ProblemSpecification {
+    /// The level given, or the default: the paper's where a radius is given, else `balanced`; `None` where there is no ball of which
+    /// to take a share.
+    pub fn caution_level(&self) -> Option<CautionLevel> {
+        let has_ball = matches!(self.framework, Framework::Adaptive | Framework::Static);
+        let usual = if self.radius.is_some() { CautionLevel::Paper } else { CautionLevel::Balanced };
+        has_ball.then(|| self.caution.unwrap_or(usual))
+    }
+
+    /// The same problem at the paper's caution, with every return possible, where neither is given.
+    #[must_use]
+    pub fn as_in_the_paper(mut self) -> Self {
+        self.caution.get_or_insert(CautionLevel::Paper);
+        self.support.get_or_insert(Support::None {});
+        self
+    }
+
+    /// Whether levels can be found: of a ball whose radius is that of the bridge.
+    pub fn takes_levels(&self) -> bool {
+        matches!(self.radius_rule(), RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. })
+            && self.caution_level().is_some()
+    }
+
+    /// The radius rule with the share of its radius that is acted on.
+    pub fn radius_in_force(&self) -> RadiusRule {
+        let level = self.caution_level().unwrap_or(CautionLevel::Paper);
+        let share = match level {
+            CautionLevel::Paper => 1.0,
+            CautionLevel::Scale(scale) => scale,
+            found => self.levels.as_ref().and_then(|levels| levels.of(found)).map_or(1.0, |level| level.scale),
+        };
+        self.radius_rule().scaled(share)
+    }
+
+    /// Checks the support.
+    ///
+    /// # Errors
+    /// It breaks a rule, or a return of the history lies outside of it.
+    pub fn check_support(&self) -> Result<(), FieldError> {
+        let Some(given) = self.support else { return Ok(()) };
+        if self.framework.is_parametric() {
+            let rule = "must be absent in the parametric frameworks: a normal law has no bounds";
+            return Err(FieldError::new("problem.support", "an object", rule));
+        }
+        check_support(given)?;
+        let Some(Interval { min, max }) = given.given() else { return Ok(()) };
+        match self.history.iter().enumerate().find(|&(_, z)| !(min..=max).contains(z)) {
+            Some((index, value)) => {
+                let rule = format!("must lie in problem.support, [{min}, {max}]");
+                Err(FieldError::new(format!("problem.history[{index}]"), value, rule))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks the level.
+    ///
+    /// # Errors
+    /// It is out of its bounds, or there is nothing of which to take a share.
+    pub fn check_caution(&self) -> Result<(), FieldError> {
+        if let Some(levels) = &self.levels {
+            let scales = [levels.bold, levels.balanced, levels.cautious, levels.paper].map(|level| level.scale);
+            scales.into_iter().try_for_each(|scale| rules::within("problem.levels", scale, 0.0, 1.0))?;
+        }
+        let Some(level) = self.caution else { return Ok(()) };
+        if let CautionLevel::Scale(scale) = level {
+            rules::within("problem.caution.scale", scale, 0.0, LARGEST_SCALE)?;
+        }
+        if level != CautionLevel::Paper && !self.takes_levels() {
+            let rule = "must be left out: it is a share of the radius of `bridge` or `calibrated`, in the frameworks `adaptive` \
+                        and `static`";
+            return Err(FieldError::new("problem.caution", level.name(), rule));
+        }
+        Ok(())
+    }
+}
+
+/// Checks the numbers of a support.
+///
+/// # Errors
+/// The first that breaks its rule.
+pub fn check_support(support: Support) -> Result<(), FieldError> {
+    match support {
+        Support::WorstSeen { factor } => rules::within("problem.support.factor", factor, FACTOR.0, FACTOR.1),
+        Support::None {} => Ok(()),
+        Support::Between { min, max } => rules::interval("problem.support", Interval { min, max }, -LIMIT, LIMIT),
+    }
+}

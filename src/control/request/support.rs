@@ -1,0 +1,127 @@
+//! Which log-returns the adversary may use.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Standard deviations on either side of the mean that `worst_seen` always considers, however calm the extremes seen.
+pub const LEAST_DEVIATIONS: f64 = 5.0;
+/// Bounds of a given support, and of any that follows from a record.
+pub const LIMIT: f64 = 20.0;
+/// Multiples of the worst return seen.
+pub const FACTOR: (f64, f64) = (1.0, 10.0);
+
+/// A closed interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Interval {
+    /// The lower end.
+    pub min: f64,
+    /// The upper end.
+    pub max: f64,
+}
+
+/// The log-returns that the laws in a ball may give mass to. Part of the law, as its radius is: under `worst_seen` it follows the
+/// returns seen so far.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Support {
+    /// From `min(factor z_min, m - 5 s)` to `max(factor z_max, m + 5 s)`, z_min and z_max the worst and the best log-return of the
+    /// law in the middle, m and s its mean and standard deviation; never narrower than from z_min to z_max.
+    WorstSeen {
+        /// Multiple of the worst and the best log-return, 1 to 10.
+        #[serde(default = "default_factor")]
+        factor: f64,
+    },
+    /// All log-returns: the paper's.
+    None {},
+    /// Those between two bounds, whatever is seen.
+    Between {
+        /// The lowest.
+        min: f64,
+        /// The highest.
+        max: f64,
+    },
+}
+
+impl Default for Support {
+    fn default() -> Self {
+        Support::WorstSeen { factor: default_factor() }
+    }
+}
+
+/// What a support is found from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// The lowest and the highest log-return.
+    pub ends: [f64; 2],
+    /// Of the log-returns, by their masses.
+    pub mean: f64,
+    /// Of the log-returns.
+    pub variance: f64,
+}
+
+impl Extent {
+    /// Of log-returns of equal mass.
+    pub fn of(log_returns: impl Iterator<Item = f64> + Clone) -> Self {
+        let count = log_returns.clone().count().max(1) as f64;
+        let mean = log_returns.clone().sum::<f64>() / count;
+        let variance = log_returns.clone().map(|z| (z - mean).powi(2)).sum::<f64>() / count;
+        let ends = [log_returns.clone().fold(f64::INFINITY, f64::min), log_returns.fold(f64::NEG_INFINITY, f64::max)];
+        Extent { ends, mean, variance }
+    }
+}
+
+impl Support {
+    /// The interval around a law of this extent; `None` where every return is allowed.
+    /// Checked by: `tests::twice_the_worst_or_five_deviations`.
+    pub fn around(self, law: Extent) -> Option<Interval> {
+        match self {
+            Support::WorstSeen { factor } => {
+                let [lowest, highest] = law.ends;
+                let reach = LEAST_DEVIATIONS * law.variance.max(0.0).sqrt();
+                let min = (factor * lowest).min(law.mean - reach).min(lowest).max(-LIMIT);
+                let max = (factor * highest).max(law.mean + reach).max(highest).min(LIMIT);
+                Some(Interval { min, max })
+            }
+            Support::None {} => None,
+            Support::Between { min, max } => Some(Interval { min, max }),
+        }
+    }
+
+    /// The bounds that hold whatever is seen.
+    pub fn given(self) -> Option<Interval> {
+        match self {
+            Support::Between { min, max } => Some(Interval { min, max }),
+            Support::WorstSeen { .. } | Support::None {} => None,
+        }
+    }
+}
+
+fn default_factor() -> f64 {
+    2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: of -0.1, 0.02 and 0.05 the mean is -0.01 and the variance 0.0042.
+    #[test]
+    fn twice_the_worst_or_five_deviations() {
+        let law = Extent::of([-0.1, 0.02, 0.05].into_iter());
+        assert!((law.mean + 0.01).abs() < 1e-15 && (law.variance - 0.0042).abs() < 1e-15);
+        let reach = 5.0 * 0.0042_f64.sqrt();
+        let ends = |support: Support| support.around(law).map(|Interval { min, max }| [min, max]).unwrap();
+        let [min, max] = ends(Support::default());
+        assert!((min + 0.01 + reach).abs() < 1e-12 && (max + 0.01 - reach).abs() < 1e-12);
+        let [min, max] = ends(Support::WorstSeen { factor: 8.0 });
+        assert!((min + 0.8).abs() < 1e-12 && (max - 0.4).abs() < 1e-12);
+        // A record that never fell, and one whose worst is further than five deviations.
+        let rose = Support::default().around(Extent::of([0.3, 0.30001].into_iter())).unwrap();
+        assert!(rose.min < 0.3 && rose.min > 0.2999 && rose.max > 0.6);
+        let crash = [-0.5].into_iter().chain((0..99).map(|k| if k % 2 == 0 { 0.01 } else { -0.01 }));
+        assert!((Support::default().around(Extent::of(crash)).unwrap().min + 1.0).abs() < 1e-12);
+        assert_eq!(Support::None {}.around(law), None);
+        assert_eq!(ends(Support::Between { min: -0.3, max: 0.2 }), [-0.3, 0.2]);
+    }
+}
