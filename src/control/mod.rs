@@ -7,7 +7,7 @@
 //!
 //! Folders from the lowest to the highest: `request` (what may be asked), `problem` (state, dynamics, utility),
 //! `uncertainty` (the set C), `assets` (one step with several assets), `surrogate` (what regresses V and the action), `bellman`
-//! (one step), `training` (all of them),
+//! (one step), `caution` (what share of the radius is acted on), `training` (all of them),
 //! `policy` (the document and how it answers), `evaluation` (strategies compared).
 //!
 //! | paper | name | printed as | file | checked by |
