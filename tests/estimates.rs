@@ -146,7 +146,8 @@ fn frontiers() {
     let question = |dates: usize, paths: usize| {
         let rows: Vec<Vec<f64>> = (0..dates).map(row).collect();
         let problem = json!({ "assets": assets, "rate_per_step": 0.002, "history": rows,
-            "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "bridge", "paths": paths } });
+            "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "bridge", "paths": paths },
+            "support": { "rule": "none" } });
         let request = json!({ "problem": problem, "scales": [0.3], "resamples": 20 });
         serde_json::from_value::<FrontierRequest>(request).unwrap().question().unwrap()
     };
