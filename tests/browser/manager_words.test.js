@@ -30,7 +30,7 @@ async function askFor({ rate, cost }) {
 }
 
 test("the first sentence of a policy says what it holds now, as a session of it is advised", async () => {
-  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY.map((value) => value + 0.01), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY.map((value) => value + 0.01), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 }, support: { rule: "none" } };
   const first = async (policy) => {
     await go(`#/policies/${policy}`);
     const words = page.locator(".words p").first();
