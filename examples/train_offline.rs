@@ -148,7 +148,7 @@ fn main() {
         "problem": {
             "horizon": 2, "rate_per_step": RATE, "utility": { "kind": "log" },
             "radius": { "rule": "root_n", "kappa": KAPPA },
-            "support": { "min": SUPPORT.0, "max": SUPPORT.1 },
+            "support": { "rule": "between", "min": SUPPORT.0, "max": SUPPORT.1 },
             "history": HISTORY
         },
         "design": { "count": 400 }
