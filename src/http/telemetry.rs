@@ -42,8 +42,8 @@ const UPKEEP: Duration = Duration::from_secs(5);
 
 /// Reads the histograms now and then, counts the connections, and tells of lines left out; without end.
 pub async fn keep_up(connections: Arc<Connections>) {
+    metrics::counter!(names::CONNECTIONS_REFUSED).increment(0);
     loop {
-        tokio::time::sleep(UPKEEP).await;
         for (phase, count) in connections.count() {
             metrics::gauge!(names::CONNECTIONS, "phase" => phase.name()).set(count as f64);
         }
@@ -54,6 +54,7 @@ pub async fn keep_up(connections: Arc<Connections>) {
         if let Some(recorder) = RECORDER.get().and_then(Option::as_ref) {
             recorder.run_upkeep();
         }
+        tokio::time::sleep(UPKEEP).await;
     }
 }
 
