@@ -59,7 +59,14 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
     let returns = arguments.record.read()?;
     let count = returns.rows().len();
     let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count, &arguments.record))?;
-    let told = || words::told(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
+    let told = || {
+        let coarser = returns.coarser().into_iter().filter_map(|returns| {
+            let advised = arguments.question(&returns).answer().ok()?;
+            Some((returns.noun(), advised.advice.allocation))
+        });
+        let text = words::told(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
+        words::told_of_coarser(text, &coarser.collect::<Vec<_>>())
+    };
     Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
 }
 

@@ -87,7 +87,7 @@ pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
         return Err(FieldError::new("--sizes", size, rule).into());
     }
     let CoverageArgs { alpha, records, seed, .. } = *arguments;
-    let bridge = |scale: f64| RadiusRule::Bridge { alpha, paths: PATHS, scale };
+    let bridge = |scale: f64| RadiusRule::Bridge { alpha, paths: PATHS, scale, correction: None };
     let rules = [bridge(0.0), bridge(0.5), bridge(1.0), RadiusRule::Calibrated { alpha, paths: PATHS, scale: 1.0 }];
     println!(
         "{:<22}{:>6}{:>20}{:>14}{:>24}{:>10}{:>28}{:>8}",

@@ -17,6 +17,7 @@ use calendar::{Calendar, SEVERAL, check};
 pub use error::ReturnsError;
 
 mod calendar;
+mod coarser;
 mod error;
 #[cfg(test)]
 mod tests;

@@ -137,6 +137,11 @@ impl Kept {
         self.0.things.contains_key(key)
     }
 
+    /// The thing of this key, if it is here.
+    pub fn get<T: Any + Send + Sync>(&self, key: &Key) -> Option<Arc<T>> {
+        self.0.things.get(key)?.value.downcast().ok()
+    }
+
     /// The thing of this key, made where it is not here. `bytes` is what it weighs, and what making it takes. What is
     /// made may not ask for anything kept.
     pub fn get_or_make<T: Any + Send + Sync>(&self, key: &Key, bytes: usize, make: impl FnOnce() -> T) -> Arc<T> {

@@ -49,6 +49,15 @@ impl AbsoluteBridges {
         statistics
     }
 
+    /// What |B| counts at each time in the statistic of a law.
+    pub(super) fn nodes(&self, law: &EmpiricalDistribution) -> Vec<f64> {
+        let mut weights = Weights::new(self);
+        for (pair, shares) in law.atoms().windows(2).zip(self.shares_of(law, Statistic::Now)) {
+            weights.place(&shares, pair[1] - pair[0]);
+        }
+        weights.weights.iter().zip(&self.units).map(|(weight, unit)| weight / unit).collect()
+    }
+
     /// Every gap of each law. Where all values weigh the same, gaps of all laws of a size count at the same times.
     fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Waiting> {
         let mut weights = Weights::new(self);

@@ -2,6 +2,7 @@
 
 pub mod block_bootstrap;
 pub mod bridge;
+pub mod bridge_law;
 pub mod bridge_paths;
 pub mod calibration;
 pub mod chebyshev;

@@ -11,7 +11,7 @@ use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
-use crate::control::policy::levels::LevelsAdvised;
+use crate::control::policy::levels::{LevelsAdvised, WhyNothing};
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
@@ -50,6 +50,9 @@ pub struct Advised {
     /// The levels of caution, where one of them is followed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<LevelsAdvised>,
+    /// Where nothing is held.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why_nothing: Option<WhyNothing>,
     /// How near it is to changing, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<Sensitivity>,
@@ -106,9 +109,10 @@ impl Checked {
         let (advice, worst_case) = investor.advise(self.holding)?;
         let sensitivity = self.asks_sensitivity.then(|| investor.sensitivity(self.holding, &advice)).transpose()?;
         let levels = investor.levels(self.holding)?;
+        let why_nothing = investor.why_nothing(self.holding, &advice)?;
         let (caution, problem) = (cautions(&advice, sensitivity.as_ref()), &self.specification.problem);
         let (annualised, warnings) = (problem.annualised(), problem.warnings());
-        Ok(Advised { advice, worst_case, caution, levels, sensitivity, annualised, warnings })
+        Ok(Advised { advice, worst_case, caution, levels, why_nothing, sensitivity, annualised, warnings })
     }
 }
 

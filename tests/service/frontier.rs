@@ -202,6 +202,8 @@ async fn what_cannot_be_tried_is_refused_by_name() {
         ("/problem/horizon", json!(2), "problem.horizon"),
         ("/problem/trading_cost", json!(0.01), "problem.trading_cost"),
         ("/problem/learning", json!({ "kind": "decay", "half_life": 20.0 }), "problem.learning"),
+        ("/problem/caution", json!("cautious"), "problem.caution"),
+        ("/problem/caution", json!({ "scale": 0.3 }), "problem.caution"),
         ("/problem/contributions", json!(1.0), "problem.contributions"),
         ("/problem/history", json!(history(11)), "problem.history"),
         ("/scales", json!([]), "scales"),

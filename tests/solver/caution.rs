@@ -12,6 +12,8 @@ use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::streams::stream;
 use rand::RngExt;
 
+use crate::support::policies::advisor;
+
 /// Log-returns of `count` periods.
 fn drawn(seed: usize, count: usize, mean: f64, deviation: f64) -> Vec<f64> {
     let mut random = stream(3, "caution test", seed, 0);
@@ -62,6 +64,42 @@ fn the_curve_is_the_advice_of_the_robust_step_at_every_radius() {
         }
     }
     assert!(inside > 30, "{inside}");
+}
+
+/// Nothing is held where the least mean among the laws of the ball pays no more than the bank, and only there: the slope of the robust
+/// step at 0, by another sum.
+#[test]
+fn nothing_is_held_where_no_premium_is_left() {
+    let mut nothing = 0;
+    for seed in 0..60 {
+        let history = drawn(seed, 12 + 3 * seed, 0.006, 0.04);
+        let support = [None, Some(Support::None {})][seed % 2];
+        let problem = ProblemSpecification {
+            horizon: 1,
+            support,
+            radius: Some(RadiusRule::scaled_bridge(0.1, 0.02 * seed as f64)),
+            ..ProblemSpecification::of(history, 0.002)
+        };
+        let specification = Specification::of(problem, 1).completed().unwrap();
+        let investor = OnePeriod::new(&specification, Kept::default());
+        let (advice, _) = investor.advise(0.0).unwrap();
+        let Some(why) = investor.why_nothing(0.0, &advice).unwrap() else {
+            assert!(advice.allocation > 0.0);
+            let advisor = advisor(serde_json::to_value(&specification).unwrap());
+            let left = advisor.worst_mean(&advisor.initial_state(None, None).unwrap()) - 1.002;
+            assert!(left > 0.0, "{seed}: {} held, {left} left", advice.allocation);
+            continue;
+        };
+        nothing += 1;
+        // To rounding.
+        assert!(why.premium_left < 1e-12, "{seed}: {why:?}");
+        let half = ProblemSpecification {
+            radius: Some(specification.problem.radius_rule().scaled(0.5)),
+            ..specification.problem
+        };
+        assert_eq!(why.at_half_the_caution, Some(advised(half)));
+    }
+    assert!((15..45).contains(&nothing), "{nothing}");
 }
 
 /// Shares of the radius that are simulated.
@@ -166,4 +204,57 @@ fn a_level_has_the_least_worst_regret_of_a_plain_simulation() {
         assert!(levels.bold.scale <= levels.balanced.scale && levels.balanced.scale <= levels.cautious.scale);
         assert_eq!(specification.levels(&Kept::new(1 << 30)), levels);
     }
+}
+
+/// Drawn over what is legal: few and heavy-tailed returns, banks that take and pay, any risk aversion, every support, radii from next
+/// to none to a whole deviation.
+#[test]
+fn the_curve_is_the_advice_on_problems_drawn_at_random() {
+    let (mut tried, mut further) = (0, 0);
+    for index in 0..1500_usize {
+        let mut random = stream(9, "random problems", index, 0);
+        let mut uniform = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+        let count = uniform(2.0, 90.0) as usize + 1;
+        let deviation = uniform(0.002_f64.ln(), 0.5_f64.ln()).exp();
+        let mean = deviation * uniform(-0.3, 0.8);
+        let history: Vec<f64> = (0..count)
+            .map(|_| {
+                let normal = (0..12).map(|_| uniform(0.0, 1.0)).sum::<f64>() - 6.0;
+                let heavy = if uniform(0.0, 1.0) < 0.05 { 6.0 } else { 1.0 };
+                (mean + deviation * normal * heavy).clamp(-4.9, 4.9)
+            })
+            .collect();
+        let utility = match index % 3 {
+            0 => UtilitySpecification::Log {},
+            1 => UtilitySpecification::Power { risk_aversion: uniform(1.05_f64.ln(), 100_f64.ln()).exp() },
+            _ => UtilitySpecification::exponential(uniform(0.01_f64.ln(), 100_f64.ln()).exp() / 100.0),
+        };
+        let support =
+            [Support::default(), Support::None {}, Support::WorstSeen { factor: uniform(1.0, 10.0) }][index / 3 % 3];
+        let (highest, rate) = (uniform(0.05, 1.0), uniform(-0.02, 0.05));
+        let highest = if index % 2 == 0 { 1.0 } else { highest };
+        let problem = ProblemSpecification {
+            horizon: 1,
+            utility,
+            action_interval: [0.0, highest],
+            support: Some(support),
+            ..ProblemSpecification::of(history.clone(), rate)
+        };
+        // A deviation or a risk aversion that no request may have.
+        if Specification::of(problem.clone(), 1).completed().is_err() {
+            continue;
+        }
+        let centre = Centring::of(&problem).centre(&EmpiricalDistribution::new(&history));
+        let relative = RelativeUtility::new(utility, 100.0 * (1.0 + rate));
+        let curve = AllocationCurve::of(&centre, Investor { bank: 1.0 + rate, utility: relative, highest, support });
+        let radius = deviation * uniform(0.003_f64.ln(), 1.0_f64.ln()).exp();
+        let exact = advised(ProblemSpecification { radius: Some(RadiusRule::Fixed { radius }), ..problem.clone() });
+        let read = curve.at(radius);
+        let off = (read - exact).abs() / highest;
+        // Of the highest: a twenty-fourth lies between two allocations of which the radius is known.
+        assert!(off < 1.0 / 24.0, "{index} {problem:?} {radius}: {read} {exact}");
+        tried += 1;
+        further += usize::from(off > 0.5 / 24.0);
+    }
+    assert!(tried > 1400 && 100 * further < tried, "{further} of {tried}");
 }

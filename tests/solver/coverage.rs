@@ -58,7 +58,7 @@ fn two_returns_are_held_as_often_as_the_binomial_law_says() {
 fn intervals_of_coverage_hold_for_other_seeds_too() {
     let law = DrawnLaw::Continuous(ContinuousLaw::mixture(vec![(1.0, 0.01, 0.1)]));
     let covered = |seed: u64| {
-        let rules = vec![RadiusRule::Bridge { alpha: 0.1, paths: 100, scale: 1.0 }];
+        let rules = vec![RadiusRule::Bridge { alpha: 0.1, paths: 100, scale: 1.0, correction: None }];
         let question = CoverageQuestion { records: 100, seed, ..question(rules) };
         coverage(&law, &question).unwrap()[0].covered.value
     };
@@ -91,7 +91,10 @@ fn a_centre_mixed_with_the_law_itself_is_nearer_by_the_share_that_was_seen() {
 fn calibrated_balls_hold_a_law_that_no_record_was_smoothed_from() {
     let law = DrawnLaw::Continuous(ContinuousLaw::mixture(vec![(1.0, 0.01, 0.1)]));
     let (alpha, paths, scale) = (0.1, 500, 1.0);
-    let rules = vec![RadiusRule::Bridge { alpha, paths, scale }, RadiusRule::Calibrated { alpha, paths, scale }];
+    let rules = vec![
+        RadiusRule::Bridge { alpha, paths, scale, correction: None },
+        RadiusRule::Calibrated { alpha, paths, scale },
+    ];
     let found = coverage(&law, &CoverageQuestion { records: 1000, ..question(rules) }).unwrap();
     let [bridge, calibrated] = [0, 1].map(|rule: usize| found[rule].covered.value);
     // Four standard errors of a share of 1000 records around 90 %; the bridge alone falls short by more than that.

@@ -26,7 +26,7 @@ fn request(seed: u64, count: usize) -> Value {
     let history: Vec<f64> = (0..20).map(|k| 0.011 + 0.1 * f64::from(7 * k % 20 - 10) / 10.0).collect();
     json!({
         "problem": { "horizon": 2, "rate_per_step": 0.002, "history": history, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
-            "radius": { "rule": "bridge", "alpha": 0.5, "paths": 200, "scale": 0.3 } },
+            "radius": { "rule": "bridge", "alpha": 0.5, "scale": 0.3 } },
         "design": { "count": count, "initial_laws": "resampled", "sampling_law": { "kind": "gaussian_mixture",
             "components": [ { "weight": 0.4, "mean": 0.006, "variance": 0.016 },
                             { "weight": 0.6, "mean": 0.016, "variance": 0.00625 } ] } },

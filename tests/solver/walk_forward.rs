@@ -113,7 +113,7 @@ fn a_period_at_the_volatility_of_now_is_that_of_advice_alone() {
     for (start, decision) in decisions.iter().enumerate() {
         let past = &periods[start..start + walk.window];
         let specification = walk.specification(Framework::Adaptive, 0.9, past).completed().unwrap();
-        let (advice, _) = OnePeriod::new(&specification, Kept::default()).advise(0.0).unwrap();
+        let (advice, _) = OnePeriod::new(&specification, Kept::default()).resolved().advise(0.0).unwrap();
         assert!(
             (decision.band.high - advice.allocation).abs() < 1e-9 && decision.radius == advice.radius,
             "{decision:?} {advice:?}"

@@ -21,7 +21,7 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
         return text + &advised.worst_case.sentence;
     }
     text += &format!("{}\n\n", why(advised, noun));
-    for (name, figure, meaning) in figures(advice, wealth, noun) {
+    for (name, figure, meaning) in figures(advised, wealth, noun) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {name:<22}{figure:>14}  {meaning}");
     }
@@ -32,6 +32,16 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
         text += &format!("\n{sentence}");
     }
     text.trim_end().to_owned()
+}
+
+/// The same with what the record would advise by longer periods, where it was asked.
+pub fn told_of_coarser(text: String, coarser: &[(&str, f64)]) -> String {
+    if coarser.is_empty() {
+        return text;
+    }
+    let of = |(noun, share): &(&str, f64)| format!("{} by {noun}s", percent(*share, 1));
+    let shares: Vec<String> = coarser.iter().map(of).collect();
+    format!("{text}\n\nThe same record would say {}. Give returns as far apart as you decide.", shares.join(", "))
 }
 
 /// How near the advice is to changing, where that was asked for, and what to be careful about.
@@ -89,11 +99,11 @@ fn trade(advice: &Advice, wealth: f64) -> String {
     format!("{verb} for {}: {held} is held now.", money(change * wealth))
 }
 
-fn why(Advised { advice, worst_case, levels, .. }: &Advised, noun: &str) -> String {
+fn why(Advised { advice, worst_case, why_nothing, .. }: &Advised, noun: &str) -> String {
     let among = format!("Against the worst law in the ball around the {} returns", advice.sample_size);
     if advice.allocation <= 0.0 {
-        let premium = levels.as_ref().map_or(String::new(), |levels| format!("\n{}", caution::premium(levels, noun)));
-        return format!("{among}, nothing beats the bank.{premium}");
+        let why = why_nothing.as_ref().map_or(String::new(), |why| format!("\n{}", caution::why_nothing(why, noun)));
+        return format!("{among}, nothing beats the bank.{why}");
     }
     format!(
         "{among}, that is worth {} for certain at the end of the {noun};\nthe bank alone reaches {}. {}",
@@ -121,8 +131,14 @@ fn worst(worst: &WorstCase, noun: &str) -> String {
 }
 
 /// Name, figure and meaning.
-fn figures(advice: &Advice, wealth: f64, noun: &str) -> Vec<(&'static str, String, String)> {
-    let mut rows = vec![("allocation", percent(advice.allocation, 2), "of wealth in the risky asset".to_owned())];
+fn figures(Advised { advice, levels, .. }: &Advised, wealth: f64, noun: &str) -> Vec<(&'static str, String, String)> {
+    let error = levels.as_ref().and_then(|levels| levels.levels.iter().find_map(|level| level.allocation_error));
+    let (decimals, known) = match error.filter(|error| *error >= 5e-5) {
+        Some(error) => (1, format!(", give or take {:.1} by the simulation of its caution", 100.0 * error)),
+        None => (2, String::new()),
+    };
+    let of_wealth = format!("of wealth in the risky asset{known}");
+    let mut rows = vec![("allocation", percent(advice.allocation, decimals), of_wealth)];
     if advice.band.low < advice.band.high {
         let (low, high) = (percent(advice.band.low, 1), percent(advice.band.high, 1));
         rows.push(("band", format!("{low} to {high}"), "a share held between is best kept as it is".into()));
@@ -212,7 +228,8 @@ mod tests {
         let falling = told(&[-0.01, -0.03], 0.5, 0.0);
         let first = "Hold nothing in the risky asset through the coming week: keep all wealth in the bank. Sell for \
                      1000.00: 50.0 % is held now.\nAgainst the worst law in the ball around the 2 returns, nothing beats \
-                     the bank.\nThe record paid 2.08 % a week less than the bank; the chance error of that is 0.98 %.\n\n";
+                     the bank.\nThe record paid 2.08 % a week less than the bank; the chance error of that is 0.98 %.\nHalf \
+                     the caution would hold nothing either.\n\n";
         assert!(falling.starts_with(first), "{falling}");
         assert!(told(&[-0.01, -0.03], 0.0, 0.0).contains("bank. Nothing is to be traded: nothing is held now.\n"));
         assert!(!falling.contains("band"), "{falling}");

@@ -89,7 +89,7 @@ pub fn run(bench: &AccuracyBench) -> Result<(), Box<dyn Error>> {
 
 fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     let mut base = paper::specification(bench.sample_size, bench.horizon, 1000, InitialLaws::Resampled).completed()?;
-    base.problem.radius = Some(RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 });
+    base.problem.radius = Some(RadiusRule::bridge(bench.alpha));
     base.problem.trading_cost = bench.trading_cost;
     base.problem.contributions = Contributions::Each(bench.contribution);
     base.seed = bench.seed;

@@ -105,7 +105,7 @@ fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2])
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
         let seen = EmpiricalDistribution::new(&history);
-        let quantile = |sets: &RadiusEstimator| sets.measure(&seen).quantile.map_or(f64::NAN, |found| found.value);
+        let quantile = |sets: &RadiusEstimator| sets.measure(&seen).quantile.unwrap_or(f64::NAN);
         let seed = stream(request.seed, "reproduce-seek", index / GROUP, 1).random();
         let own = Specification { seed, ..specification.clone() };
         (quantile(&sets), quantile(&RadiusEstimator::new(&own, kept.clone())), history)

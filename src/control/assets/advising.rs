@@ -44,7 +44,7 @@ pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f6
 /// Of each asset, what no log-return is moved below.
 pub fn floors(support: Support, rows: &[Vec<f64>]) -> Vec<f64> {
     let of = |asset: usize| {
-        let extent = Extent::of(rows.iter().map(|row| row[asset]));
+        let extent = || Extent::of(rows.iter().map(|row| row[asset]));
         support.around(extent).map_or(f64::NEG_INFINITY, |support| support.min)
     };
     (0..rows.first().map_or(0, Vec::len)).map(of).collect()
@@ -69,8 +69,8 @@ fn step_above(
 
 impl AssetsAdvice {
     /// The advice for `problem`, whose fund of inverse volatilities is `fund`.
-    /// Cost: that of its levels of caution, where one is followed, and that of [`AssetsStep::solve`], twice where a return may fall below those seen, and of the joint factor under `bridge`
-    /// and `calibrated`.
+    /// Cost: that of its levels of caution, where one is followed; that of [`AssetsStep::solve`], twice where a return may fall below
+    /// those seen, and once for each level of a short record; and of the joint factor under `bridge` and `calibrated`.
     /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     ///
@@ -80,7 +80,9 @@ impl AssetsAdvice {
         let rows = &problem.history;
         let radius_factor = radius_factor(problem, fund.problem(), fund.seed());
         let fund = fund.within(radius_factor).resolved();
-        let (radius, whole) = (fund.radius()?, fund.at(CautionLevel::Paper).radius()?);
+        let radius = fund.radius()?;
+        let levels = fund.problem().levels.as_ref().zip(fund.problem().caution);
+        let whole = levels.map(|_| fund.at(CautionLevel::Paper).radius()).transpose()?.unwrap_or(radius);
         let fund = fund.problem();
         let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve(None);
@@ -93,10 +95,11 @@ impl AssetsAdvice {
                 .iter()
                 .sum()
         });
-        let levels = fund.levels.as_ref().zip(fund.caution).map(|(found, followed)| {
-            let at = |level: CautionLevel| {
-                let share = found.of(level).filter(|_| rows.len() * problem.assets.len() <= SOLVED_BY_LEVEL)?.scale;
-                Some(step(problem, fund, rows, share * whole).solve(Some(&solution)).allocation.iter().sum())
+        let levels = levels.map(|(found, followed)| {
+            let at = |share: f64| {
+                let is_short = rows.len() * problem.assets.len() <= SOLVED_BY_LEVEL;
+                is_short
+                    .then(|| step(problem, fund, rows, share * whole).solve(Some(&solution)).allocation.iter().sum())
             };
             LevelsAdvised::of(found, followed, at)
         });

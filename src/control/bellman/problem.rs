@@ -9,7 +9,6 @@ use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
-use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
 use crate::control::request::support::{Extent, Support};
@@ -115,7 +114,7 @@ impl Problem {
     /// return. A surrogate that is off by little may advise it; the step solved anew never does.
     pub fn is_ruined(&self, radius: f64, allocation: f64) -> bool {
         let problem = &self.specification.problem;
-        let has_ball = matches!(problem.framework, Framework::Adaptive | Framework::Static) && radius > 0.0;
+        let has_ball = problem.framework.has_ball() && radius > 0.0;
         let is_power = matches!(problem.utility, UtilitySpecification::Power { .. });
         has_ball && is_power && problem.support_rule() == (Support::None {}) && allocation >= 1.0
     }
@@ -153,6 +152,14 @@ impl Problem {
     /// Radius of the uncertainty set at a state.
     pub fn radius(&self, state: &State) -> f64 {
         if self.learns() { self.sets.radius(&state.law) } else { self.frozen().measure.radius }
+    }
+
+    /// The least mean of e^Z, Z the return, among the laws of a state's ball.
+    pub fn worst_mean(&self, state: &State) -> f64 {
+        let law = &state.law;
+        let lowest = self.lowest_return(|| extent(law, CentralMoments::of(law), None));
+        let radius = self.sets.of_returns(self.radius(state), law.effective_size());
+        ExponentialMean::of(law).worst(radius, lowest).mean
     }
 
     /// The radius of a state and what it is made of.
@@ -235,7 +242,7 @@ impl Problem {
     /// The same of one law within each of `radii`.
     fn summaries(&self, law: &EmpiricalDistribution, radii: &[Radii]) -> Vec<LawSummary> {
         let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law));
-        let lowest = self.lowest_return(extent(law, moments, None));
+        let lowest = self.lowest_return(|| extent(law, moments, None));
         let of_returns = |radius: f64| self.sets.of_returns(radius, law.effective_size());
         radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(of_returns(radii.radius), lowest))).collect()
     }
@@ -253,7 +260,7 @@ impl Problem {
         let (mean, [size, _]) = (ExponentialMean::of(law), law.effective_sizes_ahead());
         let features = |(&log_return, radii): (&f64, Radii)| {
             let moments = before.with(log_return);
-            let lowest = self.lowest_return(extent(law, moments, Some(log_return)));
+            let lowest = self.lowest_return(|| extent(law, moments, Some(log_return)));
             let worst = mean.worst_with(log_return, self.sets.of_returns(radii.radius, size), lowest);
             self.selection.of(total, &self.summary(moments, radii, worst))
         };
@@ -267,7 +274,7 @@ impl Problem {
     }
 
     /// Below which no return seen is moved.
-    fn lowest_return(&self, law: Extent) -> f64 {
+    fn lowest_return(&self, law: impl FnOnce() -> Extent) -> f64 {
         self.specification.problem.support_rule().around(law).map_or(f64::NEG_INFINITY, |support| support.min)
     }
 }

@@ -11,13 +11,14 @@
 //!
 //!   g  =  E[ U'(w) (e^Z / (1 + r) - 1) ],
 //!
-//! falls; a is advised at the radius where g is 0. Sums over the atoms below each are made once for an allocation, so that a point of
+//! falls; a is advised at the radius where g is 0, and at every radius where it stays above. Sums over the atoms below each are made once for an allocation, so that a point of
 //! the path costs two binary searches.
 //!
-//! Checked by: `tests/solver/caution.rs` against the robust step.
+//! Checked by: `tests/solver/caution.rs` against the robust step, on problems drawn at random: of 1,500 all but 1 in 100 lie within
+//! half of the distance of two allocations, and all within one.
 
 use crate::control::problem::utility::RelativeUtility;
-use crate::control::request::support::Support;
+use crate::control::request::support::{LIMIT, Support};
 use crate::control::uncertainty::centre::Centre;
 
 /// Allocations at which the radius is found.
@@ -26,8 +27,6 @@ const ALLOCATIONS: usize = 24;
 const LEAST_ALLOCATION: f64 = 1e-4;
 /// Halvings of the path: to a millionth of it.
 const HALVINGS: usize = 20;
-/// The lowest return where the support has no bound: nothing is left of the asset.
-const LOWEST: f64 = -20.0;
 
 /// Radii from the largest to 0, and the allocation advised at each; between them it is linear.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,7 +67,7 @@ impl AllocationCurve {
     /// Of a law. Cost: 24 allocations times its atoms.
     pub fn of(centre: &Centre, investor: Investor) -> Self {
         let growths: Vec<f64> = centre.atoms.iter().map(|z| z.exp() / investor.bank).collect();
-        let lowest = investor.support.around(centre.extent()).map_or(LOWEST, |support| support.min);
+        let lowest = investor.support.around(|| centre.extent()).map_or(-LIMIT, |support| support.min);
         let (mut allocations, mut radii): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut before = (0.0, 0.0);
         for index in 0..=ALLOCATIONS {
@@ -104,7 +103,7 @@ impl AllocationCurve {
             all if all == self.radii.len() => self.allocations[all - 1],
             _ => {
                 let [upper, lower] = [self.radii[above - 1], self.radii[above]];
-                let part = if upper > lower { (upper - radius) / (upper - lower) } else { 1.0 };
+                let part = if upper.is_finite() { (upper - radius) / (upper - lower) } else { 0.0 };
                 self.allocations[above - 1] + part * (self.allocations[above] - self.allocations[above - 1])
             }
         }
@@ -143,7 +142,7 @@ impl<'a> Sums<'a> {
         [utility, marginal * self.allocation * growth, marginal * (growth - 1.0)]
     }
 
-    /// The radius at which g is 0, g being above 0 without one.
+    /// The radius at which g is 0, g being above 0 without one; infinite where even the lowest return allowed beats the bank.
     fn radius(&self) -> f64 {
         let highest = self.atoms[self.atoms.len() - 1];
         let steepest = self.investor.utility.steepest(1.0 - self.allocation) / self.allocation * self.investor.bank;
@@ -156,6 +155,9 @@ impl<'a> Sums<'a> {
             self.moved(place, at, price)
         };
         let (mut within, mut beyond) = (0.0, 2.0);
+        if moved(beyond)[1] > 0.0 {
+            return f64::INFINITY;
+        }
         for _ in 0..HALVINGS {
             let between = 0.5 * (within + beyond);
             if moved(between)[1] > 0.0 { within = between } else { beyond = between }

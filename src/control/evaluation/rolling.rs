@@ -167,7 +167,7 @@ impl WalkForward {
                 utility: self.utility(),
                 centre: self.centre.clone(),
                 radius: Some(RadiusRule::scaled_bridge(alpha, self.scale)),
-                caution: matches!(framework, Framework::Adaptive | Framework::Static).then_some(self.caution),
+                caution: framework.has_ball().then_some(self.caution),
                 support: Some(self.support),
                 ..ProblemSpecification::of(
                     past.iter().map(|period| period.log_return).collect(),

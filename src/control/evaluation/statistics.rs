@@ -139,7 +139,7 @@ impl Table<'_> {
             difference: (index != self.reference).then(|| self.difference(index)),
             histogram: binned(utilities.iter().copied(), self.edges),
             periods: follower.map(|_| self.periods(index)),
-            coverage: follower.filter(|follower| has_ball(follower.framework)).map(|_| self.coverage(index)),
+            coverage: follower.filter(|follower| follower.framework.has_ball()).map(|_| self.coverage(index)),
             resolved_share: follower.map(|_| share(self.lived(index), |lived| lived.resolved)),
         })
     }
@@ -256,7 +256,7 @@ impl Table<'_> {
                 sample_size: problem.history.len() + step,
                 all_bank_share: banked as f64 / allocations.len() as f64,
                 allocation: spread(allocations),
-                radius: has_ball(self.followers[index].framework).then(|| radius_spread(radii)),
+                radius: self.followers[index].framework.has_ball().then(|| radius_spread(radii)),
             }
         };
         (0..problem.horizon).map(period).collect()
@@ -308,11 +308,6 @@ fn relative_utility(problem: &ProblemSpecification) -> (RelativeUtility, f64) {
 fn sentence(strategy: &StrategyReport) -> Option<String> {
     let OwnMix { allocation, beyond: Estimate { value, low, high } } = strategy.own_mix?;
     Some(beside_own_mix(&strategy.strategy, allocation, value, [low, high], "these paths do"))
-}
-
-/// True where the framework's uncertainty set is a Wasserstein ball.
-fn has_ball(framework: Framework) -> bool {
-    matches!(framework, Framework::Adaptive | Framework::Static)
 }
 
 /// The derivative at `value` of wealth over the floor, exp(u^{-1}).

@@ -65,10 +65,9 @@ pub struct Uncertainty {
     pub effective_size: f64,
     /// Raw moments of the law learned, first to the specification's count.
     pub moments: Vec<f64>,
-    /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`.
+    /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`. Under `bridge`
+    /// it is exact for the history of the policy, and simulated in proportion to that after returns were learned.
     pub quantile: Option<f64>,
-    /// Simulation standard error of the quantile.
-    pub quantile_standard_error: Option<f64>,
     /// As in an advice.
     pub radius: f64,
 }

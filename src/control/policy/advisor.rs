@@ -325,6 +325,11 @@ impl Advisor {
         same_law && same_wealth
     }
 
+    /// The least mean of e^Z, Z the return, among the laws of a state's ball.
+    pub fn worst_mean(&self, state: &State) -> f64 {
+        self.problem.worst_mean(state)
+    }
+
     /// Sample size, moments, quantile and radius of a state.
     pub fn uncertainty(&self, state: &State) -> Uncertainty {
         let Measure { radius, quantile } = self.problem.measure(state);
@@ -332,8 +337,7 @@ impl Advisor {
             sample_size: state.law.sample_size(),
             effective_size: state.law.effective_size(),
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),
-            quantile: quantile.map(|found| found.value),
-            quantile_standard_error: quantile.map(|found| found.standard_error),
+            quantile,
             radius,
         }
     }

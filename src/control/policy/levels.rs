@@ -3,7 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::control::request::caution::{CautionLevel, CautionLevels};
+use crate::control::request::caution::{CautionLevel, CautionLevels, CautionScale};
 
 /// The levels of caution on a record.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -34,19 +34,36 @@ pub struct LevelAdvised {
     pub spared: f64,
     /// Share of wealth that it would hold; null where that would take long to find, of several assets in long records.
     pub allocation: Option<f64>,
+    /// Its standard error, of the simulation behind the level; of the level followed alone.
+    pub allocation_error: Option<f64>,
+}
+
+/// Why an advice holds nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct WhyNothing {
+    /// Mean simple return of the record beyond the bank, per step.
+    pub premium_seen: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something.
+    pub premium_left: f64,
+    /// Share of wealth that would be held within half of the radius; null where the radius is not simulated.
+    pub at_half_the_caution: Option<f64>,
 }
 
 impl LevelsAdvised {
-    /// Of levels that were found, of which `allocation` is advised at a share of the radius.
-    pub fn of(
-        found: &CautionLevels,
-        followed: CautionLevel,
-        mut allocation: impl FnMut(CautionLevel) -> Option<f64>,
-    ) -> Self {
+    /// Of levels that were found; `allocation` is what is advised at a share of the radius.
+    pub fn of(found: &CautionLevels, followed: CautionLevel, mut allocation: impl FnMut(f64) -> Option<f64>) -> Self {
         let levels = CautionLevel::FOUND.into_iter().chain([CautionLevel::Paper]).filter_map(|level| {
-            let found = found.of(level)?;
-            let allocation = allocation(level);
-            Some(LevelAdvised { level, scale: found.scale, regrets: found.regrets, spared: found.spared, allocation })
+            let CautionScale { scale, standard_error, regrets, spared } = found.of(level)?;
+            let mut beside = |error: f64| allocation((scale + error).clamp(0.0, 1.0));
+            let allocation_error = match level == followed {
+                true => {
+                    beside(standard_error).zip(beside(-standard_error)).map(|(more, less)| 0.5 * (more - less).abs())
+                }
+                false => None,
+            };
+            Some(LevelAdvised { level, scale, regrets, spared, allocation: beside(0.0), allocation_error })
         });
         let CautionLevels { premium_seen, standard_error, premiums, .. } = *found;
         LevelsAdvised { followed, premium_seen, standard_error, premiums, levels: levels.collect() }

@@ -4,12 +4,13 @@
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use super::document::Policy;
-use super::levels::LevelsAdvised;
+use super::levels::{LevelsAdvised, WhyNothing};
 use super::sensitivity::{Sensitivity, check_learning};
 use super::worst_case::WorstCase;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::problem::state::State;
+use crate::control::request::annualised::premium;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::{ProblemSpecification, Specification};
@@ -58,7 +59,7 @@ impl OnePeriod {
         self.advisor.specification().seed
     }
 
-    /// What each level would advise, where they were found. Cost: four robust steps.
+    /// What each level would advise, where they were found. Cost: six robust steps.
     ///
     /// # Errors
     /// As [`Self::advise`].
@@ -66,8 +67,30 @@ impl OnePeriod {
         let problem = self.problem();
         let (Some(found), Some(followed)) = (&problem.levels, problem.caution) else { return Ok(None) };
         let state = self.state(holding)?;
-        let at = |level: CautionLevel| Some(self.at(level).advisor.advise(0, &state, AdviceMode::Resolve).allocation);
+        let at = |share: f64| {
+            Some(self.at(CautionLevel::Scale(share)).advisor.advise(0, &state, AdviceMode::Resolve).allocation)
+        };
         Ok(Some(LevelsAdvised::of(found, followed, at)))
+    }
+
+    /// Why `advice` holds nothing, where it does and its set is a ball. Cost: a robust step.
+    ///
+    /// # Errors
+    /// As [`Self::advise`].
+    pub fn why_nothing(&self, holding: f64, advice: &Advice) -> Result<Option<WhyNothing>, FieldError> {
+        let problem = self.problem();
+        if advice.allocation > 0.0 || !problem.framework.has_ball() {
+            return Ok(None);
+        }
+        let state = self.state(holding)?;
+        let (premium_seen, standard_error) = premium(&problem.history, problem.rate_per_step);
+        let half = || self.within(0.5).advisor.advise(0, &state, AdviceMode::Resolve).allocation;
+        Ok(Some(WhyNothing {
+            premium_seen,
+            standard_error,
+            premium_left: self.advisor.worst_mean(&state) - (1.0 + problem.rate_per_step),
+            at_half_the_caution: (problem.radius_rule().paths() > 0).then(half),
+        }))
     }
 
     /// Bytes of the bridges that its radius asks for.

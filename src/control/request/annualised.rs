@@ -49,6 +49,17 @@ pub fn deviation(log_returns: &[f64]) -> f64 {
     CentralMoments::of(&EmpiricalDistribution::new(log_returns)).variance().sqrt()
 }
 
+/// Mean of simple returns `e^z - 1` beyond the bank's, and its standard error `s / sqrt(n)`, s the sample deviation.
+///
+/// Checked by: `a_premium_and_its_error_by_hand`.
+pub fn premium(log_returns: &[f64], rate: f64) -> (f64, f64) {
+    let count = log_returns.len() as f64;
+    let simple = || log_returns.iter().map(|z| z.exp_m1());
+    let mean = simple().sum::<f64>() / count;
+    let square = simple().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (mean - rate, (square / count).sqrt())
+}
+
 /// A simple return earned `periods` times over.
 pub fn compounded(simple_return: f64, periods: f64) -> f64 {
     (periods * simple_return.ln_1p()).exp_m1().min(f64::MAX)
@@ -57,6 +68,13 @@ pub fn compounded(simple_return: f64, periods: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of 0.2 and -0.1 the mean is 0.05, and the squares about it sum to 0.045: the sample variance, of which half is under the root.
+    #[test]
+    fn a_premium_and_its_error_by_hand() {
+        let (premium, error) = premium(&[1.2_f64.ln(), 0.9_f64.ln()], 0.01);
+        assert!((premium - 0.04).abs() < 1e-15 && (error - 0.0225_f64.sqrt()).abs() < 1e-15);
+    }
 
     /// Prices that go up by a fifth or down by a tenth, each half of the time: 5 % on average. In two periods wealth grows by
     /// 1.05^2, the bank's by 1.01^2; a return lies 15 % off its mean, so that a sample of two deviates by sqrt(2) as much.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::caution::CautionLevel;
-use super::caution_rules::check_support;
+use super::caution_rules::{check_support, check_within};
 use super::contributions::Contributions;
 use super::framework::Framework;
 use super::fund::{CompositionRule, FundSpecification, GroundNorm};
@@ -14,7 +14,7 @@ use super::learning::Learning;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::{InitialLaws, ProblemSpecification, Specification, UtilitySpecification, defaults};
-use super::support::{Interval, Support};
+use super::support::Support;
 use super::text::check_text;
 use crate::control::error::FieldError;
 use crate::numerics::fund_bridges::fund_returns;
@@ -178,11 +178,9 @@ pub fn check_rows(
     }
     let Some(support) = support else { return Ok(()) };
     check_support(support)?;
-    let Some(Interval { min, max }) = support.given() else { return Ok(()) };
     for (date, row) in rows.iter().enumerate() {
-        if let Some(asset) = row.iter().position(|z| !(min..=max).contains(z)) {
-            let rule = format!("must lie in problem.support, [{min}, {max}]");
-            return Err(FieldError::new(format!("{named}[{date}][{asset}]"), row[asset], rule));
+        for (asset, &value) in row.iter().enumerate() {
+            check_within(support, || format!("{named}[{date}][{asset}]"), value)?;
         }
     }
     Ok(())

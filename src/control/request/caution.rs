@@ -67,6 +67,8 @@ pub struct CautionLevels {
 pub struct CautionScale {
     /// Share of the radius.
     pub scale: f64,
+    /// Its standard error, of the simulation of records.
+    pub standard_error: f64,
     /// Loss beside the best share in each of the three worlds: without a premium, with half, and with the whole.
     pub regrets: [f64; 3],
     /// Spared beside taking the record for the truth, in the world without a premium.

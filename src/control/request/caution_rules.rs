@@ -1,7 +1,6 @@
 //! What a problem says of caution and of the returns that are thought possible, and the rules of both.
 
 use super::caution::{CautionLevel, LARGEST_SCALE};
-use super::framework::Framework;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::ProblemSpecification;
@@ -12,9 +11,8 @@ impl ProblemSpecification {
     /// The level given, or the default: the paper's where a radius is given, else `balanced`; `None` where there is no ball of which
     /// to take a share.
     pub fn caution_level(&self) -> Option<CautionLevel> {
-        let has_ball = matches!(self.framework, Framework::Adaptive | Framework::Static);
         let usual = if self.radius.is_some() { CautionLevel::Paper } else { CautionLevel::Balanced };
-        has_ball.then(|| self.caution.unwrap_or(usual))
+        self.framework.has_ball().then(|| self.caution.unwrap_or(usual))
     }
 
     /// The same problem at the paper's caution, with every return possible, where neither is given.
@@ -53,14 +51,8 @@ impl ProblemSpecification {
             return Err(FieldError::new("problem.support", "an object", rule));
         }
         check_support(given)?;
-        let Some(Interval { min, max }) = given.given() else { return Ok(()) };
-        match self.history.iter().enumerate().find(|&(_, z)| !(min..=max).contains(z)) {
-            Some((index, value)) => {
-                let rule = format!("must lie in problem.support, [{min}, {max}]");
-                Err(FieldError::new(format!("problem.history[{index}]"), value, rule))
-            }
-            None => Ok(()),
-        }
+        let mut seen = self.history.iter().enumerate();
+        seen.try_for_each(|(index, z)| check_within(given, || format!("problem.history[{index}]"), *z))
     }
 
     /// Checks the level.
@@ -94,5 +86,19 @@ pub fn check_support(support: Support) -> Result<(), FieldError> {
         Support::WorstSeen { factor } => rules::within("problem.support.factor", factor, FACTOR.0, FACTOR.1),
         Support::None {} => Ok(()),
         Support::Between { min, max } => rules::interval("problem.support", Interval { min, max }, -LIMIT, LIMIT),
+    }
+}
+
+/// Checks that a return lies within what is given, where bounds are; `field` names it.
+///
+/// # Errors
+/// It lies outside.
+pub fn check_within(support: Support, field: impl FnOnce() -> String, log_return: f64) -> Result<(), FieldError> {
+    match support.given() {
+        Some(Interval { min, max }) if !(min..=max).contains(&log_return) => {
+            let rule = format!("must lie in problem.support, [{min}, {max}]");
+            Err(FieldError::new(field(), log_return, rule))
+        }
+        _ => Ok(()),
     }
 }

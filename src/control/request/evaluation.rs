@@ -216,7 +216,7 @@ impl EvaluationRequest {
             problem.radius = self.problem.radius_rule().alpha().map(|alpha| RadiusRule::ChiSquare { alpha });
             problem.support = None;
         }
-        if !matches!(framework, Framework::Adaptive | Framework::Static) {
+        if !framework.has_ball() {
             problem.caution = None;
         }
         if !framework.learns() {
@@ -240,6 +240,11 @@ impl EvaluationRequest {
         let mut wanted = self.specification(framework, None).completed()?.problem;
         wanted.periods_per_year = found.problem.periods_per_year;
         wanted.levels.clone_from(&found.problem.levels);
+        if let (Some(RadiusRule::Bridge { correction, .. }), RadiusRule::Bridge { correction: found, .. }) =
+            (&mut wanted.radius, found.problem.radius_rule())
+        {
+            *correction = found;
+        }
         if !framework.is_frozen() {
             wanted.history.clone_from(&found.problem.history);
         }

@@ -45,6 +45,11 @@ impl Framework {
         matches!(self, Framework::Static | Framework::ParametricStatic)
     }
 
+    /// True where laws lie in a Wasserstein ball.
+    pub fn has_ball(self) -> bool {
+        matches!(self, Framework::Adaptive | Framework::Static)
+    }
+
     /// True where returns are taken as normal.
     pub fn is_parametric(self) -> bool {
         matches!(self, Framework::ParametricStatic | Framework::ParametricAdaptive)

@@ -68,6 +68,13 @@ pub enum FrontierProblem {
 }
 
 impl FrontierProblem {
+    fn caution(&self) -> Option<CautionLevel> {
+        match self {
+            FrontierProblem::Asset(problem) => problem.caution,
+            FrontierProblem::Assets(problem) => problem.caution,
+        }
+    }
+
     fn periods(&self) -> usize {
         match self {
             FrontierProblem::Asset(problem) => problem.history.len(),
@@ -120,6 +127,10 @@ impl FrontierRequest {
             let rule = format!("must hold {} to {} periods", RETURNS.start(), RETURNS.end());
             return Err(FieldError::new("problem.history", format!("{count} periods"), rule));
         }
+        if let Some(given) = self.problem.caution().filter(|given| *given != CautionLevel::Paper) {
+            let rule = "must be `paper` or left out: `scales` are the shares of the radius that are tried";
+            return Err(FieldError::new("problem.caution", given.name(), rule));
+        }
         let (assets, mut fund) = match &self.problem {
             FrontierProblem::Assets(assets) => (assets.clone(), assets.fund(self.seed)?),
             FrontierProblem::Asset(problem) => {
@@ -128,7 +139,7 @@ impl FrontierRequest {
                 (as_assets(&fund.problem), fund)
             }
         };
-        // Shares of the whole radius are what is tried.
+        // The scales are shares of the whole radius.
         fund.problem.caution = Some(CautionLevel::Paper);
         let drawn = count * assets.assets.len() * self.scales.len();
         if drawn * resamples > MOST_DRAWN {

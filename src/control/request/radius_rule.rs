@@ -21,6 +21,10 @@ pub enum RadiusRule {
         /// A factor on the radius.
         #[serde(default = "defaults::scale")]
         scale: f64,
+        /// By what every simulated quantile is multiplied, so that that of the history is exact: found, never asked for. What a
+        /// request says here is found anew.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        correction: Option<f64>,
     },
     /// That of `bridge` times a factor found once, from the history: with it, the balls of a share 1 - alpha of records drawn from the
     /// smoothed law of the history hold that law.
@@ -92,14 +96,16 @@ impl RadiusRule {
 
     /// The same with a factor on the radius.
     pub fn scaled_bridge(alpha: f64, scale: f64) -> Self {
-        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale }
+        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale, correction: None }
     }
 
     /// The rule of a radius so many times as large, of those that are simulated.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {
-            RadiusRule::Bridge { alpha, paths, scale } => RadiusRule::Bridge { alpha, paths, scale: scale * factor },
+            RadiusRule::Bridge { alpha, paths, scale, correction } => {
+                RadiusRule::Bridge { alpha, paths, scale: scale * factor, correction }
+            }
             RadiusRule::Calibrated { alpha, paths, scale } => {
                 RadiusRule::Calibrated { alpha, paths, scale: scale * factor }
             }

@@ -52,6 +52,8 @@ pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 pub const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
 /// Factors on a bridge radius.
 pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
+/// Of a simulated quantile: a hundred paths are off by less.
+pub const RADIUS_CORRECTION: (f64, f64) = (0.5, 2.0);
 /// Fixed radii, in log-return.
 pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
 
@@ -178,12 +180,15 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
         _ => {}
     }
     match *rule {
-        RadiusRule::Bridge { alpha, paths, scale } | RadiusRule::Calibrated { alpha, paths, scale } => {
+        RadiusRule::Bridge { alpha, paths, scale, .. } | RadiusRule::Calibrated { alpha, paths, scale } => {
             let calibrated = matches!(rule, RadiusRule::Calibrated { .. });
             let (least_alpha, numbers) = if calibrated { (1e-2, CALIBRATED_NUMBERS) } else { (1e-3, BRIDGE_NUMBERS) };
             within("problem.radius.alpha", alpha, least_alpha, 0.999)?;
             whole("problem.radius.paths", paths, &PATHS)?;
             within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;
+            if let RadiusRule::Bridge { correction: Some(correction), .. } = *rule {
+                within("problem.radius.correction", correction, RADIUS_CORRECTION.0, RADIUS_CORRECTION.1)?;
+            }
             if paths.saturating_mul(problem.history.len() + problem.horizon) > numbers {
                 let rule = format!("times the final sample size must be at most {numbers}");
                 return Err(FieldError::new("problem.radius.paths", paths, rule));

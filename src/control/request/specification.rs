@@ -82,7 +82,8 @@ pub struct ProblemSpecification {
     /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<RadiusRule>,
-    /// The share of the radius that is acted on. Default: `balanced`, and `paper` where a `radius` is given. For the radius rules `bridge` and `calibrated` alone.
+    /// The share of the radius that is acted on. Default: `balanced`, and `paper` where a `radius` is given. For the radius rules
+    /// `bridge` and `calibrated` alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub caution: Option<CautionLevel>,
     /// What the levels are and cost on this record: found, never asked for. What a request says here is found anew.

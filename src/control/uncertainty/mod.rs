@@ -5,6 +5,7 @@
 //! or, where returns are taken as normal, the joint confidence region of mean and variance.
 
 pub mod centre;
+mod correction;
 pub mod measured;
 pub mod radius;
 
@@ -63,7 +64,7 @@ impl UncertaintySet {
     /// The ball around `centre` on the support that the rule has there; the centre alone without a radius.
     pub fn around(centre: Centre, radius: f64, support: Support) -> Self {
         if radius > 0.0 {
-            let support = support.around(centre.extent());
+            let support = support.around(|| centre.extent());
             UncertaintySet::Ball { centre, radius, support }
         } else {
             UncertaintySet::Point(centre)

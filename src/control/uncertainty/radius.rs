@@ -9,7 +9,7 @@ use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::control::uncertainty::centre::record;
-use crate::numerics::bridge::Quantile;
+use crate::numerics::bridge_law::BridgeLaw;
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::calibration::calibration_factor;
 use crate::numerics::chebyshev::local_cubic;
@@ -28,9 +28,9 @@ const LEAST_THINNED: usize = 9;
 pub struct RadiusEstimator {
     /// That of the specification, `bridge` in the place of `calibrated`; a radius of 0 where the framework has no uncertainty
     /// (known law, plug-in).
-    rule: RadiusRule,
+    pub(super) rule: RadiusRule,
     /// Under `calibrated`.
-    calibration: Option<Calibration>,
+    pub(super) calibration: Option<Calibration>,
     seed: u64,
     /// Sample size at the last step.
     last_size: usize,
@@ -38,27 +38,29 @@ pub struct RadiusEstimator {
     decays: bool,
     /// What the balls are centred on.
     centre: CentreSpecification,
-    /// The history, ascending: the values that most laws of a design share.
-    base: Vec<f64>,
+    /// What the history teaches. Most laws of a design share its values.
+    pub(super) learned: EmpiricalDistribution,
+    /// The law of its bridge statistic, once that was asked.
+    pub(super) exact: OnceLock<BridgeLaw>,
     /// Where the common random numbers are kept.
     kept: Kept,
 }
 
 /// The factor on the radius that the history asks for, found when a radius is first asked for.
-struct Calibration {
+pub(super) struct Calibration {
     /// Oldest first.
     history: Vec<f64>,
     retention: f64,
     factor: OnceLock<f64>,
 }
 
-/// The uncertainty set of a law: its radius, and the quantile behind it under the rules of the bridge.
+/// The radius of a law, and the quantile behind it under the rules of the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measure {
     /// In log-return; of a confidence region, in estimated standard deviations.
     pub radius: f64,
     /// Absent under other rules than `bridge` and `calibrated`.
-    pub quantile: Option<Quantile>,
+    pub quantile: Option<f64>,
 }
 
 /// The radius of a law and what it tends to be one return later.
@@ -78,22 +80,19 @@ impl RadiusEstimator {
             _ => specification.problem.radius_in_force(),
         };
         let (rule, calibrated) = match rule {
-            RadiusRule::Calibrated { alpha, paths, scale } => (RadiusRule::Bridge { alpha, paths, scale }, true),
+            RadiusRule::Calibrated { alpha, paths, scale } => {
+                (RadiusRule::Bridge { alpha, paths, scale, correction: None }, true)
+            }
             rule => (rule, false),
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let learning = specification.problem.learning;
         let history = record(&specification.problem.history, &specification.problem);
-        let calibration = calibrated.then(|| Calibration {
-            history: history.clone(),
-            retention: learning.retention(),
-            factor: OnceLock::new(),
-        });
-        let decays = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
-        let mut base = history;
-        base.sort_by(f64::total_cmp);
+        let (learned, retention) = (learning.law(&history), learning.retention());
+        let calibration = calibrated.then(|| Calibration { history, retention, factor: OnceLock::new() });
+        let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL;
         let (seed, centre) = (specification.seed, specification.problem.centre.clone());
-        RadiusEstimator { rule, calibration, seed, last_size, decays, centre, base, kept }
+        RadiusEstimator { rule, calibration, seed, last_size, decays, centre, learned, exact: OnceLock::new(), kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -113,7 +112,7 @@ impl RadiusEstimator {
     }
 
     /// Those bridges.
-    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
+    pub(super) fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
         let simulate = || match self.bridged(sample_size) {
             size @ ..GRADED_FROM => AbsoluteBridges::simulate(size, paths, self.seed),
             _ => AbsoluteBridges::graded(paths, self.seed),
@@ -158,7 +157,7 @@ impl RadiusEstimator {
 
     /// Simulates what measuring laws of this size takes, where that is yet to be done.
     pub fn prepare(&self, sample_size: usize) {
-        if let RadiusRule::Bridge { alpha, paths, scale } = self.rule {
+        if let RadiusRule::Bridge { alpha, paths, scale, .. } = self.rule {
             self.factor(scale, alpha, paths);
             self.sizes(sample_size).for_each(|size| drop(self.bridges(size, paths)));
         }
@@ -167,7 +166,7 @@ impl RadiusEstimator {
     /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } => {
+            RadiusRule::Bridge { alpha, paths, scale, .. } => {
                 let bridges = self.bridges(law.sample_size(), paths);
                 let scale = self.factor(scale, alpha, paths);
                 self.bridged_radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
@@ -179,15 +178,15 @@ impl RadiusEstimator {
     /// The rule with what a calibration finds: it gives every law the same radius, and looks at no history.
     pub fn found_rule(&self) -> RadiusRule {
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } => {
-                RadiusRule::Bridge { alpha, paths, scale: self.factor(scale, alpha, paths) }
+            RadiusRule::Bridge { alpha, paths, scale, correction } => {
+                RadiusRule::Bridge { alpha, paths, scale: self.calibrated(scale, alpha, paths), correction }
             }
             rule => rule,
         }
     }
 
-    /// `scale`, times what the calibration finds. Every radius by the bridge takes it.
-    fn factor(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
+    /// `scale`, times what the calibration finds.
+    fn calibrated(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
         let Some(Calibration { history, retention, factor }) = self.calibration.as_ref().filter(|_| scale > 0.0) else {
             return scale;
         };
@@ -195,14 +194,19 @@ impl RadiusEstimator {
         scale * factor.get_or_init(find)
     }
 
+    /// The same times the correction: every radius by the bridge takes it.
+    fn factor(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
+        self.calibrated(scale, alpha, paths) * self.correction_at(alpha, paths)
+    }
+
     /// The radius of `law` and what it is made of.
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
         let size = law.effective_size();
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } => {
-                let quantile = self.bridges(law.sample_size(), paths).bridge_quantile_with_error(law, alpha);
-                let scale = self.factor(scale, alpha, paths);
-                Measure { radius: self.bridged_radius(scale, quantile.value, size), quantile: Some(quantile) }
+            RadiusRule::Bridge { alpha, paths, scale, .. } => {
+                let simulated = self.bridges(law.sample_size(), paths).bridge_quantile(law, Statistic::Now, alpha);
+                let radius = self.bridged_radius(self.factor(scale, alpha, paths), simulated, size);
+                Measure { radius, quantile: Some(self.correction_at(alpha, paths) * simulated) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
         }
@@ -213,7 +217,7 @@ impl RadiusEstimator {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
             RadiusRule::Bridge { .. } if !self.looks_ahead(size) => known,
-            RadiusRule::Bridge { alpha, paths, scale } => {
+            RadiusRule::Bridge { alpha, paths, scale, .. } => {
                 let bridges = self.bridges(size + 1, paths);
                 let scale = self.factor(scale, alpha, paths);
                 self.bridged_radius(
@@ -234,20 +238,22 @@ impl RadiusEstimator {
     pub fn radii_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<Radii>> {
         let Some(first) = laws.first() else { return Vec::new() };
         let (size, effective_size) = (first.sample_size(), first.effective_size());
-        let RadiusRule::Bridge { alpha, paths, scale } = self.rule else {
+        let RadiusRule::Bridge { paths, scale, .. } = self.rule else {
             let radius = self.radius_of_size(effective_size);
             return vec![vec![Radii { radius, radius_ahead: radius }; alphas.len()]; laws.len()];
         };
-        let scale = self.factor(scale, alpha, paths);
-        let quantiles = |which, size| self.bridges(size, paths).bridge_quantiles(laws, &self.base, which, alphas);
+        let factors: Vec<f64> = alphas.iter().map(|alpha| self.factor(scale, *alpha, paths)).collect();
+        let base = self.learned.atoms();
+        let quantiles = |which, size| self.bridges(size, paths).bridge_quantiles(laws, base, which, alphas);
         let now = quantiles(Statistic::Now, size);
         let ahead = self.looks_ahead(size).then(|| quantiles(Statistic::OneLater, size + 1));
         let effective_size_ahead = first.effective_sizes_ahead()[0];
         let of_law = |(index, now): (usize, Vec<f64>)| {
             let of_level = |(level, now): (usize, f64)| {
-                let known = self.bridged_radius(scale, now, effective_size);
+                let factor = factors[level];
+                let known = self.bridged_radius(factor, now, effective_size);
                 let later =
-                    ahead.as_ref().map(|ahead| self.bridged_radius(scale, ahead[index][level], effective_size_ahead));
+                    ahead.as_ref().map(|ahead| self.bridged_radius(factor, ahead[index][level], effective_size_ahead));
                 Radii { radius: known, radius_ahead: later.unwrap_or(known) }
             };
             now.into_iter().enumerate().map(of_level).collect()
@@ -268,7 +274,7 @@ impl RadiusEstimator {
         let size = law.sample_size() + 1;
         let [next_size, size_after] = law.effective_sizes_ahead();
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } => {
+            RadiusRule::Bridge { alpha, paths, scale, .. } => {
                 let scale = self.factor(scale, alpha, paths);
                 let radii = |values: &[f64], which, size, effective_size| {
                     let found = self.bridges(size, paths).bridge_quantiles_with(law, values, which, alpha);
@@ -426,7 +432,7 @@ mod tests {
         let sets = estimator("adaptive", bridge(0.7));
         let law = EmpiricalDistribution::new(&[0.02, -0.01, 0.04, 0.01]);
         let Measure { radius, quantile } = sets.measure(&law);
-        assert!((radius - 0.7 * quantile.unwrap().value / 2.0).abs() < 1e-15);
+        assert!((radius - 0.7 * quantile.unwrap() / 2.0).abs() < 1e-15);
         assert_eq!(sets.radius(&law), radius);
         let mut larger = law.clone();
         larger.push(0.03);

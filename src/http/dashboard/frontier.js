@@ -6,6 +6,7 @@ import { h, section, table } from "./dom.js";
 import { pressed } from "./form.js";
 import { minus, percent, tick } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
+import { shareOf } from "./specification.js";
 
 export function body(report) {
   const words = h("div", { class: "words" }, report.sentences.map((sentence) => h("p", {}, minus(sentence))));
@@ -53,7 +54,9 @@ function drawn({ own, per_year }, { bootstrap, best, points: scales }, domain) {
 
 /** A button that asks for it, of a problem as a policy has it with the returns and the wealth of now; `fund` where there are several assets. */
 export function asking({ problem: asked, fund }, history, initial_wealth) {
-  const { rate_per_step, periods_per_year, action_interval, utility, radius, support } = asked;
+  const { rate_per_step, periods_per_year, action_interval, utility, radius: whole, support } = asked;
+  // Multiples of the caution that is followed.
+  const radius = whole.scale === undefined ? whole : { ...whole, scale: whole.scale * shareOf(asked) };
   const investor = { initial_wealth, action_interval, utility, radius, support };
   const problem = { history, rate_per_step, periods_per_year, ...investor, ...(fund && several(fund, radius)) };
   const button = h("button", { class: "quiet" }, "How much caution?");

@@ -9,12 +9,12 @@ import { unitOf } from "./periods.js";
 
 /** The kinds of policy in a manager's words; `PAPER` has the paper's. */
 export const FRAMEWORKS = {
-  adaptive: "Cautious, learns",
-  static: "Cautious, fixed",
+  adaptive: "Robust, learns",
+  static: "Robust, fixed",
   known_law: "Knows the market",
   plug_in: "Trusts the record",
-  parametric_static: "Cautious, fixed, bell curve",
-  parametric_adaptive: "Cautious, learns, bell curve",
+  parametric_static: "Robust, fixed, bell curve",
+  parametric_adaptive: "Robust, learns, bell curve",
 };
 export const PAPER = {
   adaptive: "Adaptive robust",
@@ -151,12 +151,15 @@ export function meant(form, { noun, job, warnings, problem }, yes) {
   question.focus();
 }
 
-/** The level of caution and its share of the radius, where that is not all of it. */
-function levelInWords({ caution, levels }) {
-  const share = caution?.scale ?? levels?.[caution]?.scale;
-  if (share === undefined) return "";
+/** The share of the radius that is acted on. */
+export const shareOf = ({ caution, levels }) => caution?.scale ?? levels?.[caution]?.scale ?? 1;
+
+/** The level of caution and its share of the radius, where it is not the paper's. */
+function levelInWords(problem) {
+  const { caution } = problem;
+  if (caution === undefined || caution === "paper") return "";
   const level = typeof caution === "string" ? `${caution}, ` : "";
-  return `${level}${percent(share, 0)} of `;
+  return `${level}${percent(shareOf(problem), 0)} of `;
 }
 
 /** How cautious a policy is, in a few words. */

@@ -33,12 +33,10 @@ const REDRAWN = ["problem.framework", "problem.periods_per_year"];
 
 /** The request that a policy was trained by; of several assets by their names. */
 export function requestOf(specification) {
-  if (!specification.fund) {
-    const { levels, ...problem } = specification.problem;
-    return structuredClone({ ...specification, problem });
-  }
+  const { levels, ...asked } = specification.problem;
+  if (!specification.fund) return structuredClone({ ...specification, problem: asked });
   const { radius_factor, ...named } = specification.fund;
-  const { framework, learning, centre, levels, radius, ...problem } = specification.problem;
+  const { framework, learning, centre, radius, ...problem } = asked;
   const scale = radius.scale === undefined ? {} : { scale: Number((radius.scale / radius_factor).toPrecision(12)) };
   const { accuracy, count } = specification.design;
   return structuredClone({ problem: { ...problem, ...named, radius: { ...radius, ...scale } }, design: { accuracy, count }, seed: specification.seed });

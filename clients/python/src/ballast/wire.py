@@ -255,6 +255,8 @@ class CautionScale(TypedDict):
 
     scale: float
     """Share of the radius."""
+    standard_error: float
+    """Its standard error, of the simulation of records."""
     regrets: list[float]
     """Loss beside the best share in each of the three worlds: without a premium, with half, and with the whole."""
     spared: float
@@ -611,6 +613,8 @@ class LevelAdvised(TypedDict):
     """Spared per step in the world without a premium, beside taking the record for the truth."""
     allocation: NotRequired[float | None]
     """Share of wealth that it would hold; null where that would take long to find, of several assets in long records."""
+    allocation_error: NotRequired[float | None]
+    """Its standard error, of the simulation behind the level; of the level followed alone."""
 
 
 class LevelsAdvised(TypedDict):
@@ -796,6 +800,11 @@ class RadiusRule1(TypedDict):
     """Simulated paths."""
     scale: NotRequired[float]
     """A factor on the radius."""
+    correction: NotRequired[float | None]
+    """
+    By what every simulated quantile is multiplied, so that that of the history is exact: found, never asked for. What a
+    request says here is found anew.
+    """
     rule: Literal["bridge"]
 
 
@@ -1139,9 +1148,10 @@ class Uncertainty(TypedDict):
     moments: list[float]
     """Raw moments of the law learned, first to the specification's count."""
     quantile: NotRequired[float | None]
-    """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`."""
-    quantile_standard_error: NotRequired[float | None]
-    """Simulation standard error of the quantile."""
+    """
+    (1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`. Under `bridge`
+    it is exact for the history of the policy, and simulated in proportion to that after returns were learned.
+    """
     radius: float
     """As in an advice."""
 
@@ -1225,6 +1235,19 @@ class WealthReport(TypedDict):
     Mean over paths of the largest fall on the way below the highest so far, as a share of it; what is added or withdrawn is
     neither gain nor fall.
     """
+
+
+class WhyNothing(TypedDict):
+    """Why an advice holds nothing."""
+
+    premium_seen: float
+    """Mean simple return of the record beyond the bank, per step."""
+    standard_error: float
+    """Its standard error."""
+    premium_left: float
+    """The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something."""
+    at_half_the_caution: NotRequired[float | None]
+    """Share of wealth that would be held within half of the radius; null where the radius is not simulated."""
 
 
 class WithoutOne(TypedDict):
@@ -2053,6 +2076,7 @@ class Advised(Advice):
     caution: list[Caution]
     """What to know before the advice is followed."""
     levels: NotRequired[LevelsAdvised | None]
+    why_nothing: NotRequired[WhyNothing | None]
     sensitivity: NotRequired[Sensitivity | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
@@ -2530,7 +2554,7 @@ class StrategyReport(TypedDict):
     """One strategy."""
 
     strategy: str
-    """Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like."""
+    """Its name: `Robust, learns`, `50 % in stocks`, `All in the bank` and the like."""
     framework: NotRequired[Framework | None]
     constant_mix: NotRequired[float | None]
     """The allocation of a constant mix."""

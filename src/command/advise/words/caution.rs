@@ -2,17 +2,25 @@
 
 use std::fmt::Write;
 
-use ballast::control::policy::levels::{LevelAdvised, LevelsAdvised};
+use ballast::control::policy::levels::{LevelAdvised, LevelsAdvised, WhyNothing};
 
 use super::percent;
 
-/// What the record paid beyond the bank, and how well that is known.
-pub fn premium(LevelsAdvised { premium_seen, standard_error, .. }: &LevelsAdvised, noun: &str) -> String {
-    let (seen, error) = (percent(premium_seen.abs(), 2), percent(*standard_error, 2));
-    match *premium_seen > 0.0 {
+/// What the record paid beyond the bank, how well that is known, what the caution leaves of it, and what half of it would hold.
+pub fn why_nothing(why: &WhyNothing, noun: &str) -> String {
+    let [seen, error, left] = [why.premium_seen, why.standard_error, why.premium_left].map(|z| percent(z.abs(), 2));
+    let text = match why.premium_seen > 0.0 {
         true => format!("The record beat the bank by {seen} a {noun}; the chance error of that is {error}."),
         false => format!("The record paid {seen} a {noun} less than the bank; the chance error of that is {error}."),
-    }
+    };
+    let as_well = (why.premium_seen > 0.0 && why.premium_left < 0.0)
+        .then(|| format!("At this caution it may as well be {left} less than the bank."));
+    let half = why.at_half_the_caution.map(|share| match share > 0.0 {
+        true => format!("Half the caution would hold {}.", percent(share, 1)),
+        false => "Half the caution would hold nothing either.".into(),
+    });
+    let second: Vec<String> = as_well.into_iter().chain(half).collect();
+    if second.is_empty() { text } else { format!("{text}\n{}", second.join(" ")) }
 }
 
 /// What the level followed costs and spares in a year of so many periods, and what the others would.
@@ -23,10 +31,14 @@ pub fn told(levels: &LevelsAdvised, periods: f64) -> String {
         levels.levels.iter().find(|level| level.level == levels.followed)
     {
         let saved = if *spared < 0.0 { "costs" } else { "spares" };
+        let supposed = match levels.premium_seen > 0.0 {
+            true => "what the record shows and a standard error more",
+            false => "a standard error above none, as the record shows none",
+        };
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "Caution is {}: {} of the radius is acted on. If the premium is what the record shows and a standard error more,\n\
+            "Caution is {}: {} of the radius is acted on. If the premium is {supposed},\n\
              this costs {} a year beside the best share; if there is none, it {saved} {} a year beside trusting the record.\n",
             level.name(),
             percent(*scale, 0),
@@ -61,6 +73,7 @@ mod tests {
             regrets: [0.0001, 0.0002, 0.0003],
             spared: 0.0004,
             allocation: Some(allocation),
+            allocation_error: None,
         };
         let levels = LevelsAdvised {
             followed: CautionLevel::Balanced,

@@ -29,6 +29,7 @@ use crate::control::error::TrainError;
 use crate::control::kept::Kept;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::{Phase, StepProgress, Watch};
+use crate::control::request::annualised::premium;
 use crate::control::request::frontier::FrontierQuestion;
 use crate::control::uncertainty::radius::RadiusEstimator;
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -71,7 +72,8 @@ impl Frontier {
         let fund = &question.fund.problem;
         let factor = advising::radius_factor(&question.assets, fund, question.request.seed);
         let utility = advising::utility(fund);
-        Frontier { radii: RadiusEstimator::new(&question.fund, kept), factor, utility, question }
+        let radii = RadiusEstimator::new(&question.fund.clone().resolved(&kept), kept);
+        Frontier { radii, factor, utility, question }
     }
 
     /// The report. Cost: a robust step for each scale and resample.
@@ -226,12 +228,9 @@ impl Frontier {
     /// Checked by: `tests/service/frontier.rs::at_the_record_itself_it_advises_as_advise_does`.
     fn evidence(&self) -> f64 {
         let rows = &self.question.assets.history;
-        let returns: Vec<f64> =
-            fund_returns(rows, &inverse_volatility(rows)).into_iter().map(|value| value.exp_m1()).collect();
-        let count = returns.len() as f64;
-        let mean = returns.iter().sum::<f64>() / count;
-        let square = returns.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        (mean - self.question.fund.problem.rate_per_step) * (count / square).sqrt()
+        let fund = fund_returns(rows, &inverse_volatility(rows));
+        let (premium, error) = premium(&fund, self.question.fund.problem.rate_per_step);
+        premium / error
     }
 }
 
