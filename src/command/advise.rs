@@ -8,11 +8,12 @@ use ballast::control::request::learning::Learning;
 use ballast::control::request::rules::BRIDGE_NUMBERS;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advise::Advise;
+use ballast::service::advise_assets::AdviseAssets;
 use clap::Args;
 
 use super::caution::{self, CautionArgs};
 use super::record::{Record, show};
-use super::returns::Returns;
+use super::returns::{AnyReturns, Returns, SeveralReturns};
 
 mod words;
 
@@ -56,9 +57,15 @@ const OPTIONS: [(&str, &str); 6] = [
 ];
 
 pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
-    let returns = arguments.record.read()?;
+    match arguments.record.read_named()? {
+        AnyReturns::One(returns) => one(arguments, &returns),
+        AnyReturns::Several(returns) => several(arguments, &returns),
+    }
+}
+
+fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
     let count = returns.rows().len();
-    let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count, &arguments.record))?;
+    let advised = arguments.question(returns).answer().map_err(|error| by_option(error, count, &arguments.record))?;
     let told = || {
         let coarser = returns.coarser().into_iter().filter_map(|returns| {
             let advised = arguments.question(&returns).answer().ok()?;
@@ -68,6 +75,29 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
         words::told_of_coarser(text, &coarser.collect::<Vec<_>>())
     };
     Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
+}
+
+fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<dyn Error>> {
+    let given = [
+        ("--holding", arguments.holding != 0.0),
+        ("--trading-cost", arguments.trading_cost != 0.0),
+        ("--half-life", arguments.half_life.is_some()),
+        ("--sensitivity", arguments.sensitivity),
+    ];
+    if let Some((option, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
+        let rule = "must be left out of several assets, of which what is held now and what trading costs are not known";
+        return Err(FieldError::new(option, format!("given of {}", returns.record.assets.len()), rule).into());
+    }
+    let question = AdviseAssets {
+        problem: arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem)),
+        wealth: Some(arguments.wealth),
+        seed: arguments.seed,
+    };
+    let count = returns.record.rows.len();
+    let advised = question.answer().map_err(|error| by_option(error, count, &arguments.record))?;
+    let (noun, periods) = (returns.record.frequency.noun(), returns.record.periods_per_year as f64);
+    let told = || words::told_of_several(&advised, arguments.wealth, noun, periods);
+    Ok(show(&returns.sentence, arguments.json, &advised, told)?)
 }
 
 impl AdviseArgs {

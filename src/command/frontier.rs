@@ -9,7 +9,6 @@ use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, Resampled};
 use ballast::control::kept::Kept;
 use ballast::control::progress::Watch;
-use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::frontier::{FrontierProblem, FrontierRequest, default_scales};
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
@@ -61,7 +60,8 @@ impl FrontierArgs {
                 FrontierProblem::Asset(ProblemSpecification { radius, ..self.record.problem(returns) })
             }
             AnyReturns::Several(returns) => {
-                FrontierProblem::Assets(AssetsProblem { radius, ..self.record.assets_problem(returns) })
+                let within = |problem| ProblemSpecification { radius, ..problem };
+                FrontierProblem::Assets(self.record.assets_problem(returns, within))
             }
         };
         let FrontierArgs { scales, resamples, block, seed, .. } = self.clone();

@@ -32,6 +32,14 @@ impl Record {
         Ok(self.last(self.file.read()?)?)
     }
 
+    /// Several columns are an asset each where they are named, and else it is asked which is meant.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_named(&self) -> Result<AnyReturns, Box<dyn Error>> {
+        if self.file.names_columns() { self.read_any() } else { self.read().map(AnyReturns::One) }
+    }
+
     /// Columns that nothing tells apart are an asset each.
     ///
     /// # Errors
@@ -67,11 +75,15 @@ impl Record {
         self.asked(history, returns.rate(), returns.periods_per_year)
     }
 
-    /// Of several assets.
-    pub fn assets_problem(&self, returns: &SeveralReturns) -> AssetsProblem {
+    /// Of several assets; `completed` says what else is asked.
+    pub fn assets_problem(
+        &self,
+        returns: &SeveralReturns,
+        completed: impl Fn(ProblemSpecification) -> ProblemSpecification,
+    ) -> AssetsProblem {
         let AssetsRecord { assets, rows, bank, periods_per_year, .. } = &returns.record;
         let rate = bank.last().copied().unwrap_or(0.0);
-        asked_of(assets.clone(), rows.clone(), &self.asked(Vec::new(), rate, *periods_per_year))
+        asked_of(assets.clone(), rows.clone(), &completed(self.asked(Vec::new(), rate, *periods_per_year)))
     }
 
     fn asked(&self, history: Vec<f64>, rate: f64, periods_per_year: usize) -> ProblemSpecification {

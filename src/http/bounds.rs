@@ -15,8 +15,8 @@ use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
 use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
-    ACCURACY, COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE,
-    RATE, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
+    ACCURACY, COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR,
+    RADIUS_CORRECTION, RADIUS_SCALE, RATE, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
 use crate::control::request::support::{FACTOR, LIMIT};
 use crate::service::plan::MOST_RENEWALS;
@@ -73,6 +73,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("RadiusRule chi_square", "alpha", within((1e-3, 1.0))),
         ("RadiusRule", "paths", whole(&PATHS)),
         ("RadiusRule", "scale", within(RADIUS_SCALE)),
+        ("RadiusRule", "correction", within(RADIUS_CORRECTION)),
         ("RadiusRule", "kappa", within((0.0, 100.0))),
         ("RadiusRule", "radius", within(FIXED_RADIUS)),
         ("RadiusRule", "c", within((1e-9, 1e12))),

@@ -6,6 +6,9 @@ use utoipa::ToSchema;
 use super::error::ServiceError;
 use super::sessions::Sessions;
 use crate::control::assets::advice::AssetsAdvice;
+use crate::control::error::FieldError;
+use crate::control::kept::Kept;
+use crate::control::policy::one_period::OnePeriod;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::rules;
@@ -58,17 +61,38 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
-        let AdviseAssets { mut problem, wealth, seed } = question;
+        let (problem, fund) = question.checked()?;
+        let fund = self.policies.one_period(&fund)?;
+        Ok(self.resolving.run(tenant, move || AssetsAdvised::of(&problem, &fund)).await??)
+    }
+}
+
+impl AdviseAssets {
+    /// The answer, found in this process for its own user, as [`super::advise::Advise::answer`].
+    ///
+    /// # Errors
+    /// A field breaks a rule.
+    pub fn answer(self) -> Result<AssetsAdvised, FieldError> {
+        let (problem, fund) = self.checked()?;
+        AssetsAdvised::of(&problem, &OnePeriod::new(&fund, Kept::default()))
+    }
+
+    /// The problem, and that of its fund of inverse volatilities.
+    fn checked(self) -> Result<(AssetsProblem, Specification), FieldError> {
+        let AdviseAssets { mut problem, wealth, seed } = self;
         if let Some(wealth) = wealth {
             rules::wealth("wealth", wealth)?;
             problem.initial_wealth = wealth;
         }
-        let fund = self.policies.one_period(&problem.fund(seed)?)?;
-        let solving = move || {
-            let advice = AssetsAdvice::of(&problem, &fund)?;
-            let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
-            Ok::<_, ServiceError>(AssetsAdvised { advice, annualised, warnings })
-        };
-        self.resolving.run(tenant, solving).await?
+        let fund = problem.fund(seed)?;
+        Ok((problem, fund))
+    }
+}
+
+impl AssetsAdvised {
+    fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
+        let advice = AssetsAdvice::of(problem, fund)?;
+        let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
+        Ok(AssetsAdvised { advice, annualised, warnings })
     }
 }

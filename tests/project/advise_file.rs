@@ -156,3 +156,26 @@ fn the_pages_show_what_commands_print() {
     }
     assert_eq!(shown, 7);
 }
+
+#[test]
+fn named_columns_are_an_asset_each() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let file = format!("{root}/data/us_industries_monthly.csv");
+    let asked = ["advise", &file, "--window", "120", "--column", "energy", "--column", "utilities"];
+    let answered = ballast(&[&asked[..], &["--json"]].concat());
+    let advised: serde_json::Value = serde_json::from_str(&text(&answered.stdout)).unwrap();
+    let held = advised["allocation"].as_object().unwrap();
+    assert_eq!(held.keys().collect::<Vec<_>>(), ["energy", "utilities"]);
+    let total: f64 = held.values().map(|share| share.as_f64().unwrap()).sum();
+    assert!((total - advised["total"].as_f64().unwrap()).abs() < 1e-12 && total > 0.0, "{advised}");
+    let told = text(&ballast(&asked).stdout);
+    for part in
+        ["of wealth in these assets through the coming month", "\n  energy ", "\n  utilities ", "Caution is balanced"]
+    {
+        assert!(told.contains(part), "{told}");
+    }
+    let refused = ballast(&[&asked[..], &["--holding", "0.1"]].concat());
+    assert!(text(&refused.stderr).starts_with("ballast: --holding is given of 2: must be left out"), "{refused:?}");
+    // Not named, they are asked for: a file of prices has more columns than assets.
+    assert!(text(&ballast(&["advise", &file]).stderr).contains("--column"));
+}

@@ -92,6 +92,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/radius", json!({"rule": "bridge", "alpha": 0.0}), "problem.radius.alpha"),
         ("/problem/radius", json!({"rule": "bridge", "paths": 1}), "problem.radius.paths"),
         ("/problem/radius", json!({"rule": "bridge", "scale": -1.0}), "problem.radius.scale"),
+        ("/problem/radius", json!({"rule": "bridge", "correction": 3.0}), "problem.radius.correction"),
         ("/problem/radius", json!({"rule": "concentration", "C": 0.0, "c": 1.0}), "problem.radius.C"),
         ("/problem/radius", json!({"rule": "concentration", "C": 2.0, "c": 0.0}), "problem.radius.c"),
         ("/problem/radius", json!({"rule": "root_n", "kappa": -1.0}), "problem.radius.kappa"),
@@ -169,7 +170,7 @@ fn described_fields() -> BTreeSet<String> {
 
 /// What a policy holds of levels, with this share of the radius.
 fn found_levels(scale: f64) -> Value {
-    let level = json!({ "scale": scale, "regrets": [0.0, 0.0, 0.0], "spared": 0.0 });
+    let level = json!({ "scale": scale, "standard_error": 0.0, "regrets": [0.0, 0.0, 0.0], "spared": 0.0 });
     json!({ "premiums": [0.0, 0.001, 0.002], "premium_seen": 0.001, "standard_error": 0.001,
         "bold": level, "balanced": level, "cautious": level, "paper": level })
 }

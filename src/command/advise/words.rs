@@ -1,6 +1,7 @@
 //! An advice for one period in plain words and a small table.
 
 mod caution;
+mod several;
 
 use std::fmt::Write;
 
@@ -9,6 +10,8 @@ use ballast::control::policy::sensitivity::{NextAdvice, Return, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
 use ballast::numerics::digits;
 use ballast::service::advise::Advised;
+
+pub use several::told_of_several;
 
 /// Less than this is not traded: what is printed would not show it.
 const SMALLEST_TRADE: f64 = 5e-4;

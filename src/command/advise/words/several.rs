@@ -1,0 +1,48 @@
+//! An advice on several assets.
+
+use std::fmt::Write;
+
+use ballast::service::advise_assets::AssetsAdvised;
+
+use super::{caution, money, percent};
+
+/// What to hold of each, and what that rests on.
+pub fn told_of_several(advised: &AssetsAdvised, wealth: f64, noun: &str, periods: f64) -> String {
+    let advice = &advised.advice;
+    let total = percent(advice.total, 1);
+    let mut text = match advice.total > 0.0 {
+        true if advice.total >= 0.9995 => format!("Hold all wealth in these assets through the coming {noun}.\n"),
+        true => format!("Hold {total} of wealth in these assets through the coming {noun}, the rest in the bank.\n"),
+        false => format!("Hold nothing of these assets through the coming {noun}: keep all wealth in the bank.\n"),
+    };
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "Against the worst law in the ball around the {} dates, that is worth {} for certain at the end of the {noun};\n\
+         the bank alone reaches {}.\n",
+        advice.sample_size,
+        money(advice.certainty_equivalent),
+        money(advice.floor)
+    );
+    let width = advice.allocation.keys().map(String::len).max().unwrap_or_default();
+    let _ = writeln!(
+        text,
+        "  {:<width$}{:>9}{:>12}   mean log-return a {noun}: seen, and by the worst law",
+        "", "hold", "of wealth"
+    );
+    for (asset, share) in &advice.allocation {
+        let means = advice
+            .worst_means
+            .get(asset)
+            .map_or(String::new(), |mean| format!("{:>10}{:>10}", percent(mean.seen, 2), percent(mean.worst, 2)));
+        let _ = writeln!(text, "  {asset:<width$}{:>9}{:>12}   {means}", percent(*share, 1), money(share * wealth));
+    }
+    if let Some(levels) = &advice.levels {
+        text += &format!("\n{}", caution::told(levels, periods));
+    }
+    let warnings = advised.warnings.iter().map(|warning| &warning.message);
+    for sentence in warnings.chain(advice.caution.iter().map(|caution| &caution.sentence)) {
+        text += &format!("\n{sentence}");
+    }
+    text.trim_end().to_owned()
+}
