@@ -48,6 +48,7 @@ const PARTS: &[(&str, &[Document])] = documents! {
         "choosing" "Choosing what to ask" "docs/choosing.md",
         "glossary" "Words" "docs/glossary.md",
         "results" "What it earned and cost" "docs/results.md",
+        "beside" "Beside other tools" "docs/beside.md",
     ],
     "How to": [
         "backtest" "Walk a record forward" "docs/backtest.md",
