@@ -57,6 +57,8 @@ impl Specification {
     /// for long records: 0.25 s at 240 returns.
     #[must_use]
     pub fn resolved(mut self, kept: &Kept) -> Self {
+        // What was found before is found anew, by the whole radius.
+        self.problem.levels = None;
         let found = RadiusEstimator::new(&self, kept.clone()).found_correction();
         if let Some(RadiusRule::Bridge { correction, .. }) = &mut self.problem.radius {
             *correction = found;
