@@ -331,7 +331,7 @@ mod tests {
         assert_eq!(files::periods(&one).lines().count(), 1 + 12 * one.walked.lines.len());
         assert_eq!(one.report.whole_years, 1);
         let page = one.page().unwrap();
-        assert!(page.contains("Robust, learns, 10 %") && page.contains("Trading costs 10 bp"), "{page}");
+        assert!(page.contains("Cautious, learns, 10 %") && page.contains("Trading costs 10 bp"), "{page}");
         assert!(page.contains("The whole years are 1, fewer than 30"), "{page}");
     }
 

@@ -33,7 +33,7 @@ test("what was compared, on which policy and for whom, comes first, and then wha
   const words = plain(await page.locator("main").innerText());
   const [first] = words.split("What each is worth");
   assert.match(first, /14 ways to hold stocks, through the same 400 futures of 3 months, after a record of 24 returns, for a balanced investor \(risk aversion 3\) who starts with 100\.00\./);
-  assert.match(first, /the bank pays 0\.20 % a month\. .Robust, learns. is policy [0-9a-f]{10}; the other policies were trained for this\./);
+  assert.match(first, /the bank pays 0\.20 % a month\. .Cautious, learns. is policy [0-9a-f]{10}; the other policies were trained for this\./);
   await page.locator(`a[href="#/policies/${policy}"]`).waitFor();
   const best = report.strategies.reduce((best, one) => (one.certainty_equivalent.value > best.certainty_equivalent.value ? one : best));
   assert.ok(words.includes(`came to the most over these futures: as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
@@ -41,7 +41,7 @@ test("what was compared, on which policy and for whom, comes first, and then wha
   const main = report.strategies.find(({ strategy }) => strategy === report.reference);
   assert.notEqual(main, best);
   assert.match(words, /Here the record is the truth, so caution can only cost\. What it may save shows where the histories are drawn from the market\./);
-  assert.deepEqual(await page.locator("tbody th b").allInnerTexts(), ["Robust, learns"]);
+  assert.deepEqual(await page.locator("tbody th b").allInnerTexts(), ["Cautious, learns"]);
   assert.doesNotMatch(words, /utility|Variance|Less adaptive|undefined|NaN/);
 });
 
@@ -76,7 +76,7 @@ test("what ends as the bank does is a bar of its own, of as many futures as ende
   assert.deepEqual([one.shares, one.banked], [[0.05, 0, 0, 0.2], 0.75]);
   for (const { wealth } of report.strategies) assert.equal(wealth.histogram.reduce((sum, count) => sum + count, wealth.at_bank), 400);
   const charts = page.locator("section", { hasText: "How wealth spreads at the end" });
-  const name = { adaptive: "Robust, learns", static: "Robust, fixed", plug_in: "Trusts the record" };
+  const name = { adaptive: "Cautious, learns", static: "Cautious, fixed", plug_in: "Trusts the record" };
   const banked = report.strategies.find(({ framework, wealth }) => framework && wealth.at_bank > 0 && wealth.at_bank < 400);
   assert.ok(banked, "no strategy is in the bank on some paths alone");
   const rows = charts.getByRole("table", { name: name[banked.framework], exact: true, includeHidden: true });
@@ -89,7 +89,7 @@ test("a strategy has one colour in every chart", async () => {
   const stroke = (locator) => locator.evaluate((element) => getComputedStyle(element).stroke);
   const fill = (locator) => locator.evaluate((element) => getComputedStyle(element).fill);
   const seen = { adaptive: [], plug_in: [] };
-  for (const [kind, name, colour] of [["adaptive", "Robust, learns", "s0"], ["plug_in", "Trusts the record", "s5"]]) {
+  for (const [kind, name, colour] of [["adaptive", "Cautious, learns", "s0"], ["plug_in", "Trusts the record", "s5"]]) {
     seen[kind].push(await stroke(page.locator(`figure:has-text("Average share in stocks") path.line.${colour}`).first()));
     seen[kind].push(await stroke(page.locator(`figure:has-text("Worth as much as a sure") line.range.${colour}`).first()));
     seen[kind].push(await fill(page.getByRole("slider", { name, exact: true }).locator("rect.bar").first()));

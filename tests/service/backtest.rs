@@ -47,7 +47,7 @@ async fn a_job_reports_what_the_command_reports() {
     let reported = report(&app, &job).await;
     // Of the main line the mix is a line of its own, kept with the same cost.
     let strategies = reported["strategies"].as_array().unwrap();
-    let own = strategies.iter().find(|strategy| strategy["strategy"] == "Robust, learns, 10 %").unwrap();
+    let own = strategies.iter().find(|strategy| strategy["strategy"] == "Cautious, learns, 10 %").unwrap();
     let mix = strategies.iter().find(|strategy| strategy["hindsight"] == true).unwrap();
     assert_eq!(own["beyond_own_mix"]["value"], mix["adaptive_ahead"]["value"]);
     assert!(own["annual_turnover"]["value"].as_f64() > Some(0.0) && mix["beyond_own_mix"].is_null(), "{own} {mix}");
@@ -72,7 +72,10 @@ async fn a_job_reports_what_the_command_reports() {
     assert_eq!(reported, by_command);
     let names: Vec<&str> =
         reported["strategies"].as_array().unwrap().iter().map(|one| one["strategy"].as_str().unwrap()).collect();
-    assert_eq!(names[..4], ["Robust, learns, 70 %", "Robust, learns, 10 %", "Robust, blind to costs", "Robust, fixed"]);
+    assert_eq!(
+        names[..4],
+        ["Cautious, learns, 70 %", "Cautious, learns, 10 %", "Cautious, blind to costs", "Cautious, fixed"]
+    );
     assert_eq!((&reported["dates"][0], reported["dates"].as_array().unwrap().len()), (&json!("2013-01"), 8));
     // Something was held, and its wealth follows from it by hand in the first quarter.
     let held = &reported["periods"][1];

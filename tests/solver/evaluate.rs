@@ -344,7 +344,7 @@ fn a_ball_holds_the_true_law_where_it_is_wide_enough() {
         request["problem"]["radius"] = json!({ "rule": "fixed", "radius": radius });
         let report = reported(request);
         let coverage = |name: &str| report.strategy(name).unwrap().coverage.clone().unwrap();
-        (coverage("Robust, learns"), coverage("Robust, fixed"))
+        (coverage("Cautious, learns"), coverage("Cautious, fixed"))
     };
     let (adaptive, fixed) = covered(1.0);
     assert_eq!((adaptive.by_sample_size.len(), fixed.by_sample_size.len()), (4, 1));

@@ -49,7 +49,7 @@ impl StrategyKind {
     pub fn name(self) -> &'static str {
         match self {
             StrategyKind::Adaptive => framework_name(Framework::Adaptive),
-            StrategyKind::CostBlind => "Robust, blind to costs",
+            StrategyKind::CostBlind => "Cautious, blind to costs",
             StrategyKind::Static => framework_name(Framework::Static),
             StrategyKind::PlugIn => framework_name(Framework::PlugIn),
             StrategyKind::SixtyForty => "60/40",
@@ -70,12 +70,12 @@ impl StrategyKind {
 /// The name of a framework of policies.
 pub fn framework_name(framework: Framework) -> &'static str {
     match framework {
-        Framework::Adaptive => "Robust, learns",
-        Framework::Static => "Robust, fixed",
+        Framework::Adaptive => "Cautious, learns",
+        Framework::Static => "Cautious, fixed",
         Framework::KnownLaw => "Knows the market",
         Framework::PlugIn => "Trusts the record",
-        Framework::ParametricStatic => "Robust, fixed, bell curve",
-        Framework::ParametricAdaptive => "Robust, learns, bell curve",
+        Framework::ParametricStatic => "Cautious, fixed, bell curve",
+        Framework::ParametricAdaptive => "Cautious, learns, bell curve",
     }
 }
 
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn a_name_has_the_digits_that_its_share_has() {
-        assert_eq!([at_level(0.1), at_level(0.025)], ["Robust, learns, 90 %", "Robust, learns, 97.5 %"]);
+        assert_eq!([at_level(0.1), at_level(0.025)], ["Cautious, learns, 90 %", "Cautious, learns, 97.5 %"]);
         let tenths: Vec<String> = [0, 3, 6, 7, 10].map(|tenth| mix_name(f64::from(tenth) / 10.0)).into();
         assert_eq!(tenths, ["All in the bank", "30 % in stocks", "60/40", "70 % in stocks", "All in stocks"]);
         assert_eq!(own_mix_name(0.25), "Hindsight: 25.0 % in stocks");

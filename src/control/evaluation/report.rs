@@ -50,7 +50,7 @@ pub struct Costs {
 /// One strategy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StrategyReport {
-    /// Its name: `Robust, learns`, `50 % in stocks`, `All in the bank` and the like.
+    /// Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like.
     pub strategy: String,
     /// Null for constant mixes.
     pub framework: Option<Framework>,

@@ -286,7 +286,7 @@ mod tests {
     #[test]
     fn the_verdict_follows_the_figures_either_way() {
         let all = [
-            figures("Robust, learns", 103.0, [0.0; 2], Some(3)),
+            figures("Cautious, learns", 103.0, [0.0; 2], Some(3)),
             figures("All in the bank", 104.0, [-1.5, -0.5], Some(1)),
             figures("Trusts the record", 101.0, [1.0, 3.0], Some(4)),
             figures("60/40", 103.5, [-1.5, 0.5], Some(2)),
@@ -294,7 +294,7 @@ mod tests {
         ];
         assert_eq!(
             ranking(&all, 0),
-            "With “Robust, learns” a year from 100 counts as 103.00 for certain, place 3 of 4. The first is “All in the \
+            "With “Cautious, learns” a year from 100 counts as 103.00 for certain, place 3 of 4. The first is “All in the \
              bank” with 104.00."
         );
         assert_eq!(

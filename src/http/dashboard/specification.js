@@ -9,12 +9,12 @@ import { unitOf } from "./periods.js";
 
 /** The kinds of policy in a manager's words; `PAPER` has the paper's. */
 export const FRAMEWORKS = {
-  adaptive: "Robust, learns",
-  static: "Robust, fixed",
+  adaptive: "Cautious, learns",
+  static: "Cautious, fixed",
   known_law: "Knows the market",
   plug_in: "Trusts the record",
-  parametric_static: "Robust, fixed, bell curve",
-  parametric_adaptive: "Robust, learns, bell curve",
+  parametric_static: "Cautious, fixed, bell curve",
+  parametric_adaptive: "Cautious, learns, bell curve",
 };
 export const PAPER = {
   adaptive: "Adaptive robust",

@@ -2554,7 +2554,7 @@ class StrategyReport(TypedDict):
     """One strategy."""
 
     strategy: str
-    """Its name: `Robust, learns`, `50 % in stocks`, `All in the bank` and the like."""
+    """Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like."""
     framework: NotRequired[Framework | None]
     constant_mix: NotRequired[float | None]
     """The allocation of a constant mix."""
