@@ -48,9 +48,10 @@ pub struct BridgeLaw {
 }
 
 impl AbsoluteBridges {
-    /// The law of the statistic of `law`, at the times of these bridges. Cost O(times^1.5): 5 ms at 240 values, 60 ms from 1,025 on.
+    /// The law of the statistic of `law`, at the times of these bridges. Cost O(times^1.5): 25 ms at 240 values, 55 ms
+    /// from 1,025 on.
     ///
-    /// Checked by: `the_law_has_the_quantiles_that_are_known` `quantiles_of_laws_drawn_at_random_are_those_of_many_paths`, and
+    /// Checked by: `the_law_has_the_quantiles_that_are_known`, `quantiles_of_laws_drawn_at_random_are_those_of_many_paths`, and
     /// against a million paths `tests/solver/control.rs`.
     pub fn exact(&self, law: &EmpiricalDistribution) -> BridgeLaw {
         let time = |index: usize| match &self.times {
