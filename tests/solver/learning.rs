@@ -206,7 +206,7 @@ async fn an_evaluation_measures_coverage_by_weight() {
     let app = App::start().await;
     let law =
         json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.008, "variance": 0.001 }] });
-    let wide = json!({ "rule": "bridge", "alpha": 0.1 });
+    let wide = json!({ "rule": "bridge", "alpha": 0.1, "paths": 500 });
     let mut asked = request(1, wide, decay());
     asked["problem"]["law"] = law;
     asked["problem"]["history"] = json!((0..40).map(|k| 0.008 + 0.001 * f64::from(k)).collect::<Vec<f64>>());

@@ -337,9 +337,9 @@ impl App {
         job["job"].as_str().expect("a job").to_owned()
     }
 
-    /// Waits until the job satisfies `reached`.
+    /// Waits until the job satisfies `reached`. Beside the jobs of other tests it gets a small part of the processors.
     pub async fn until(&self, job: &str, reached: impl Fn(&Value) -> bool) -> Value {
-        let deadline = Instant::now() + patience::patience();
+        let deadline = Instant::now() + 3 * patience::patience();
         let mut steps_done = 0;
         loop {
             let (_, now) = self.get(&format!("/jobs/{job}")).await;
