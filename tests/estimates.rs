@@ -4,6 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use ballast::control::assets::advising::FundsBall;
 use ballast::control::error::TrainError;
 use ballast::control::estimate;
 use ballast::control::evaluation::assets::AssetsBacktest;
@@ -184,9 +185,9 @@ fn walks_of_assets(pool: &TrainingPool) {
     let backtest = request(30, 1912, 1900);
     let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
     let (taken, _) = most_bytes(|| {
-        let radii = pool.install(|| backtest.radii(&watch, &|| {})).unwrap();
+        let balls = pool.install(|| backtest.balls(&watch, &|| {})).unwrap();
         let strategies = backtest.strategies()[..THREADS].to_vec();
-        pool.install(|| pool::map(strategies, |strategy| backtest.decide(strategy, &radii, &watch, &|| {}).unwrap()))
+        pool.install(|| pool::map(strategies, |strategy| backtest.decide(strategy, &balls, &watch, &|| {}).unwrap()))
     });
     holds("a long window", estimated, taken);
     let backtest = request(20, 4000, 24);
@@ -195,8 +196,9 @@ fn walks_of_assets(pool: &TrainingPool) {
     let (taken, _) = most_bytes(|| {
         let share = |period: usize| (0..20).map(|asset| 0.003 * (period + asset) as f64 % 0.05).collect();
         let held = vec![(0..lived).map(share).collect::<Vec<Vec<f64>>>(); strategies];
-        let radii = [vec![0.0123456789; lived]];
-        serde_json::to_string(&AssetsBacktestReport::new(&backtest.walked(&radii, held))).unwrap()
+        let ball = FundsBall { radius_factor: 1.0, radius: 0.0123456789, levels: None };
+        let balls = [vec![ball; lived]];
+        serde_json::to_string(&AssetsBacktestReport::new(&backtest.walked(&balls, held))).unwrap()
     });
     holds("a record of several assets", estimated, taken);
 }

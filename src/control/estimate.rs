@@ -4,8 +4,9 @@
 //! the constants below are what one thing of each takes, found by counting what the allocator was asked for
 //! (`tests/estimates.rs` holds the estimates to it).
 
+use super::assets::advising::FACTOR_PATHS;
 use super::bellman::problem::Problem;
-use super::evaluation::assets::{AssetsBacktest, PATHS};
+use super::evaluation::assets::AssetsBacktest;
 use super::evaluation::backtest::Backtest;
 use super::policy::Policy;
 use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
@@ -292,7 +293,7 @@ pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, thread
     let books = product(&[backtest.lived().len(), strategies, DECIDED_BYTES]);
     let known = backtest.choices.windows.iter().map(|window| window.unwrap_or(periods)).max().unwrap_or_default();
     let steps = product(&[threads, known, backtest.record.assets.len(), STEP_NUMBERS, NUMBER]);
-    let bridges = product(&[threads, known, PATHS, NUMBER]);
+    let bridges = product(&[threads, known, FACTOR_PATHS, NUMBER]);
     let record = held.saturating_add(books).saturating_add(LEAST);
     Footprint::of(field, periods, record).and("windows", backtest.choices.windows.len(), steps.saturating_add(bridges))
 }

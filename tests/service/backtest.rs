@@ -319,7 +319,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
     assert_eq!((report["dates"].as_array().unwrap().len(), &report["dates"][0]), (16, &json!("2013-01")));
     let names: Vec<&str> =
         report["strategies"].as_array().unwrap().iter().map(|one| one["strategy"].as_str().unwrap()).collect();
-    assert_eq!((names.len(), names[0], names[16]), (18, "Robust, half the caution, knows 3 years", "Equal shares"));
+    assert_eq!((names.len(), names[0], names[20]), (22, "Robust, bold, knows 3 years", "Equal shares"));
 
     let (mut wealth, mut held) = (100.0, [0.0, 0.0]);
     let mut highest: f64 = 100.0;
@@ -331,7 +331,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
         held = grown.map(|position| position / (grown[0] + grown[1]));
         highest = highest.max(wealth);
         fall = fall.max(1.0 - wealth / highest);
-        let found = report["periods"][16]["wealth"][quarter - 12].as_f64().unwrap();
+        let found = report["periods"][20]["wealth"][quarter - 12].as_f64().unwrap();
         assert!((found / wealth - 1.0).abs() < 1e-12, "{quarter}: {found} {wealth}");
     }
     let equal = &report["strategies"][16];

@@ -632,6 +632,8 @@ fn faulty_walks_of_assets() -> Vec<(&'static str, Value, &'static str)> {
         ("every", json!(2001), "every"),
         ("alpha", json!(1.0), "alpha"),
         ("alpha", json!([0.1]), "alpha"),
+        ("support", json!({ "rule": "worst_seen", "factor": 0.5 }), "support.factor"),
+        ("support", json!({ "rule": "between", "min": 0.0, "max": 0.2 }), "simple_returns[3][0]"),
         ("risk_aversion", json!(0.9), "risk_aversion"),
         ("trading_cost", json!(0.2), "trading_cost"),
         ("seed", json!(0.5), "seed"),

@@ -36,12 +36,17 @@ impl BacktestArgs {
             ("--count", self.count.map(|count| count.to_string())),
             ("--cost-blind", self.cost_blind.then(|| "given".to_owned())),
             ("--scale", self.scale.map(|scale| scale.to_string())),
-            ("--caution", self.caution.map(|caution| caution.name().to_owned())),
-            ("--support", self.support.map(|_| "given".to_owned())),
             ("--centre", self.centre.as_ref().map(|centre| centre.name().to_owned())),
         ];
         if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {
             return Err(refused(option, value, "must be left out of several assets, for which nothing is trained"));
+        }
+        if let Some(caution) = self.caution {
+            return Err(refused(
+                "--caution",
+                caution.name(),
+                "must be left out of several assets: every level is walked",
+            ));
         }
         let usual = AssetsChoices::usual(record.periods_per_year, record.rows.len());
         let window = |window: &Window| match window {
@@ -64,6 +69,7 @@ impl BacktestArgs {
             windows: if windows.is_empty() { usual.windows } else { windows },
             every: self.every.unwrap_or(usual.every),
             alpha,
+            support: self.support.unwrap_or(usual.support),
             risk_aversion: self.risk_aversion,
             trading_cost: self.trading_cost()?,
             seed: self.seed,

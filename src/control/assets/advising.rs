@@ -9,7 +9,7 @@ use crate::control::policy::one_period::OnePeriod;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
-use crate::control::request::caution::CautionLevel;
+use crate::control::request::caution::{CautionLevel, CautionLevels};
 use crate::control::request::fund::CompositionRule;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
@@ -17,7 +17,7 @@ use crate::control::request::support::{Extent, Support};
 use crate::numerics::fund_bridges::FundBridges;
 
 /// Paths of the joint factor: its standard error is then a hundredth of it.
-const FACTOR_PATHS: usize = 1000;
+pub const FACTOR_PATHS: usize = 1000;
 /// Returns up to which what each level would hold is solved too: a fraction of a second.
 const SOLVED_BY_LEVEL: usize = 6000;
 
@@ -67,6 +67,37 @@ fn step_above(
     )
 }
 
+/// The ball around the law of several assets that holds for all of their funds at once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FundsBall {
+    /// What the radius of the fund of inverse volatilities is multiplied by.
+    pub radius_factor: f64,
+    /// In log-return, at the paper's caution.
+    pub radius: f64,
+    /// What of it the levels act on, where one of them is followed.
+    pub levels: Option<Box<CautionLevels>>,
+}
+
+impl FundsBall {
+    /// That of `problem`, whose fund of inverse volatilities is `fund`. Cost: the joint factor under `bridge` and `calibrated`, and
+    /// that of [`Specification::resolved`](crate::control::request::specification::Specification::resolved).
+    ///
+    /// # Errors
+    /// The history of the fund breaks a rule, which a completed one does not.
+    pub fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
+        let radius_factor = radius_factor(problem, fund.problem(), fund.seed());
+        let fund = fund.within(radius_factor).resolved();
+        // A rule without levels has no share of its radius to act on.
+        let whole = if fund.problem().takes_levels() { fund.at(CautionLevel::Paper) } else { fund };
+        Ok(FundsBall { radius_factor, radius: whole.radius()?, levels: whole.problem().levels.clone() })
+    }
+
+    /// In log-return, at a level.
+    pub fn radius_at(&self, level: CautionLevel) -> f64 {
+        self.radius * level.share(self.levels.as_deref())
+    }
+}
+
 impl AssetsAdvice {
     /// The advice for `problem`, whose fund of inverse volatilities is `fund`.
     /// Cost: that of its levels of caution, where one is followed; that of [`AssetsStep::solve`], twice where a return may fall below
@@ -78,12 +109,10 @@ impl AssetsAdvice {
     /// The history of the fund breaks a rule, which a completed one does not.
     pub fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
         let rows = &problem.history;
-        let radius_factor = radius_factor(problem, fund.problem(), fund.seed());
-        let fund = fund.within(radius_factor).resolved();
-        let radius = fund.radius()?;
-        let levels = fund.problem().levels.as_ref().zip(fund.problem().caution);
-        let whole = levels.map(|_| fund.at(CautionLevel::Paper).radius()).transpose()?.unwrap_or(radius);
+        let ball = FundsBall::of(problem, fund)?;
         let fund = fund.problem();
+        let followed = fund.caution_level().unwrap_or(CautionLevel::Paper);
+        let radius = ball.radius_at(followed);
         let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve(None);
         let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -95,11 +124,12 @@ impl AssetsAdvice {
                 .iter()
                 .sum()
         });
-        let levels = levels.map(|(found, followed)| {
+        let levels = ball.levels.as_deref().map(|found| {
             let at = |share: f64| {
                 let is_short = rows.len() * problem.assets.len() <= SOLVED_BY_LEVEL;
-                is_short
-                    .then(|| step(problem, fund, rows, share * whole).solve(Some(&solution)).allocation.iter().sum())
+                is_short.then(|| {
+                    step(problem, fund, rows, share * ball.radius).solve(Some(&solution)).allocation.iter().sum()
+                })
             };
             LevelsAdvised::of(found, followed, at)
         });
@@ -113,7 +143,7 @@ impl AssetsAdvice {
             bound: bank * solution.bound.exp(),
             floor: bank,
             radius,
-            radius_factor,
+            radius_factor: ball.radius_factor,
             sample_size: rows.len(),
             worst_means: worst_means(&problem.assets, rows, &solution),
             levels,

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::framework::Framework;
 
 /// A kind of strategy that walks through a record, which decides its colour and its sentences.
@@ -100,11 +101,11 @@ pub fn own_mix_name(share: f64) -> String {
 }
 
 /// How much of the measured radius is taken, in words.
-pub fn caution_in_words(scale: f64) -> String {
-    match scale {
-        0.5 => "half the caution".into(),
-        1.0 => "full caution".into(),
-        _ => format!("{scale} times the caution"),
+pub fn caution_in_words(level: CautionLevel) -> String {
+    match level {
+        CautionLevel::Paper => "full caution".into(),
+        CautionLevel::Scale(scale) => format!("{scale} times the caution"),
+        found => found.name().into(),
     }
 }
 

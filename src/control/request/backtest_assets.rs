@@ -10,6 +10,7 @@ use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, bounds, days, defau
 use super::frequency::Frequency;
 use super::rules::{whole, within};
 use super::specification::default_seed;
+use super::support::Support;
 use crate::control::error::FieldError;
 
 /// Log-returns that all one-step problems of a walk together read: some hours of two cores.
@@ -46,6 +47,9 @@ pub struct AssetsBacktestRequest {
     /// Miscoverage of the radius. Default: 0.1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<f64>,
+    /// The log-returns of each asset that the adversary may use.
+    #[serde(default)]
+    pub support: Support,
     /// Relative: 1 is log utility.
     #[serde(default = "defaults::risk_aversion")]
     pub risk_aversion: f64,

@@ -28,6 +28,15 @@ impl CautionLevel {
         CautionLevel::FOUND.contains(&self)
     }
 
+    /// Of the radius, where these levels were found; a level that was not is the whole of it.
+    pub fn share(self, found: Option<&CautionLevels>) -> f64 {
+        match self {
+            CautionLevel::Paper => 1.0,
+            CautionLevel::Scale(scale) => scale,
+            level => found.and_then(|levels| levels.of(level)).map_or(1.0, |level| level.scale),
+        }
+    }
+
     /// As on the wire.
     pub fn name(self) -> &'static str {
         match self {

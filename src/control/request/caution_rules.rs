@@ -32,12 +32,7 @@ impl ProblemSpecification {
     /// The radius rule with the share of its radius that is acted on.
     pub fn radius_in_force(&self) -> RadiusRule {
         let level = self.caution_level().unwrap_or(CautionLevel::Paper);
-        let share = match level {
-            CautionLevel::Paper => 1.0,
-            CautionLevel::Scale(scale) => scale,
-            found => self.levels.as_ref().and_then(|levels| levels.of(found)).map_or(1.0, |level| level.scale),
-        };
-        self.radius_rule().scaled(share)
+        self.radius_rule().scaled(level.share(self.levels.as_deref()))
     }
 
     /// Checks the support.

@@ -45,14 +45,14 @@ impl Worker {
         let checkpoints = self.checkpoints(claimed)?;
         let watch = Watch { stop, progress: &|_| {} };
         let report = self.pool.install(|| {
-            let radii = backtest.radii(&watch, &|| {})?;
+            let balls = backtest.balls(&watch, &|| {})?;
             let decide = |(index, strategy)| {
-                let decided = || backtest.decide(strategy, &radii, &watch, &|| {});
+                let decided = || backtest.decide(strategy, &balls, &watch, &|| {});
                 self.checkpointed(claimed, &checkpoints, Some(index), decided)
             };
             let held = pool::map(backtest.strategies().into_iter().enumerate().collect(), decide);
             let held = held.into_iter().collect::<Result<_, Ended>>()?;
-            Ok::<_, Ended>(AssetsBacktestReport::new(&backtest.walked(&radii, held)))
+            Ok::<_, Ended>(AssetsBacktestReport::new(&backtest.walked(&balls, held)))
         })?;
         reported(&report)
     }

@@ -32,6 +32,7 @@ impl AssetsBacktest {
             windows: request.windows.clone().unwrap_or(usual.windows),
             every: request.every.unwrap_or(usual.every),
             alpha: request.alpha.unwrap_or(usual.alpha),
+            support: request.support,
             risk_aversion: request.risk_aversion,
             trading_cost: request.trading_cost,
             seed: request.seed,

@@ -2,25 +2,31 @@
 //!
 //! Before a period a strategy chooses shares of wealth in the assets, the rest in the bank, from the returns that it knows, and they
 //! are held through it; nothing later is used. *Robust* is the one-step problem ([`crate::control::assets`]) under power or log
-//! utility. Its radius is that of all funds at once ([`FundBridges::joint_factor`]) times a scale, and is measured at the start of
-//! every stretch of periods. *Static* solves once a stretch and keeps its shares; *plug-in* has the radius 0. No strategy knows of
+//! utility. Its ball is that of `POST /advise` ([`FundsBall`]) at a level of caution, and is found at the start of every stretch of
+//! periods. *Static* solves once a stretch and keeps its shares; *plug-in* has the radius 0. No strategy knows of
 //! the trading cost. Nothing is trained: a policy of a fund over many periods holds what the one-step problem proposes, and its
 //! worth beyond that is some basis points a year.
 
 use self::report::AssetsChoices;
 use self::rules::{AssetsStrategy, Rule, equal, strategies};
+use crate::control::assets::advising::FundsBall;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
 use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
+use crate::control::kept::Kept;
+use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
-use crate::control::request::assets::{DATES, check_names, check_rows};
+use crate::control::request::assets::{AssetsProblem, DATES, check_names, check_rows};
 use crate::control::request::backtest::{ALPHA, RELATIVE, defaults, too_long, usual_window};
+use crate::control::request::caution::CautionLevel;
+use crate::control::request::caution_rules::check_support;
 use crate::control::request::frequency::Frequency;
+use crate::control::request::frontier::asked_of;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::{TRADING_COST, whole, within};
-use crate::control::request::specification::{UtilitySpecification, default_seed};
-use crate::numerics::fund_bridges::FundBridges;
-use crate::numerics::levelling::inverse_volatility;
+use crate::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
+use crate::control::request::support::Support;
 
 mod asked;
 mod figures;
@@ -28,8 +34,6 @@ pub mod report;
 pub mod rules;
 mod words;
 
-/// Simulated bridges: the standard error of a radius is then a hundredth of it or two.
-pub const PATHS: usize = 500;
 /// Years that windows have, beside all.
 const WINDOW_YEARS: [usize; 2] = [10, 20];
 /// Windows at most.
@@ -109,6 +113,7 @@ impl AssetsChoices {
             every: periods_per_year,
             alpha: 0.1,
             risk_aversion: defaults::risk_aversion(),
+            support: Support::default(),
             trading_cost: 0.0,
             seed: default_seed(),
         }
@@ -128,6 +133,8 @@ impl AssetsChoices {
         }
         whole("every", self.every, &(1..=*DATES.end()))?;
         within("alpha", self.alpha, ALPHA.0, ALPHA.1)?;
+        check_support(self.support)
+            .map_err(|error| FieldError { field: error.field.replacen("problem.", "", 1), ..error })?;
         within("risk_aversion", self.risk_aversion, RELATIVE.0, RELATIVE.1)?;
         within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)
     }
@@ -148,10 +155,11 @@ impl AssetsBacktest {
             return Err(too_long(first, found, year));
         }
         let backtest = AssetsBacktest { record, choices, first };
+        let support = Some(backtest.choices.support);
         for window in &backtest.choices.windows {
             for start in backtest.starts() {
                 let known = backtest.record.known(start, *window);
-                check_rows("simple_returns", known, &backtest.record.assets, None).map_err(|error| {
+                check_rows("simple_returns", known, &backtest.record.assets, support).map_err(|error| {
                     let rule = format!("{}, in the {} periods before period {}", error.rule, known.len(), start + 1);
                     FieldError::new(error.field, error.value, rule)
                 })?;
@@ -206,67 +214,78 @@ impl AssetsBacktest {
     /// # Errors
     /// [`TrainError::Stopped`].
     pub fn run(self, watch: &Watch, done: &(dyn Fn() + Sync)) -> Result<AssetsWalked, TrainError> {
-        let radii = self.radii(watch, done)?;
-        let held = pool::map(self.strategies(), |strategy| self.decide(strategy, &radii, watch, done));
-        Ok(self.walked(&radii, held.into_iter().collect::<Result<_, _>>()?))
+        let balls = self.balls(watch, done)?;
+        let held = pool::map(self.strategies(), |strategy| self.decide(strategy, &balls, watch, done));
+        Ok(self.walked(&balls, held.into_iter().collect::<Result<_, _>>()?))
     }
 
-    /// The radius of all funds at once, window by window, at the start of every stretch.
+    /// The ball that holds for all funds at once, window by window, at the start of every stretch: as `POST /advise` finds it.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
-    pub fn radii(&self, watch: &Watch, done: &(dyn Fn() + Sync)) -> Result<Vec<Vec<f64>>, TrainError> {
-        let radius = |(window, start): (Option<usize>, usize)| {
+    pub fn balls(&self, watch: &Watch, done: &(dyn Fn() + Sync)) -> Result<Vec<Vec<FundsBall>>, TrainError> {
+        let ball = |(window, start): (Option<usize>, usize)| {
             watch.go_on()?;
-            let rows = self.record.known(start, window);
-            let bridges = FundBridges::simulate(rows, PATHS, self.choices.seed);
-            let own = bridges.quantile(&inverse_volatility(rows), self.choices.alpha).value;
-            let radius = bridges.joint_factor(self.choices.alpha).value * own / (rows.len() as f64).sqrt();
+            let problem = self.problem(start, window);
+            let fund = problem.fund(self.choices.seed)?;
+            let ball = FundsBall::of(&problem, &OnePeriod::new(&fund, Kept::default()))?;
             done();
-            Ok(radius)
+            Ok(ball)
         };
         let of_window = |&window: &Option<usize>| {
             let starts = self.starts().map(|start| (window, start)).collect();
-            pool::map(starts, radius).into_iter().collect()
+            pool::map(starts, ball).into_iter().collect()
         };
         self.choices.windows.iter().map(of_window).collect()
     }
 
-    /// What a strategy holds in every period, where the radii are those.
+    /// What `POST /advise` is asked before a period by who knows a window. The bank is taken to go on paying what it paid last.
+    fn problem(&self, period: usize, window: Option<usize>) -> AssetsProblem {
+        let asked = ProblemSpecification {
+            utility: self.utility(),
+            radius: Some(RadiusRule::bridge(self.choices.alpha)),
+            caution: Some(CautionLevel::Balanced),
+            support: Some(self.choices.support),
+            ..ProblemSpecification::of(Vec::new(), self.record.bank[period - 1])
+        };
+        asked_of(self.record.assets.clone(), self.record.known(period, window).to_vec(), &asked)
+    }
+
+    /// What a strategy holds in every period, where the balls are those.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
     pub fn decide(
         &self,
         strategy: AssetsStrategy,
-        radii: &[Vec<f64>],
+        balls: &[Vec<FundsBall>],
         watch: &Watch,
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<f64>>, TrainError> {
-        strategy.decide(self, self.radii_of(strategy, radii), watch, done)
+        strategy.decide(self, self.balls_of(strategy, balls), watch, done)
     }
 
     /// The books of what every strategy held.
-    pub fn walked(self, radii: &[Vec<f64>], held: Vec<Vec<Vec<f64>>>) -> AssetsWalked {
-        let line = |(strategy, held)| self.line(strategy, held, self.radii_of(strategy, radii));
+    pub fn walked(self, balls: &[Vec<FundsBall>], held: Vec<Vec<Vec<f64>>>) -> AssetsWalked {
+        let line = |(strategy, held)| self.line(strategy, held, self.balls_of(strategy, balls));
         let lines = self.strategies().into_iter().zip(held).map(line).collect();
         AssetsWalked { lines, backtest: self }
     }
 
-    fn radii_of<'a>(&self, strategy: AssetsStrategy, radii: &'a [Vec<f64>]) -> &'a [f64] {
+    fn balls_of<'a>(&self, strategy: AssetsStrategy, balls: &'a [Vec<FundsBall>]) -> &'a [FundsBall] {
         let at = self.choices.windows.iter().position(|window| *window == strategy.window);
-        at.map_or(&[][..], |at| &radii[at])
+        at.map_or(&[][..], |at| &balls[at])
     }
 
-    fn line(&self, strategy: AssetsStrategy, held: Vec<Vec<f64>>, radii: &[f64]) -> AssetsLine {
+    fn line(&self, strategy: AssetsStrategy, held: Vec<Vec<f64>>, balls: &[FundsBall]) -> AssetsLine {
         let keep =
             |held: &[Vec<f64>]| keep_assets(held, self.lived(), self.bank(), self.choices.trading_cost, INITIAL_WEALTH);
         let account = keep(&held);
         let is_equal = matches!(strategy.rule, Rule::Equal { .. });
         let mix = |total| keep(&vec![equal(self.record.assets.len(), total); held.len()]);
         let own_mix = (!is_equal).then(|| MixBooks::new(account.mean_allocation(), mix));
-        let scale = strategy.rule.scale().unwrap_or_default();
-        let radius = |period: usize| radii.get(period / self.choices.every).map_or(0.0, |radius| scale * radius);
+        let level = strategy.rule.caution().unwrap_or(CautionLevel::Scale(0.0));
+        let radius = |period: usize| balls.get(period / self.choices.every).map_or(0.0, |ball| ball.radius_at(level));
         let name = strategy.name(|window| self.window_in_words(window));
         AssetsLine { name, strategy, radii: (0..held.len()).map(radius).collect(), held, account, own_mix }
     }
@@ -276,6 +295,7 @@ impl AssetsBacktest {
 mod tests {
     use super::report::AssetsBacktestReport;
     use super::*;
+    use crate::control::assets::advice::AssetsAdvice;
     use crate::control::evaluation::analysis::{Analysis, Line};
     use crate::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
     use crate::control::evaluation::names::StrategyKind;
@@ -323,7 +343,7 @@ mod tests {
         let walked = walk(record(3, 30, |_, period| log_return(0, period)));
         let lived: Vec<Period> =
             (12..30).map(|period| Period { log_return: log_return(0, period), bank_return: BANK }).collect();
-        let names = ["Equal shares", "60 % in equal shares", "Robust, half the caution, knows 3 years"];
+        let names = ["Equal shares", "60 % in equal shares", "Robust, balanced, knows 3 years"];
         let line = |name: &str| {
             let decision = |share: &f64| Decision { band: Band::of(&[*share]), radius: 0.0, source: None };
             let decisions = named(&walked, name).account.allocations.iter().map(decision).collect();
@@ -384,10 +404,8 @@ mod tests {
         // Twelve periods of a hundredth of a basis point.
         assert!(mean([plug_in[0], plug_in[1]]) > best - 12.0 * 2.0 * 1e-6, "{plug_in:?}");
         let total = |name: &str| named(&walked, name).account.allocations[0];
-        assert!(
-            total("Robust, sup norm, full caution, knows all") < total("Robust, sup norm, half the caution, knows all")
-        );
-        assert!(total("Robust, sup norm, half the caution, knows all") < plug_in.iter().sum());
+        assert!(total("Robust, sup norm, full caution, knows all") < total("Robust, sup norm, balanced, knows all"));
+        assert!(total("Robust, sup norm, balanced, knows all") < plug_in.iter().sum());
     }
 
     #[test]
@@ -417,18 +435,29 @@ mod tests {
     #[test]
     fn static_keeps_its_shares_for_a_year_and_radii_are_those_of_its_start() {
         let walked = walk(record(2, 22, log_return));
-        let kept = named(&walked, "Robust, rarely renewed, half the caution, knows all");
+        let kept = named(&walked, "Robust, rarely renewed, balanced, knows all");
         assert!(kept.held.len() == 10 && kept.held.chunks(4).all(|year| year.iter().all(|held| *held == year[0])));
         assert_ne!(kept.held[3], kept.held[4]);
-        let robust = named(&walked, "Robust, half the caution, knows all");
+        let robust = named(&walked, "Robust, balanced, knows all");
         assert_eq!((&kept.held[0], &kept.radii), (&robust.held[0], &robust.radii));
         let wide = named(&walked, "Robust, full caution, knows all");
-        assert!(wide.radii.iter().zip(&robust.radii).all(|(one, half)| (one - 2.0 * half).abs() < 1e-12));
-        // Of one fund at least: its bridges' quantile over the root of the number of returns.
-        let rows = &walked.backtest.record.rows[..16];
-        let bridges = FundBridges::simulate(rows, PATHS, walked.backtest.choices.seed);
-        let half = bridges.quantile(&[0.5, 0.5], 0.9).value / 4.0;
-        assert!(wide.radii[4] > half && wide.radii[4] < 3.0 * half, "{} {half}", wide.radii[4]);
+        assert!(wide.radii.iter().zip(&robust.radii).all(|(whole, share)| share <= whole));
+    }
+
+    /// At every level, as `POST /advise` holds at the start of the walk.
+    #[test]
+    fn a_level_holds_what_advice_at_that_level_holds() {
+        let walked = walk(record(3, 24, log_return));
+        for (level, name) in
+            [(CautionLevel::Bold, "bold"), (CautionLevel::Cautious, "cautious"), (CautionLevel::Paper, "full caution")]
+        {
+            let line = named(&walked, &format!("Robust, {name}, knows 3 years"));
+            let problem = AssetsProblem { caution: Some(level), ..walked.backtest.problem(12, Some(12)) };
+            let fund = OnePeriod::new(&problem.fund(walked.backtest.choices.seed).unwrap(), Kept::default());
+            let advice = AssetsAdvice::of(&problem, &fund).unwrap();
+            assert_eq!(line.held[0], advice.allocation.into_values().collect::<Vec<f64>>(), "{name}");
+            assert!((line.radii[0] - advice.radius).abs() < 1e-12, "{name}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 use crate::control::evaluation::names::StrategyKind;
+use crate::control::request::support::Support;
 
 /// Name and version of the report's form.
 pub const FORMAT: &str = "ballast-backtest-assets-1";
@@ -49,6 +50,8 @@ pub struct AssetsChoices {
     pub every: usize,
     /// Miscoverage of the radius.
     pub alpha: f64,
+    /// The log-returns of each asset that the adversary may use.
+    pub support: Support,
     /// Relative.
     pub risk_aversion: f64,
     /// Lost of what is traded, as a share of it.

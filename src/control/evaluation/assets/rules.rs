@@ -1,34 +1,32 @@
 //! What to hold of several assets, by rule.
 
 use super::AssetsBacktest;
-use crate::control::assets::advising::floors;
+use crate::control::assets::advising::{FundsBall, floors};
 use crate::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
 use crate::control::error::TrainError;
 use crate::control::evaluation::names::{StrategyKind, caution_in_words};
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
+use crate::control::request::caution::CautionLevel;
 use crate::control::request::fund::GroundNorm;
-use crate::control::request::support::Support;
 use crate::numerics::least_variance::least_variance;
 use crate::numerics::levelling::inverse_volatility;
 
 /// How shares of wealth are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// The one-step problem, solved in every period. At scale 0 it is plug-in: the empirical law is taken as true.
+    /// The one-step problem, solved in every period. At no caution it is plug-in: the empirical law is taken as true.
     Robust {
         /// What moving a law costs the adversary.
         norm: GroundNorm,
-        /// Times the radius.
-        scale: f64,
+        /// Of the radius, what is acted on.
+        caution: CautionLevel,
     },
-    /// The same, solved at the start of every stretch and kept.
+    /// The same under the norm `scaled_one`, solved at the start of every stretch and kept.
     Static {
-        /// What moving a law costs the adversary.
-        norm: GroundNorm,
-        /// Times the radius.
-        scale: f64,
+        /// Of the radius, what is acted on.
+        caution: CautionLevel,
     },
     /// All wealth at the least variance.
     MinimumVariance,
@@ -50,20 +48,24 @@ pub struct AssetsStrategy {
     pub window: Option<usize>,
 }
 
-/// Multiples of the radius that are walked.
-const SCALES: [f64; 2] = [0.5, 1.0];
+/// What of the radius is walked with: under the norm `scaled_one`, and under `sup`.
+const LEVELS: [CautionLevel; 4] =
+    [CautionLevel::Bold, CautionLevel::Balanced, CautionLevel::Cautious, CautionLevel::Paper];
+const SUP_LEVELS: [CautionLevel; 2] = [CautionLevel::Balanced, CautionLevel::Paper];
+/// What trusts the record.
+const NONE: CautionLevel = CautionLevel::Scale(0.0);
 
 /// Those that are walked for each window, and the two that know nothing.
 pub fn strategies(windows: &[Option<usize>]) -> Vec<AssetsStrategy> {
-    let norms = [GroundNorm::ScaledOne, GroundNorm::Sup];
-    let robust = norms.into_iter().flat_map(|norm| SCALES.map(|scale| Rule::Robust { norm, scale }));
+    let robust = LEVELS.into_iter().map(|caution| Rule::Robust { norm: GroundNorm::ScaledOne, caution });
+    let sup = SUP_LEVELS.into_iter().map(|caution| Rule::Robust { norm: GroundNorm::Sup, caution });
     let others = [
-        Rule::Static { norm: GroundNorm::ScaledOne, scale: SCALES[0] },
-        Rule::Robust { norm: GroundNorm::Sup, scale: 0.0 },
+        Rule::Static { caution: CautionLevel::Balanced },
+        Rule::Robust { norm: GroundNorm::Sup, caution: NONE },
         Rule::MinimumVariance,
         Rule::InverseVolatility,
     ];
-    let rules: Vec<Rule> = robust.chain(others).collect();
+    let rules: Vec<Rule> = robust.chain(sup).chain(others).collect();
     let of_windows = windows.iter().flat_map(|&window| rules.iter().map(move |&rule| AssetsStrategy { rule, window }));
     let equal = [1.0, 0.6].map(|share| AssetsStrategy { rule: Rule::Equal { share }, window: None });
     of_windows.chain(equal).collect()
@@ -73,7 +75,7 @@ impl Rule {
     /// Its kind, whatever its scale.
     pub fn kind(self) -> StrategyKind {
         match self {
-            Rule::Robust { scale: 0.0, .. } => StrategyKind::PlugIn,
+            Rule::Robust { caution: NONE, .. } => StrategyKind::PlugIn,
             Rule::Robust { norm: GroundNorm::ScaledOne, .. } => StrategyKind::Robust,
             Rule::Robust { norm: GroundNorm::Sup, .. } => StrategyKind::RobustSup,
             Rule::Static { .. } => StrategyKind::RobustStatic,
@@ -84,10 +86,10 @@ impl Rule {
         }
     }
 
-    /// Times the radius, where there is one.
-    pub fn scale(self) -> Option<f64> {
+    /// What of the radius is acted on, where there is one.
+    pub fn caution(self) -> Option<CautionLevel> {
         match self {
-            Rule::Robust { scale, .. } | Rule::Static { scale, .. } => Some(scale).filter(|scale| *scale > 0.0),
+            Rule::Robust { caution, .. } | Rule::Static { caution, .. } => Some(caution).filter(|level| *level != NONE),
             _ => None,
         }
     }
@@ -101,7 +103,7 @@ pub fn equal(assets: usize, share: f64) -> Vec<f64> {
 impl AssetsStrategy {
     /// In words; `known` says of the window what it is.
     pub fn name(&self, known: impl Fn(Option<usize>) -> String) -> String {
-        let caution = self.rule.scale().map_or(String::new(), |scale| format!(", {}", caution_in_words(scale)));
+        let caution = self.rule.caution().map_or(String::new(), |level| format!(", {}", caution_in_words(level)));
         let window = match self.rule {
             Rule::Equal { .. } => String::new(),
             _ => format!(", knows {}", known(self.window)),
@@ -109,14 +111,14 @@ impl AssetsStrategy {
         format!("{}{caution}{window}", self.rule.kind().name())
     }
 
-    /// Shares of wealth in every period decided about; `radii` are those of the stretches. `done` hears of every stretch.
+    /// Shares of wealth in every period decided about; `balls` are those of the stretches. `done` hears of every stretch.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
     pub fn decide(
         &self,
         backtest: &AssetsBacktest,
-        radii: &[f64],
+        balls: &[FundsBall],
         watch: &Watch,
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<f64>>, TrainError> {
@@ -129,16 +131,18 @@ impl AssetsStrategy {
                 done();
             }
             let rows = backtest.record.known(period, self.window);
+            let mut solved = |norm: GroundNorm, caution: CautionLevel| {
+                let step = step(backtest, period, rows, norm, balls[stretch].radius_at(caution));
+                last.insert(step.solve(last.as_ref())).allocation.clone()
+            };
             let kept = held.last().filter(|_| matches!(self.rule, Rule::Static { .. }) && !is_start);
             let shares = match (kept, self.rule) {
                 (Some(kept), _) => kept.clone(),
                 (None, Rule::MinimumVariance) => least_variance(&covariance(rows)),
                 (None, Rule::InverseVolatility) => inverse_volatility(rows),
                 (None, Rule::Equal { share }) => equal(rows[0].len(), share),
-                (None, Rule::Robust { norm, scale } | Rule::Static { norm, scale }) => {
-                    let step = step(backtest, period, rows, norm, scale * radii[stretch]);
-                    last.insert(step.solve(last.as_ref())).allocation.clone()
-                }
+                (None, Rule::Robust { norm, caution }) => solved(norm, caution),
+                (None, Rule::Static { caution }) => solved(GroundNorm::ScaledOne, caution),
             };
             held.push(shares);
         }
@@ -152,7 +156,7 @@ fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: Groun
     let rate = backtest.record.bank[period - 1];
     // Under power and log utility wealth changes nothing.
     let utility = RelativeUtility::new(backtest.utility(), 1.0 + rate);
-    let law = AssetsLaw { returns: rows, radius, floors: floors(Support::None {}, rows) };
+    let law = AssetsLaw { returns: rows, radius, floors: floors(backtest.choices.support, rows) };
     AssetsStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
 }
 
