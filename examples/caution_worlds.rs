@@ -1,0 +1,136 @@
+//! What each level of caution costs where the truth is known.
+//!
+//!     cargo run --release --example caution_worlds [RECORDS]
+//!
+//! The true law is that of the bundled months of the US market, shifted so that their mean beyond the bank is none, half, or the whole
+//! of what it was. Of each world records of 60 to 480 months are drawn in circular blocks of a year. On each record every rule says
+//! what to hold for a month, and is scored by the true law: what is told is the certainty equivalent lost beside who knows that law,
+//! with its standard error by the drawing, in basis points a year. *Worst regret* is the largest, over the three worlds, of what a
+//! rule loses more than the share of the radius that loses least there. *Shrunk* takes the record for the truth, its premium halved.
+
+use std::error::Error;
+
+use ballast::control::problem::utility::RelativeUtility;
+use ballast::control::request::annualised::premium;
+use ballast::control::request::caution::CautionLevel;
+use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
+use ballast::numerics::block_bootstrap::circular_blocks;
+use ballast::numerics::streams::stream;
+use ballast::service::advise::Advise;
+
+const MONTHS: [usize; 4] = [60, 120, 240, 480];
+const PARTS: [f64; 3] = [0.0, 0.5, 1.0];
+const BLOCK: usize = 12;
+const SHARES: [f64; 7] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0];
+const LEVELS: [CautionLevel; 3] = CautionLevel::FOUND;
+const RULES: usize = SHARES.len() + LEVELS.len() + 1;
+/// Basis points of log certainty equivalent a month, in a year.
+const YEARLY: f64 = 12e4;
+/// Allocations among which the best is looked for.
+const GRID: usize = 1000;
+
+/// The true law of a world.
+struct Truth {
+    growths: Vec<f64>,
+    utility: RelativeUtility,
+    best: f64,
+}
+
+impl Truth {
+    fn of(log_returns: &[f64], bank: f64) -> Self {
+        let growths = log_returns.iter().map(|z| z.exp() / (1.0 + bank)).collect();
+        let utility = RelativeUtility::new(UtilitySpecification::default(), 1.0 + bank);
+        let truth = Truth { growths, utility, best: 0.0 };
+        let best = (0..=GRID).map(|part| truth.worth(part as f64 / GRID as f64)).fold(f64::NEG_INFINITY, f64::max);
+        Truth { best, ..truth }
+    }
+
+    fn worth(&self, allocation: f64) -> f64 {
+        let total: f64 = self.growths.iter().map(|growth| self.utility.at(1.0 + allocation * (growth - 1.0)).0).sum();
+        self.utility.inverse(total / self.growths.len() as f64)
+    }
+
+    /// Basis points a year.
+    fn lost(&self, allocation: f64) -> f64 {
+        YEARLY * (self.best - self.worth(allocation))
+    }
+}
+
+/// Log-returns moved so that their mean beyond the bank is this.
+fn shifted(log_returns: &[f64], bank: f64, mean_beyond: f64) -> Vec<f64> {
+    let (seen, _) = premium(log_returns, bank);
+    let shift = ((1.0 + bank + mean_beyond) / (1.0 + bank + seen)).ln();
+    log_returns.iter().map(|z| z + shift).collect()
+}
+
+/// What each rule holds: the shares of the radius, the levels, and the record with half of its premium.
+fn held(record: Vec<f64>, bank: f64) -> Result<[f64; RULES], Box<dyn Error>> {
+    let asked = |record: Vec<f64>, caution: CautionLevel| {
+        let problem =
+            ProblemSpecification { horizon: 1, caution: Some(caution), ..ProblemSpecification::of(record, bank) };
+        Advise { problem, wealth: None, holding: None, seed: 1, sensitivity: false }.answer()
+    };
+    let (seen, _) = premium(&record, bank);
+    let mut held = [0.0; RULES];
+    for (held, share) in held.iter_mut().zip(SHARES) {
+        *held = asked(record.clone(), CautionLevel::Scale(share))?.advice.allocation;
+    }
+    held[RULES - 1] = asked(shifted(&record, bank, 0.5 * seen), CautionLevel::Scale(0.0))?.advice.allocation;
+    let levels = asked(record, CautionLevel::Balanced)?.levels.ok_or("a level is followed")?.levels;
+    for (held, level) in held[SHARES.len()..].iter_mut().zip(LEVELS) {
+        let found = levels.iter().find(|found| found.level == level);
+        *held = found.and_then(|found| found.allocation).ok_or("a short record is solved")?;
+    }
+    Ok(held)
+}
+
+fn mean_and_error(values: &[f64]) -> [f64; 2] {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    [mean, (square / count).sqrt()]
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let records: usize = std::env::args().nth(1).map_or(Ok(200), |text| text.parse())?;
+    let months = include_str!("../data/us_market_monthly.csv").lines().skip(1);
+    let rows: Vec<Vec<f64>> =
+        months.map(|row| row.split(',').skip(1).map(str::parse).collect()).collect::<Result<_, _>>()?;
+    let market: Vec<f64> = rows.iter().map(|row| row[0].ln_1p()).collect();
+    let bank = rows.iter().map(|row| row[1]).sum::<f64>() / rows.len() as f64;
+    let (whole, _) = premium(&market, bank);
+    let names: Vec<String> = SHARES
+        .iter()
+        .map(|share| format!("share {share}"))
+        .chain(LEVELS.iter().map(|level| level.name().to_owned()))
+        .chain(["shrunk".to_owned()])
+        .collect();
+    println!("| months | rule | no premium | half | whole | worst regret |");
+    println!("|---|---|---|---|---|---|");
+    for count in MONTHS {
+        // Rule by rule and world by world.
+        let mut lost: Vec<[[f64; 2]; 3]> = vec![[[0.0; 2]; 3]; RULES];
+        for (world, part) in PARTS.iter().enumerate() {
+            let law = shifted(&market, bank, part * whole);
+            let truth = Truth::of(&law, bank);
+            let mut losses: Vec<Vec<f64>> = vec![Vec::new(); RULES];
+            for index in 0..records {
+                let places = circular_blocks(law.len(), BLOCK, &mut stream(1, "caution worlds", count, index));
+                let record = places.into_iter().take(count).map(|place| law[place]).collect();
+                let held = held(record, bank)?;
+                losses.iter_mut().zip(held).for_each(|(losses, share)| losses.push(truth.lost(share)));
+            }
+            lost.iter_mut().zip(&losses).for_each(|(lost, losses)| lost[world] = mean_and_error(losses));
+        }
+        let least: Vec<f64> = (0..PARTS.len())
+            .map(|world| lost[..SHARES.len()].iter().map(|lost| lost[world][0]).fold(f64::INFINITY, f64::min))
+            .collect();
+        for (name, lost) in names.iter().zip(&lost) {
+            let told: Vec<String> = lost.iter().map(|[mean, error]| format!("{mean:.0} ± {error:.0}")).collect();
+            let regret = |(lost, least): (&[f64; 2], &f64)| lost[0] - least;
+            let worst = lost.iter().zip(&least).map(regret).fold(f64::NEG_INFINITY, f64::max);
+            println!("| {count} | {name} | {} | {worst:.0} |", told.join(" | "));
+        }
+    }
+    Ok(())
+}
