@@ -517,3 +517,63 @@ fn the_joint_factor_of_independent_assets_errs_low() {
     let (together, among) = factors(0.6);
     assert!(among / together < 1.05, "{together} {among}");
 }
+
+/// Where trading costs, by all that a search for something better tries: what is held, everything sold, what is best without the
+/// cost, ways between them, and many allocations near the one found and far from it. Over laws, norms, costs and holdings drawn.
+#[test]
+fn holdings_and_a_cost_are_best_by_direct_search() {
+    let mut random = stream(5, "trading", 0, 0);
+    let (mut kept, mut moved) = (0, 0);
+    for case in 0..60 {
+        let assets = [2, 3, 5, 8][case % 4];
+        let returns = sample(assets, [24, 60, 120][case % 3], case);
+        let ground = ground(["sup", "scaled_one"][case / 2 % 2], &returns);
+        let utility = [POWER, RelativeUtility::Log, RelativeUtility::Power { eta: 8.0 }][case % 3];
+        let radius = 0.02 * random.random::<f64>().powi(2);
+        let cost = [0.0005, 0.005, 0.02, 0.1][random.random_range(0..4)];
+        let highest = [1.0, 0.6][usize::from(case % 5 == 0)];
+        let step = AssetsStep::new(
+            AssetsLaw { returns: &returns, radius, floors: vec![-0.4; assets] },
+            ground,
+            utility,
+            0.002,
+            ActionInterval { lowest: 0.0, highest },
+        );
+        // Up to all wealth is held, above the highest total too; some assets are not.
+        let draws: Vec<f64> = (0..assets).map(|_| (random.random::<f64>() - 0.3).max(0.0)).collect();
+        let scale = random.random::<f64>() / draws.iter().sum::<f64>().max(1e-9);
+        let holdings: Vec<f64> = draws.iter().map(|draw| draw * scale).collect();
+        let found = step.solve_from(&holdings, cost, None);
+        certified(&found);
+        let turnover = |allocation: &[f64]| -> f64 {
+            allocation.iter().zip(&holdings).map(|(share, held)| (share - held).abs()).sum()
+        };
+        let worth = |allocation: &[f64]| step.worth(allocation).value + (1.0 - cost * turnover(allocation)).ln();
+        assert!((worth(&found.allocation) - found.value).abs() < 0.002 * BP, "{case}: {found:?}");
+        let free = step.solve(None).allocation;
+        let towards = |other: &[f64], part: f64| -> Vec<f64> {
+            found.allocation.iter().zip(other).map(|(share, other)| share + part * (other - share)).collect()
+        };
+        let mut tried: Vec<Vec<f64>> = Vec::new();
+        for part in [1e-3, 0.03, 0.3, 1.0] {
+            tried.extend([&holdings, &free, &vec![0.0; assets]].map(|other| towards(other, part)));
+            for _ in 0..4 {
+                let other: Vec<f64> = (0..assets).map(|_| 2.0 * random.random::<f64>() / assets as f64).collect();
+                tried.push(towards(&other, part));
+            }
+            // From one asset into another, or into the bank.
+            let (from, to) = (random.random_range(0..assets), random.random_range(0..assets));
+            let mut other = found.allocation.clone();
+            other[to] += part * other[from];
+            other[from] -= part * found.allocation[from];
+            tried.push(other);
+        }
+        for allocation in tried.iter().filter(|allocation| allocation.iter().sum::<f64>() <= highest) {
+            assert!(worth(allocation) < found.bound + 1e-9, "{case}: {allocation:?} {found:?} {holdings:?}");
+        }
+        kept += found.allocation.iter().zip(&holdings).filter(|(share, held)| share == held).count();
+        moved += found.allocation.iter().zip(&holdings).filter(|(share, held)| share != held).count();
+    }
+    // What is held is kept where it is hardly off, to the bit, and changed where it is far.
+    assert!(kept > 30 && moved > 30, "{kept} {moved}");
+}

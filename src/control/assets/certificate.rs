@@ -1,6 +1,8 @@
 //! The bounds that the search tells of every point: they hold whatever its state.
 
+use super::AssetsStep;
 use super::interior::{Interior, dot};
+use super::trading::Tangent;
 use crate::numerics::dispatch::dispatched;
 
 /// Others enter where they raise the bound by more than this share of the gap without them, and with the one that raises it
@@ -13,7 +15,7 @@ impl Interior<'_> {
     pub fn tell_bounds(&mut self) {
         let assets = self.step.assets();
         let (shares, price) = (&self.point[..assets], self.point[assets]);
-        let (lower, _) = self.step.dual(&self.branches, price);
+        let lower = self.step.dual(&self.branches, price).0 - self.step.trading.taken(shares);
         if lower > self.lower {
             (self.lower, self.best, self.best_price) = (lower, shares.to_vec(), price);
         }
@@ -36,17 +38,27 @@ impl Interior<'_> {
                 }
             }
         });
-        self.held.iter().for_each(|&asset| others[asset] = f64::NEG_INFINITY);
         let steepest = |gradient: &[f64]| gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let (among, outside) = (steepest(&gradient), steepest(&others));
-        let total = self.step.total;
-        let upper =
-            |steepest: f64| mean + (total.highest * steepest).max(total.lowest * steepest) - dot(&gradient, shares);
-        self.upper = self.upper.min(upper(among.max(outside)));
-        if upper(among.max(outside)) - upper(among) > ENTERING * (upper(among) - self.lower) {
+        let along = dot(&gradient, shares);
+        let upper = |slopes: &[f64], step: &AssetsStep| mean + step.trading.most(slopes, step.total) - along;
+        let among = upper(&gradient, self.step);
+        let mut slopes = others.clone();
+        self.held.iter().zip(&gradient).for_each(|(&asset, slope)| slopes[asset] = *slope);
+        let all = upper(&slopes, self.whole);
+        if all - among > ENTERING * (among - self.lower) {
+            self.held.iter().for_each(|&asset| others[asset] = f64::NEG_INFINITY);
+            let (among, outside) = (steepest(&gradient), steepest(&others));
             let counts = |asset: &usize| others[*asset] - among > ENTERING_TOO * (outside - among);
             self.entering = (0..others.len()).filter(counts).collect();
         }
+        if all < self.upper {
+            (self.upper, self.tangent) = (all, Tangent { shares: shares.to_vec(), mean, slopes });
+        }
+    }
+
+    /// A tangent at shares of the assets searched among as one at shares of all.
+    pub fn of_all_assets(&self, tangent: &Tangent) -> Tangent {
+        Tangent { shares: self.of_all(&tangent.shares), ..tangent.clone() }
     }
 
     /// A row of the assets searched among as one of all.

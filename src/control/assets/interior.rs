@@ -10,7 +10,8 @@
 //!
 //! of which every multiplier m >= 0, sum_m m_jm = p_j, makes a law in the ball or, after a mixture with the centre, one that is.
 //! Multipliers and slacks follow Newton steps on `slack x multiplier = barrier x p_j`; where a branch has come or gone, or lies
-//! lower than the step foresaw, t_j gives way. Source: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7.
+//! lower than the step foresaw, t_j gives way. Where trading costs, u_i >= |a_i - h_i| join the point, and `p sum u_i` is taken off
+//! (`trading.rs`). Source: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7.
 
 mod newton;
 mod price;
@@ -18,6 +19,7 @@ mod price;
 use self::newton::Direction;
 use super::AssetsStep;
 use super::branches::Branches;
+use super::trading::Tangent;
 
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
 const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
@@ -72,7 +74,7 @@ pub(super) struct Interior<'a> {
     pub held: &'a [usize],
     /// Others that would raise the value by more than what is left to find among these.
     pub entering: Vec<usize>,
-    /// The shares, then the price gamma.
+    /// The shares, then the price gamma, then where trading costs what is traded of each asset.
     pub point: Vec<f64>,
     /// t_j.
     pub tops: Vec<f64>,
@@ -90,6 +92,8 @@ pub(super) struct Interior<'a> {
     /// What the best is worth at least, and every allocation at most, in relative utility.
     pub lower: f64,
     pub upper: f64,
+    /// Of the law that told the lowest upper bound.
+    pub tangent: Tangent,
     pub evaluations: usize,
 }
 
@@ -140,13 +144,21 @@ impl<'a> Interior<'a> {
             point.iter_mut().zip(shares).for_each(inside);
         }
         point.push(near.as_ref().map_or(middle, |(_, price)| price.max(LEAST_ROOM)));
-        let unit =
-            |index: usize| (0..=assets).map(|other| if other == index { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-        let sum = |sign: f64| (0..=assets).map(|other| if other < assets { sign } else { 0.0 }).collect::<Vec<f64>>();
+        point.extend(&step.trading.holdings);
+        let size = point.len();
+        let unit = |index: usize| (0..size).map(|other| if other == index { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+        let sum = |sign: f64| (0..size).map(|other| if other < assets { sign } else { 0.0 }).collect::<Vec<f64>>();
         let mut lines: Vec<(Vec<f64>, f64)> = (0..=assets).map(|index| (unit(index), 0.0)).collect();
         lines.push((sum(-1.0), highest));
         if lowest > 0.0 {
             lines.push((sum(1.0), -lowest));
+        }
+        for (asset, held) in step.trading.holdings.iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let mut line = unit(assets + 1 + asset);
+                line[asset] = sign;
+                lines.push((line, -sign * held));
+            }
         }
         let bounds =
             lines.into_iter().map(|(direction, offset)| Bound { direction, offset, multiplier: 0.0 }).collect();
@@ -168,6 +180,7 @@ impl<'a> Interior<'a> {
             pairs_before: Vec::new(),
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
+            tangent: Tangent::default(),
             evaluations: 0,
         };
         interior.price_the_start(near.is_some());
@@ -188,6 +201,12 @@ impl<'a> Interior<'a> {
             self.centre(atom);
         }
         let barrier = self.barrier * self.bound_weight;
+        let (assets, price) = (self.step.assets(), self.step.trading.price);
+        for (asset, held) in self.step.trading.holdings.iter().enumerate() {
+            // On the central path the multipliers of its two bounds sum to the price.
+            let moved = price * (self.point[asset] - held);
+            self.point[assets + 1 + asset] = (barrier + barrier.hypot(moved)) / price;
+        }
         for bound in &mut self.bounds {
             bound.multiplier = barrier / bound.slack(&self.point);
         }

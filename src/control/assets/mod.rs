@@ -24,10 +24,12 @@ mod certificate;
 pub mod composition;
 pub mod fund;
 mod interior;
+mod trading;
 pub mod worst;
 
 use self::branches::Branches;
 use self::interior::Interior;
+use self::trading::{Tangent, Trading};
 use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
@@ -59,6 +61,7 @@ pub struct AssetsStep {
     radius: f64,
     utility: RelativeUtility,
     total: ActionInterval,
+    trading: Trading,
 }
 
 /// The law of the coming returns and the set around it.
@@ -117,6 +120,7 @@ impl AssetsStep {
             radius: law.radius,
             utility,
             total,
+            trading: Trading::default(),
         }
     }
 
@@ -127,12 +131,12 @@ impl AssetsStep {
     /// at most.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
         let barrier = if near.is_some() { BARRIER_NEAR } else { BARRIERS[0] };
-        let mut best = self.search(self.first_held(near), near, barrier);
+        let (mut best, _) = self.search(self.first_held(near), near, barrier);
         for barrier in BARRIERS.into_iter().skip(usize::from(near.is_none())) {
             if best.bound - best.value < CONTENT {
                 break;
             }
-            let next = self.search((0..self.assets).collect(), None, barrier);
+            let (next, _) = self.search((0..self.assets).collect(), None, barrier);
             let (bound, evaluations) = (best.bound.min(next.bound), best.evaluations + next.evaluations);
             let better = if next.value > best.value { next } else { best };
             best = AssetsSolution { bound, evaluations, ..better };
@@ -140,10 +144,11 @@ impl AssetsStep {
         self.at_least_the_bank(best)
     }
 
-    /// The assets that a search begins with: those held near by, or, where few are ever held, the one of the highest mean.
+    /// The assets that a search begins with: those held already or near by, or, where few are ever held, the one of the highest mean.
     fn first_held(&self, near: Option<&AssetsSolution>) -> Vec<usize> {
-        let held: Vec<usize> =
-            (0..self.assets).filter(|&asset| near.is_some_and(|near| near.allocation[asset] > 0.0)).collect();
+        let counts =
+            |asset: usize| self.trading.holding(asset) > 0.0 || near.is_some_and(|near| near.allocation[asset] > 0.0);
+        let held: Vec<usize> = (0..self.assets).filter(|&asset| counts(asset)).collect();
         if !held.is_empty() {
             return held;
         }
@@ -169,8 +174,14 @@ impl AssetsStep {
         AssetsSolution { allocation: nothing.clone(), value: 0.0, bound: bound.max(0.0), mean_moves: nothing, ..found }
     }
 
-    /// Searches among the assets `held`, and among more once they would count: the bound is that of all.
-    fn search(&self, mut held: Vec<usize>, near: Option<&AssetsSolution>, mut barrier: f64) -> AssetsSolution {
+    /// Searches among the assets `held`, and among more once they would count: the bound is that of all, and so is the tangent that
+    /// is told beside it.
+    fn search(
+        &self,
+        mut held: Vec<usize>,
+        near: Option<&AssetsSolution>,
+        mut barrier: f64,
+    ) -> (AssetsSolution, Tangent) {
         let mut start = near.map(|near| (held.iter().map(|&asset| near.allocation[asset]).collect(), near.multiplier));
         let (mut upper, mut evaluations) = (f64::INFINITY, 0);
         loop {
@@ -180,7 +191,7 @@ impl AssetsStep {
             upper = interior.upper.min(upper);
             evaluations += interior.evaluations;
             if interior.entering.is_empty() {
-                return among.told(&interior, upper, evaluations);
+                return (among.told(&interior, upper, evaluations), interior.of_all_assets(&interior.tangent));
             }
             let entering = std::mem::take(&mut interior.entering);
             let (shares, price) = interior.point.split_at(held.len());
@@ -221,6 +232,7 @@ impl AssetsStep {
             growths: (0..self.atoms()).flat_map(|atom| of(self.growth(atom))).collect(),
             least_growths: of(&self.least_growths),
             masses: self.masses.clone(),
+            trading: self.trading.among(held),
             ground: match &self.ground {
                 Ground::Sup => Ground::Sup,
                 Ground::Weighted(weights) => Ground::Weighted(of(weights)),
@@ -239,11 +251,11 @@ impl AssetsStep {
         if held_up < growth { held_up } else { growth }
     }
 
-    /// What an allocation is worth at least, in relative utility: the dual at a price of distance.
+    /// What an allocation is worth at least, in relative utility and less what trading takes: the dual at a price of distance.
     fn value_at(&self, allocation: &[f64], price: f64) -> f64 {
         let mut branches = Branches::default();
         branches.find(self, allocation, price);
-        self.dual(&branches, price).0
+        self.dual(&branches, price).0 - self.trading.taken(allocation)
     }
 
     /// The dual at a price of distance, and the distance that its law takes.

@@ -64,7 +64,7 @@ impl Interior<'_> {
     ///
     /// `None` where the matrix is not positive definite to working precision. Cost O(branches d^2).
     pub(super) fn direction(&self) -> Option<Direction> {
-        let size = self.point.len();
+        let size = self.step.assets() + 1;
         let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
         let mut eliminated = vec![Eliminated::default(); self.tops.len()];
         // Sums of `multiplier / slack` times gradients, atom by atom.
@@ -75,22 +75,39 @@ impl Interior<'_> {
             }
         });
         system.right[size - 1] -= self.step.radius;
+        let mut system = self.with_trades(system);
         for bound in &self.bounds {
             let slack = bound.slack(&self.point);
             let target = self.barrier * self.bound_weight / slack;
             system.right.iter_mut().zip(&bound.direction).for_each(|(sum, part)| *sum += target * part);
             system.add(bound.multiplier / slack, &bound.direction);
         }
-        for diagonal in system.matrix.iter_mut().step_by(size + 1) {
+        for diagonal in system.matrix.iter_mut().step_by(system.size + 1) {
             *diagonal *= 1.0 + ROUNDING;
         }
-        let point = Cholesky::factor(DMatrix::from_vec(size, size, system.matrix))?.solve(&system.right);
+        let matrix = DMatrix::from_vec(system.size, system.size, system.matrix);
+        let point = Cholesky::factor(matrix)?.solve(&system.right);
         let atoms = eliminated.iter().zip(gradients.chunks_exact(size)).zip(&self.step.masses);
         let top = |((left, gradient), mass): ((&Eliminated, &[f64]), &f64)| {
-            (mass - left.target + dot(gradient, &point)) / left.stiffness
+            (mass - left.target + dot(gradient, &point[..size])) / left.stiffness
         };
         let tops: Vec<f64> = atoms.map(top).collect();
         Some(self.with_multipliers(point, tops))
+    }
+
+    /// The system of shares and price with what is traded of each asset, of which every unit takes the price of trading.
+    fn with_trades(&self, system: System) -> System {
+        let (size, whole) = (system.size, self.point.len());
+        if whole == size {
+            return system;
+        }
+        let mut matrix = vec![0.0; whole * whole];
+        for (row, of) in matrix.chunks_exact_mut(whole).zip(system.matrix.chunks_exact(size)) {
+            row[..size].copy_from_slice(of);
+        }
+        let mut right = system.right;
+        right.resize(whole, -self.step.trading.price);
+        System { size: whole, matrix, right }
     }
 
     #[inline(always)]
@@ -158,7 +175,7 @@ impl Interior<'_> {
 
     /// The steps of the multipliers, and the lengths that keep everything positive.
     fn with_multipliers(&self, point: Vec<f64>, tops: Vec<f64>) -> Direction {
-        let last = point.len() - 1;
+        let last = self.step.assets();
         let (mut length, mut dual_length): (f64, f64) = (1.0, 1.0);
         let mut pair = |slack: f64, step: f64, multiplier: f64, target: f64| {
             let change = target / slack - multiplier - multiplier / slack * step;
