@@ -1,9 +1,12 @@
 //! `ballast advise`: what to hold through the coming period, from a file of returns or prices. No server runs; the answer is
 //! that of `POST /advise`.
 
+use std::collections::BTreeMap;
 use std::error::Error;
+use std::fmt;
 
 use ballast::control::error::FieldError;
+use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::learning::Learning;
 use ballast::control::request::rules::BRIDGE_NUMBERS;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
@@ -32,9 +35,9 @@ pub struct AdviseArgs {
     /// Wealth now, in any currency
     #[arg(long, default_value_t = 100.0)]
     wealth: f64,
-    /// Share of wealth in the risky asset now
-    #[arg(long, default_value_t = 0.0)]
-    holding: f64,
+    /// Share of wealth in the risky asset now; of several columns COLUMN=SHARE, given again for each
+    #[arg(long = "holding", value_name = "SHARE", value_parser = Holding::read)]
+    holdings: Vec<Holding>,
     /// Lost of what is bought or sold, as a fraction: 0.001 is 0.1 %
     #[arg(long, default_value_t = 0.0)]
     trading_cost: f64,
@@ -44,6 +47,33 @@ pub struct AdviseArgs {
     /// Print what POST /advise answers, and what was read on the standard error
     #[arg(long)]
     json: bool,
+}
+
+/// What is held already, of one of several columns where it is named.
+#[derive(Debug, Clone, PartialEq)]
+struct Holding {
+    column: Option<String>,
+    share: f64,
+}
+
+impl Holding {
+    fn read(text: &str) -> Result<Self, String> {
+        let (column, share) = match text.rsplit_once('=') {
+            Some((column, share)) => (Some(column.to_owned()), share),
+            None => (None, text),
+        };
+        let share = share.parse().map_err(|_| "must be a share of wealth, or COLUMN=SHARE".to_owned())?;
+        Ok(Holding { column, share })
+    }
+}
+
+impl fmt::Display for Holding {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.column {
+            Some(column) => write!(formatter, "{column}={}", self.share),
+            None => write!(formatter, "{}", self.share),
+        }
+    }
 }
 
 /// The option that says what a field of the question is.
@@ -65,32 +95,34 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
 
 fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
     let count = returns.rows().len();
-    let advised = arguments.question(returns).answer().map_err(|error| by_option(error, count, &arguments.record))?;
+    let holding = arguments.one_holding()?;
+    let asked = |returns: &Returns| arguments.question(returns, holding).answer();
+    let advised = asked(returns).map_err(|error| by_option(error, count, &arguments.record))?;
     let told = || {
-        let coarser = returns.coarser().into_iter().filter_map(|returns| {
-            let advised = arguments.question(&returns).answer().ok()?;
-            Some((returns.noun(), advised.advice.allocation))
-        });
+        // Of a record of a few months: too short for its quarters.
+        let coarser: Vec<(&str, Option<f64>)> = (returns.coarser().iter())
+            .map(|returns| (returns.noun(), asked(returns).ok().map(|advised| advised.advice.allocation)))
+            .collect();
         let text = words::told(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
-        words::told_of_coarser(text, &coarser.collect::<Vec<_>>())
+        words::told_of_coarser(text, &coarser)
     };
     Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
 }
 
 fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<dyn Error>> {
     let given = [
-        ("--holding", arguments.holding != 0.0),
-        ("--trading-cost", arguments.trading_cost != 0.0),
-        ("--half-life", arguments.half_life.is_some()),
-        ("--sensitivity", arguments.sensitivity),
+        ("--half-life", arguments.half_life.is_some(), "all returns weigh the same"),
+        ("--sensitivity", arguments.sensitivity, "how near the advice is to changing is not found"),
     ];
-    if let Some((option, _)) = given.into_iter().find(|(_, is_given)| *is_given) {
-        let rule = "must be left out of several assets, of which what is held now and what trading costs are not known";
+    if let Some((option, _, why)) = given.into_iter().find(|(_, is_given, _)| *is_given) {
+        let rule = format!("must be left out of several assets, of which {why}");
         return Err(FieldError::new(option, format!("given of {}", returns.record.assets.len()), rule).into());
     }
+    let asked = arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem));
     let question = AdviseAssets {
-        problem: arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem)),
+        problem: AssetsProblem { trading_cost: arguments.trading_cost, ..asked },
         wealth: Some(arguments.wealth),
+        holdings: Some(arguments.holdings_of(&returns.record.assets)?),
         seed: arguments.seed,
     };
     let count = returns.record.rows.len();
@@ -101,7 +133,36 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
 }
 
 impl AdviseArgs {
-    fn question(&self, returns: &Returns) -> Advise {
+    /// That of the one asset.
+    fn one_holding(&self) -> Result<f64, FieldError> {
+        match &self.holdings[..] {
+            [] => Ok(0.0),
+            [Holding { column: None, share }] => Ok(*share),
+            all => {
+                let given: Vec<String> = all.iter().map(Holding::to_string).collect();
+                Err(FieldError::new("--holding", given.join(" "), "must be one share of wealth, of the one asset"))
+            }
+        }
+    }
+
+    /// That of each of these columns: nothing of those that are not named.
+    fn holdings_of(&self, columns: &[String]) -> Result<BTreeMap<String, f64>, FieldError> {
+        let mut by_name = BTreeMap::new();
+        for holding in &self.holdings {
+            let rule = "must be COLUMN=SHARE of several assets, each column once";
+            let wrong = || FieldError::new("--holding", holding, rule);
+            let column = holding.column.clone().ok_or_else(wrong)?;
+            if by_name.insert(column, holding.share).is_some() {
+                return Err(wrong());
+            }
+        }
+        columns.iter().for_each(|column| {
+            by_name.entry(column.clone()).or_insert(0.0);
+        });
+        Ok(by_name)
+    }
+
+    fn question(&self, returns: &Returns, holding: f64) -> Advise {
         let problem = ProblemSpecification {
             trading_cost: self.trading_cost,
             learning: self.half_life.map_or_else(Learning::default, |half_life| Learning::Decay { half_life }),
@@ -110,7 +171,7 @@ impl AdviseArgs {
         Advise {
             problem,
             wealth: Some(self.wealth),
-            holding: Some(self.holding),
+            holding: Some(holding),
             seed: self.seed,
             sensitivity: self.sensitivity,
         }
@@ -126,6 +187,10 @@ fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
             "must be at most {most}, as the radius is not simulated for more: --window {most} uses the last ones"
         );
         return FieldError::new(record.source(), format!("{count} returns"), rule);
+    }
+    if let Some(column) = error.field.strip_prefix("holdings") {
+        let value = format!("{}={}", column.trim_start_matches('.'), error.value);
+        return FieldError { field: "--holding".into(), value, ..error };
     }
     match OPTIONS.iter().chain(&caution::OPTIONS).find(|(field, _)| *field == error.field) {
         Some((_, option)) => FieldError { field: (*option).into(), ..error },

@@ -16,7 +16,8 @@ use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
 use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
     ACCURACY, COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR,
-    RADIUS_CORRECTION, RADIUS_SCALE, RATE, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
+    RADIUS_CORRECTION, RADIUS_SCALE, RATE, RELATIVE_RISK_AVERSION, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST,
+    WEALTH,
 };
 use crate::control::request::support::{FACTOR, LIMIT};
 use crate::service::plan::MOST_RENEWALS;
@@ -53,6 +54,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let rules = [
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
+        ("ProblemSpecification", "risk_aversion", within(RELATIVE_RISK_AVERSION)),
         ("ProblemSpecification", "history", history.clone()),
         ("CentreSpecification smoothed", "bandwidth", within(BANDWIDTH)),
         ("CentreSpecification volatility_scaled", "half_life", within(HALF_LIFE)),
@@ -138,6 +140,7 @@ fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let rules = [
         ("AssetsProblem", "horizon", whole(&HORIZON)),
         ("AssetsProblem", "trading_cost", within(TRADING_COST)),
+        ("AssetsProblem", "risk_aversion", within(RELATIVE_RISK_AVERSION)),
         ("FundSpecification", "assets", names.clone()),
         ("FundSpecification", "radius_factor", within((1.0, LARGEST_FACTOR))),
         ("FundSpecification", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
@@ -179,6 +182,7 @@ fn supposed() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
         ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
         ("WhatIf", "holdings", each(within((0.0, 1.0)))),
+        ("AdviseAssets", "holdings", each(within((0.0, 1.0)))),
     ];
     rules.into_iter()
 }
@@ -202,7 +206,7 @@ fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("horizon", whole(&HORIZON)),
         ("alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
         ("scale", within(RADIUS_SCALE)),
-        ("risk_aversion", within(backtest::RELATIVE)),
+        ("risk_aversion", within(RELATIVE_RISK_AVERSION)),
         ("trading_cost", within(TRADING_COST)),
         ("count", whole(&COUNT)),
         ("log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
@@ -224,7 +228,7 @@ fn walked_of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value
         ("windows", json!({ "minItems": 1, "maxItems": MOST_WINDOWS })),
         ("every", whole(&(1..=*DATES.end()))),
         ("alpha", within(backtest::ALPHA)),
-        ("risk_aversion", within(backtest::RELATIVE)),
+        ("risk_aversion", within(RELATIVE_RISK_AVERSION)),
         ("trading_cost", within(TRADING_COST)),
     ];
     fields.into_iter().map(|(field, rule)| ("AssetsBacktestRequest", field, rule))

@@ -1,13 +1,17 @@
 //! Advice on several assets without a policy or a session.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::assets::shares;
 use super::error::ServiceError;
 use super::sessions::Sessions;
 use crate::control::assets::advice::AssetsAdvice;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
+use crate::control::policy::levels::WhyNothing;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::assets::AssetsProblem;
@@ -26,6 +30,8 @@ pub struct AdviseAssets {
     pub problem: AssetsProblem,
     /// Wealth now. Default: the problem's initial wealth.
     pub wealth: Option<f64>,
+    /// Share of wealth in each asset now, before trading, by its name. Default: nothing of any.
+    pub holdings: Option<BTreeMap<String, f64>>,
     /// Of the simulated bridges.
     #[serde(default = "default_seed")]
     pub seed: u64,
@@ -36,6 +42,9 @@ pub struct AdviseAssets {
 pub struct AssetsAdvised {
     #[serde(flatten)]
     pub advice: AssetsAdvice,
+    /// Where nothing is held, of the fund of inverse volatilities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why_nothing: Option<WhyNothing>,
     /// Of the fund of inverse volatilities, where `problem.periods_per_year` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,
@@ -61,9 +70,9 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
-        let (problem, fund) = question.checked()?;
+        let Checked { problem, holdings, fund } = question.checked()?;
         let fund = self.policies.one_period(&fund)?;
-        Ok(self.resolving.run(tenant, move || AssetsAdvised::of(&problem, &fund)).await??)
+        Ok(self.resolving.run(tenant, move || AssetsAdvised::of(&problem, &holdings, &fund)).await??)
     }
 }
 
@@ -73,26 +82,37 @@ impl AdviseAssets {
     /// # Errors
     /// A field breaks a rule.
     pub fn answer(self) -> Result<AssetsAdvised, FieldError> {
-        let (problem, fund) = self.checked()?;
-        AssetsAdvised::of(&problem, &OnePeriod::new(&fund, Kept::default()))
+        let Checked { problem, holdings, fund } = self.checked()?;
+        AssetsAdvised::of(&problem, &holdings, &OnePeriod::new(&fund, Kept::default()))
     }
 
-    /// The problem, and that of its fund of inverse volatilities.
-    fn checked(self) -> Result<(AssetsProblem, Specification), FieldError> {
-        let AdviseAssets { mut problem, wealth, seed } = self;
+    fn checked(self) -> Result<Checked, FieldError> {
+        let AdviseAssets { mut problem, wealth, holdings, seed } = self;
         if let Some(wealth) = wealth {
             rules::wealth("wealth", wealth)?;
             problem.initial_wealth = wealth;
         }
         let fund = problem.fund(seed)?;
-        Ok((problem, fund))
+        let holdings = match holdings {
+            Some(holdings) => shares("holdings", &holdings, &problem.assets)?,
+            None => vec![0.0; problem.assets.len()],
+        };
+        Ok(Checked { problem, holdings, fund })
     }
 }
 
+/// A question that keeps the rules, with the problem of its fund of inverse volatilities.
+struct Checked {
+    problem: AssetsProblem,
+    /// Asset by asset.
+    holdings: Vec<f64>,
+    fund: Specification,
+}
+
 impl AssetsAdvised {
-    fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
-        let advice = AssetsAdvice::of(problem, fund)?;
+    fn of(problem: &AssetsProblem, holdings: &[f64], fund: &OnePeriod) -> Result<Self, FieldError> {
+        let (advice, why_nothing) = AssetsAdvice::of(problem, holdings, fund)?;
         let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
-        Ok(AssetsAdvised { advice, annualised, warnings })
+        Ok(AssetsAdvised { advice, why_nothing, annualised, warnings })
     }
 }

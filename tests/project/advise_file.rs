@@ -174,8 +174,20 @@ fn named_columns_are_an_asset_each() {
     {
         assert!(told.contains(part), "{told}");
     }
-    let refused = ballast(&[&asked[..], &["--holding", "0.1"]].concat());
-    assert!(text(&refused.stderr).starts_with("ballast: --holding is given of 2: must be left out"), "{refused:?}");
+    let held = ballast(&[&asked[..], &["--holding", "energy=0.4", "--trading-cost", "0.05", "--json"]].concat());
+    let held: serde_json::Value = serde_json::from_str(&text(&held.stdout)).unwrap();
+    // At such a cost nothing is bought, and no more sold than what is too much.
+    assert!(held["trade"]["utilities"] == 0.0 && held["allocation"]["energy"].as_f64().unwrap() > 0.0, "{held}");
+    for (options, refusal) in [
+        (&["--holding", "0.1"][..], "--holding is 0.1: must be COLUMN=SHARE of several assets, each column once"),
+        (&["--holding", "energy=0.1", "--holding", "energy=0.2"], "--holding is energy=0.2: must be COLUMN=SHARE"),
+        (&["--holding", "coal=0.1"], "--holding is coal=0.1: must name one of the assets: energy, utilities"),
+        (&["--holding", "energy=1.5"], "--holding is energy=1.5: must be a number in [0, 1]"),
+        (&["--half-life", "12"], "--half-life is given of 2: must be left out"),
+    ] {
+        let refused = text(&ballast(&[&asked[..], options].concat()).stderr);
+        assert!(refused.starts_with(&format!("ballast: {refusal}")), "{options:?}: {refused}");
+    }
     // Not named, they are asked for: a file of prices has more columns than assets.
     assert!(text(&ballast(&["advise", &file]).stderr).contains("--column"));
 }

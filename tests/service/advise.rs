@@ -204,6 +204,67 @@ async fn several_assets_are_advised_by_name_as_solved_directly() {
     assert!(held >= 22, "{held} of 26");
 }
 
+/// Everything sold costs what is held; what is held is kept where a trade would not pay for itself; and a risk aversion given as a
+/// number is that of the utility it stands for.
+#[tokio::test(flavor = "multi_thread")]
+async fn holdings_and_a_trading_cost_of_several_assets_are_known() {
+    let app = App::start().await;
+    let row = |month: u32| [0.9, 1.7].map(|pace| 0.012 + 0.03 * (pace * f64::from(month)).sin());
+    let rows: Vec<[f64; 2]> = (0..60).map(row).collect();
+    let problem = json!({ "assets": ["a", "b"], "history": rows, "rate_per_step": 0.002, "trading_cost": 0.01, "risk_aversion": 5.0 });
+    let advise = async |holdings: Value| {
+        let asked = json!({ "problem": problem, "wealth": 1000.0, "holdings": holdings });
+        let (status, advised) = app.post("/advise", &asked).await;
+        assert_eq!(status, 200, "{advised}");
+        advised
+    };
+    let from_bank = advise(json!({ "a": 0.0, "b": 0.0 })).await;
+    let held = json!({ "a": 0.3, "b": 0.5 });
+    let from_held = advise(held.clone()).await;
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert!((number(&from_held["floor"]) - 1002.0 * (1.0 - 0.01 * 0.8)).abs() < 1e-9, "{from_held}");
+    assert_eq!(from_bank["floor"], 1002.0);
+    for name in ["a", "b"] {
+        let [share, trade] = ["allocation", "trade"].map(|field| number(&from_held[field][name]));
+        assert!((share - trade - number(&held[name])).abs() < 1e-12, "{from_held}");
+    }
+    // Where he ends, he would stay.
+    let again = advise(from_held["allocation"].clone()).await;
+    assert_eq!(again["allocation"], from_held["allocation"], "{again}");
+    assert_ne!(from_held["allocation"], from_bank["allocation"]);
+    let mut spelled = problem.clone();
+    spelled["risk_aversion"] = Value::Null;
+    spelled["utility"] = json!({ "kind": "power", "risk_aversion": 5.0 });
+    let (_, other) = app.post("/advise", &json!({ "problem": spelled, "wealth": 1000.0, "holdings": held })).await;
+    assert_eq!(other, from_held);
+
+    for (name, value, field) in [
+        ("holdings", json!({ "a": 0.5 }), "holdings.b"),
+        ("holdings", json!({ "a": 0.5, "b": 0.6 }), "holdings"),
+        ("holdings", json!({ "a": 0.5, "b": 0.1, "c": 0.1 }), "holdings.c"),
+        ("holdings", json!({ "a": -0.1, "b": 0.1 }), "holdings.a"),
+    ] {
+        let mut asked = json!({ "problem": problem });
+        asked[name] = value;
+        let (status, refused) = app.post("/advise", &asked).await;
+        assert_eq!((status.as_u16(), &refused["field"]), (422, &json!(field)), "{refused}");
+    }
+    for (name, value, field) in [
+        ("utility", json!({ "kind": "exponential", "risk_aversion_relative": 3.0 }), "problem.trading_cost"),
+        ("utility", json!({ "kind": "log" }), "problem.risk_aversion"),
+        ("risk_aversion", json!(0.5), "problem.risk_aversion"),
+        ("trading_cost", json!(0.2), "problem.trading_cost"),
+    ] {
+        let mut problem = problem.clone();
+        problem[name] = value;
+        if field == "problem.trading_cost" {
+            problem["risk_aversion"] = Value::Null;
+        }
+        let (status, refused) = app.post("/advise", &json!({ "problem": problem })).await;
+        assert_eq!((status.as_u16(), &refused["field"]), (422, &json!(field)), "{refused}");
+    }
+}
+
 /// What is told to be held without a crash is the advice under a floor at the lowest return seen, asked for by itself; and the
 /// crash is most of what keeps power utility from a record that pays.
 #[tokio::test(flavor = "multi_thread")]

@@ -52,6 +52,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
             "problem.utility.risk_aversion_relative",
         ),
         ("/problem/utility", json!({"kind": "power", "risk_aversion": 1.0}), "problem.utility.risk_aversion"),
+        ("/problem/risk_aversion", json!(4.0), "problem.risk_aversion"),
         ("/problem/learning", json!({"kind": "decay", "half_life": 0.5}), "problem.learning.half_life"),
         ("/problem/learning", json!({"kind": "decay", "half_life": -12.0}), "problem.learning.half_life"),
         ("/problem/centre", json!({"kind": "median"}), "problem.centre.kind"),

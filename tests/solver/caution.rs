@@ -92,7 +92,7 @@ fn nothing_is_held_where_no_premium_is_left() {
         };
         nothing += 1;
         // To rounding.
-        assert!(why.premium_left < 1e-12, "{seed}: {why:?}");
+        assert!(why.premium_left.unwrap() < 1e-12, "{seed}: {why:?}");
         let half = ProblemSpecification {
             radius: Some(specification.problem.radius_rule().scaled(0.5)),
             ..specification.problem

@@ -37,12 +37,15 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
     text.trim_end().to_owned()
 }
 
-/// The same with what the record would advise by longer periods, where it was asked.
-pub fn told_of_coarser(text: String, coarser: &[(&str, f64)]) -> String {
+/// The same with what the record would advise by longer periods, where it was asked; `None` of those that say nothing.
+pub fn told_of_coarser(text: String, coarser: &[(&str, Option<f64>)]) -> String {
     if coarser.is_empty() {
         return text;
     }
-    let of = |(noun, share): &(&str, f64)| format!("{} by {noun}s", percent(*share, 1));
+    let of = |(noun, share): &(&str, Option<f64>)| match share {
+        Some(share) => format!("{} by {noun}s", percent(*share, 1)),
+        None => format!("nothing by {noun}s, which are too few or too alike"),
+    };
     let shares: Vec<String> = coarser.iter().map(of).collect();
     format!("{text}\n\nThe same record would say {}. Give returns as far apart as you decide.", shares.join(", "))
 }
@@ -105,7 +108,9 @@ fn trade(advice: &Advice, wealth: f64) -> String {
 fn why(Advised { advice, worst_case, why_nothing, .. }: &Advised, noun: &str) -> String {
     let among = format!("Against the worst law in the ball around the {} returns", advice.sample_size);
     if advice.allocation <= 0.0 {
-        let why = why_nothing.as_ref().map_or(String::new(), |why| format!("\n{}", caution::why_nothing(why, noun)));
+        let why = why_nothing
+            .as_ref()
+            .map_or(String::new(), |why| format!("\n{}", caution::why_nothing("The record", why, noun)));
         return format!("{among}, nothing beats the bank.{why}");
     }
     format!(

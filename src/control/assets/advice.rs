@@ -14,6 +14,8 @@ use crate::control::policy::levels::LevelsAdvised;
 pub struct AssetsAdvice {
     /// Share of wealth in each asset; the rest is in the bank.
     pub allocation: BTreeMap<String, f64>,
+    /// The allocation less the holdings: shares of wealth to buy, or where they are negative to sell.
+    pub trade: BTreeMap<String, f64>,
     /// Share of each asset in what is held; where next to nothing is, that of inverse volatilities.
     pub composition: BTreeMap<String, f64>,
     /// Share of wealth in all assets together.
@@ -21,11 +23,11 @@ pub struct AssetsAdvice {
     /// The same were no log-return below the lowest seen of any asset: what it is above `total` is the part of the caution that
     /// is for a crash which nobody has seen. Null where `problem.support` rules one out already.
     pub without_crash: Option<f64>,
-    /// Wealth for certain that is worth as much as the allocation is against the worst law: at least this.
+    /// Wealth for certain that is worth as much as the allocation is against the worst law, less what trading costs: at least this.
     pub certainty_equivalent: f64,
     /// No allocation is worth more than this.
     pub bound: f64,
-    /// Wealth of the bank alone.
+    /// Wealth of selling everything now and staying in the bank.
     pub floor: f64,
     /// Radius of the ball, in log-return.
     pub radius: f64,

@@ -4,10 +4,11 @@ use super::advice::{AssetsAdvice, named, worst_means};
 use super::{AssetsLaw, AssetsStep};
 use crate::control::error::FieldError;
 use crate::control::policy::caution::Caution;
-use crate::control::policy::levels::LevelsAdvised;
+use crate::control::policy::levels::{LevelsAdvised, WhyNothing};
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::annualised::premium;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::caution::{CautionLevel, CautionLevels};
 use crate::control::request::fund::CompositionRule;
@@ -99,58 +100,60 @@ impl FundsBall {
 }
 
 impl AssetsAdvice {
-    /// The advice for `problem`, whose fund of inverse volatilities is `fund`.
-    /// Cost: that of its levels of caution, where one is followed; that of [`AssetsStep::solve`], twice where a return may fall below
+    /// The advice for `problem`, whose fund of inverse volatilities is `fund`, to who holds these shares; and why, where nothing is held.
+    /// Cost: that of its levels of caution, where one is followed; that of [`AssetsStep::solve_from`], twice where a return may fall below
     /// those seen, and once for each level of a short record; and of the joint factor under `bridge` and `calibrated`.
     /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     ///
     /// # Errors
     /// The history of the fund breaks a rule, which a completed one does not.
-    pub fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
-        let rows = &problem.history;
+    pub fn of(
+        problem: &AssetsProblem,
+        holdings: &[f64],
+        fund: &OnePeriod,
+    ) -> Result<(Self, Option<WhyNothing>), FieldError> {
+        let (rows, names, cost) = (&problem.history, &problem.assets, problem.trading_cost);
         let ball = FundsBall::of(problem, fund)?;
         let fund = fund.problem();
-        let followed = fund.caution_level().unwrap_or(CautionLevel::Paper);
-        let radius = ball.radius_at(followed);
+        let radius = ball.radius_at(fund.caution_level().unwrap_or(CautionLevel::Paper));
         let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
-        let solution = step(problem, fund, rows, radius).solve(None);
+        let solution = step(problem, fund, rows, radius).solve_from(holdings, cost, None);
+        let total_of =
+            |step: AssetsStep| step.solve_from(holdings, cost, Some(&solution)).allocation.iter().sum::<f64>();
+        let total_within = |radius: f64| total_of(step(problem, fund, rows, radius));
         let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let crashes = floors(fund.support_rule(), rows).into_iter().any(|floor| floor < lowest);
-        let without_crash = crashes.then(|| {
-            step_above(vec![lowest; problem.assets.len()], problem, fund, rows, radius)
-                .solve(Some(&solution))
-                .allocation
-                .iter()
-                .sum()
-        });
-        let levels = ball.levels.as_deref().map(|found| {
-            let at = |share: f64| {
-                let is_short = rows.len() * problem.assets.len() <= SOLVED_BY_LEVEL;
-                is_short.then(|| {
-                    step(problem, fund, rows, share * ball.radius).solve(Some(&solution)).allocation.iter().sum()
-                })
-            };
-            LevelsAdvised::of(found, followed, at)
-        });
+        let seen_alone = || step_above(vec![lowest; names.len()], problem, fund, rows, radius);
+        let is_short = rows.len() * names.len() <= SOLVED_BY_LEVEL;
+        let level = |share: f64| is_short.then(|| total_within(share * ball.radius));
+        let followed = fund.caution_level().zip(ball.levels.as_deref());
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
-        Ok(AssetsAdvice {
-            allocation: named(&problem.assets, &solution.allocation),
-            composition: named(&problem.assets, &composition),
+        let trade: Vec<f64> = solution.allocation.iter().zip(holdings).map(|(share, held)| share - held).collect();
+        let advice = AssetsAdvice {
+            allocation: named(names, &solution.allocation),
+            trade: named(names, &trade),
+            composition: named(names, &composition),
             total: solution.allocation.iter().sum(),
-            without_crash,
+            without_crash: crashes.then(|| total_of(seen_alone())),
             certainty_equivalent: bank * solution.value.exp(),
             bound: bank * solution.bound.exp(),
-            floor: bank,
+            floor: bank * (1.0 - cost * holdings.iter().sum::<f64>()),
             radius,
             radius_factor: ball.radius_factor,
             sample_size: rows.len(),
-            worst_means: worst_means(&problem.assets, rows, &solution),
-            levels,
+            worst_means: worst_means(names, rows, &solution),
+            levels: followed.map(|(followed, found)| LevelsAdvised::of(found, followed, level)),
             caution: Caution::short_record(rows.len(), rows.len() as f64)
                 .into_iter()
                 .chain(solution.caution())
                 .collect(),
-        })
+        };
+        let why_nothing = (advice.total <= 0.0).then(|| {
+            let (premium_seen, standard_error) = premium(&fund.history, fund.rate_per_step);
+            let at_half_the_caution = (fund.radius_rule().paths() > 0).then(|| total_within(0.5 * radius));
+            WhyNothing { premium_seen, standard_error, premium_left: None, at_half_the_caution }
+        });
+        Ok((advice, why_nothing))
     }
 }

@@ -82,6 +82,7 @@ impl AssetsProblem {
             action_interval: problem.action_interval,
             trading_cost: problem.trading_cost,
             contributions: problem.contributions.clone(),
+            risk_aversion: None,
             utility: problem.utility,
             radius: Some(problem.radius_rule().scaled(fund.radius_factor.recip())),
             caution: problem.caution,

@@ -38,16 +38,17 @@ pub struct LevelAdvised {
     pub allocation_error: Option<f64>,
 }
 
-/// Why an advice holds nothing.
+/// Why an advice holds nothing: of several assets by the fund of inverse volatilities.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct WhyNothing {
     /// Mean simple return of the record beyond the bank, per step.
     pub premium_seen: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something.
-    pub premium_left: f64,
-    /// Share of wealth that would be held within half of the radius; null where the radius is not simulated.
+    /// The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something. Null of several
+    /// assets, of each of which `worst_means` tells it.
+    pub premium_left: Option<f64>,
+    /// Share of wealth that would be held within half of the radius, in all assets together; null where the radius is not simulated.
     pub at_half_the_caution: Option<f64>,
 }
 

@@ -88,7 +88,7 @@ impl OnePeriod {
         Ok(Some(WhyNothing {
             premium_seen,
             standard_error,
-            premium_left: self.advisor.worst_mean(&state) - (1.0 + problem.rate_per_step),
+            premium_left: Some(self.advisor.worst_mean(&state) - (1.0 + problem.rate_per_step)),
             at_half_the_caution: (problem.radius_rule().paths() > 0).then(half),
         }))
     }

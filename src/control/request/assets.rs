@@ -56,14 +56,17 @@ pub struct AssetsProblem {
     /// Share of wealth that may be held in all assets together: `[0, highest]`.
     #[serde(default = "defaults::action_interval")]
     pub action_interval: [f64; 2],
-    /// Lost of what is moved between the bank and any asset, as a share of it; 0 of an advice.
+    /// Lost of what is moved between the bank and any asset, as a share of it. An advice takes it under power and log utility.
     #[serde(default)]
     pub trading_cost: f64,
     /// Money added at the end of each period, withdrawn where it is negative; none of an advice.
     #[serde(default)]
     pub contributions: Contributions,
-    /// Of wealth at the horizon.
-    #[serde(default)]
+    /// Relative risk aversion, in the place of `utility`: log utility at 1, power utility above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub risk_aversion: Option<f64>,
+    /// Of wealth at the horizon. Default: power utility, risk aversion 3.
+    #[serde(default = "UtilitySpecification::not_given")]
     pub utility: UtilitySpecification,
     /// Default: `bridge`. That of the fund of inverse volatilities, made wide enough for all funds at once.
     #[serde(default)]
@@ -90,12 +93,13 @@ impl AssetsProblem {
             let rule = "must be 1 or left out: one period is advised, and a policy is trained for more";
             return Err(FieldError::new("problem.horizon", horizon, rule));
         }
-        if self.trading_cost != 0.0 || !self.contributions.are_none() {
-            let (field, value) = match self.trading_cost == 0.0 {
-                true => ("problem.contributions", "not 0".to_owned()),
-                false => ("problem.trading_cost", self.trading_cost.to_string()),
-            };
-            return Err(FieldError::new(field, value, "must be 0 or left out: a policy is trained for it"));
+        if !self.contributions.are_none() {
+            let rule = "must be 0 or left out: a policy is trained for it";
+            return Err(FieldError::new("problem.contributions", "not 0", rule));
+        }
+        if self.trading_cost != 0.0 && matches!(self.utility, UtilitySpecification::Exponential { .. }) {
+            let rule = "must be 0 or left out under exponential utility; power and log utility take one";
+            return Err(FieldError::new("problem.trading_cost", self.trading_cost, rule));
         }
         Specification::of(ProblemSpecification { horizon: 1, ..self.of_fund() }, seed).completed()
     }
@@ -110,6 +114,7 @@ impl AssetsProblem {
             action_interval: self.action_interval,
             trading_cost: self.trading_cost,
             contributions: self.contributions.clone(),
+            risk_aversion: self.risk_aversion,
             utility: self.utility,
             radius: self.radius,
             caution: self.caution,

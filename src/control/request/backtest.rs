@@ -9,7 +9,9 @@ use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
-use crate::control::request::rules::{self, COUNT, HISTORY_LENGTH, HORIZON, RATE, TRADING_COST, whole, within};
+use crate::control::request::rules::{
+    self, COUNT, HISTORY_LENGTH, HORIZON, RATE, RELATIVE_RISK_AVERSION, TRADING_COST, whole, within,
+};
 use crate::control::request::specification::default_seed;
 use crate::control::request::support::Support;
 
@@ -21,8 +23,6 @@ pub const YEAR: std::ops::RangeInclusive<usize> = 1..=366;
 pub const LEVELS: std::ops::RangeInclusive<usize> = 1..=3;
 /// Miscoverages.
 pub const ALPHA: (f64, f64) = (1e-3, 0.999);
-/// Relative risk aversions.
-pub const RELATIVE: (f64, f64) = (1.0, 100.0);
 /// Policies trained.
 pub const MOST_TRAININGS: usize = 5_000;
 /// Steps of all of them.
@@ -294,7 +294,7 @@ impl BacktestRequest {
                 return Err(FieldError::new(field, alpha, "must not be named twice"));
             }
         }
-        within("risk_aversion", self.risk_aversion, RELATIVE.0, RELATIVE.1)?;
+        within("risk_aversion", self.risk_aversion, RELATIVE_RISK_AVERSION.0, RELATIVE_RISK_AVERSION.1)?;
         within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)?;
         whole("count", self.count, &COUNT)
     }

@@ -5,7 +5,7 @@ use crate::control::request::assets::check_fund;
 use crate::control::request::centre_rules::check_centre;
 use crate::control::request::rules;
 use crate::control::request::sampling_law::SamplingLaw;
-use crate::control::request::specification::Specification;
+use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::request::support::Interval;
 
 /// Design points per step where the law is part of the state, at most: the paper's count.
@@ -15,12 +15,33 @@ pub const DEFAULT_ACCURACY: f64 = 0.5;
 /// Design points per step where the state is wealth alone: the paper's count.
 pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 
+/// `given`, or that of a relative risk aversion in its place, or the default.
+///
+/// # Errors
+/// Both are given, or the risk aversion breaks its rule.
+fn utility(given: UtilitySpecification, risk_aversion: Option<f64>) -> Result<UtilitySpecification, FieldError> {
+    const FIELD: &str = "problem.risk_aversion";
+    match risk_aversion {
+        None if given.is_given() => Ok(given),
+        None => Ok(UtilitySpecification::default()),
+        Some(value) if given.is_given() => {
+            Err(FieldError::new(FIELD, value, "must be left out where problem.utility is given"))
+        }
+        Some(value) => {
+            let (low, high) = rules::RELATIVE_RISK_AVERSION;
+            rules::within(FIELD, value, low, high)?;
+            Ok(UtilitySpecification::relative(value))
+        }
+    }
+}
+
 impl Specification {
     /// Checks every rule, and fills what depends on other fields.
     ///
     /// # Errors
     /// The first field, in the order of the request, that breaks its rule.
     pub fn completed(mut self) -> Result<Self, FieldError> {
+        self.problem.utility = utility(self.problem.utility, self.problem.risk_aversion.take())?;
         rules::check(&self)?;
         self.problem.check_caution()?;
         self.problem.check_support()?;

@@ -108,6 +108,7 @@ impl EvaluationRequest {
         self.problem.law.get_or_insert(sampling_law);
         let completed = self.specification(Framework::KnownLaw, None).completed()?.problem;
         (self.problem.contributions, self.problem.utility) = (completed.contributions, completed.utility);
+        self.problem.risk_aversion = None;
         self.check_frameworks()?;
         self.complete_mixes()?;
         if self.frameworks.is_empty() && self.mixes().is_empty() {

@@ -153,8 +153,12 @@ impl FrontierRequest {
         rules::whole("block", block, &(1..=count / 2))?;
         (self.resamples, self.block) = (Some(resamples), Some(block));
         match &mut self.problem {
-            FrontierProblem::Asset(problem) => problem.utility = fund.problem.utility,
-            FrontierProblem::Assets(problem) => problem.utility = fund.problem.utility,
+            FrontierProblem::Asset(problem) => {
+                (problem.utility, problem.risk_aversion) = (fund.problem.utility, None);
+            }
+            FrontierProblem::Assets(problem) => {
+                (problem.utility, problem.risk_aversion) = (fund.problem.utility, None);
+            }
         }
         let support = fund.problem.support_rule().given();
         Ok(FrontierQuestion { request: self, assets, fund, resamples, block, support })
@@ -229,6 +233,7 @@ pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSp
         periods_per_year: problem.periods_per_year,
         initial_wealth: problem.initial_wealth,
         action_interval: problem.action_interval,
+        risk_aversion: problem.risk_aversion,
         utility: problem.utility,
         radius: problem.radius,
         caution: problem.caution,

@@ -40,6 +40,8 @@ pub const PERIODS_PER_YEAR: (f64, f64) = (1.0, 366.0);
 pub const RISK_AVERSION: (f64, f64) = (1e-18, 1e9);
 /// Risk aversions of exponential utility in multiples of one over the initial wealth.
 pub const RISK_AVERSION_RELATIVE: (f64, f64) = (1e-3, 100.0);
+/// Of power utility, and of log utility at 1.
+pub const RELATIVE_RISK_AVERSION: (f64, f64) = (1.0, 100.0);
 /// Trading costs, shares of what is traded.
 pub const TRADING_COST: (f64, f64) = (0.0, 0.1);
 /// Below, what a trade keeps is lost in rounding.

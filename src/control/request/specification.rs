@@ -70,8 +70,11 @@ pub struct ProblemSpecification {
     /// Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers.
     #[serde(default)]
     pub contributions: Contributions,
-    /// Of terminal wealth.
-    #[serde(default)]
+    /// Relative risk aversion, in the place of `utility`: log utility at 1, power utility above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub risk_aversion: Option<f64>,
+    /// Of terminal wealth. Default: power utility, risk aversion 3.
+    #[serde(default = "UtilitySpecification::not_given")]
     pub utility: UtilitySpecification,
     /// What older returns weigh in the law that is learned.
     #[serde(default)]
@@ -139,6 +142,15 @@ impl Default for UtilitySpecification {
 }
 
 impl UtilitySpecification {
+    /// Stands for one that is not given, which no JSON says.
+    pub(super) fn not_given() -> Self {
+        UtilitySpecification::Power { risk_aversion: defaults::not_given() }
+    }
+
+    pub(super) fn is_given(self) -> bool {
+        !matches!(self, UtilitySpecification::Power { risk_aversion } if risk_aversion.is_nan())
+    }
+
     /// Exponential utility of this absolute risk aversion.
     pub fn exponential(risk_aversion: f64) -> Self {
         UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: None }
@@ -170,6 +182,7 @@ impl ProblemSpecification {
             action_interval: defaults::action_interval(),
             trading_cost: 0.0,
             contributions: Contributions::default(),
+            risk_aversion: None,
             utility: UtilitySpecification::default(),
             learning: Learning::default(),
             centre: CentreSpecification::default(),

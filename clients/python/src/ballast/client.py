@@ -167,6 +167,7 @@ class _Ballast:
         rate_per_step: float | None = None,
         assets: Sequence[str] | None = None,
         wealth: float | None = None,
+        holdings: Mapping[str, float] | None = None,
         **problem: Any,
     ) -> AssetsAdvised:
         """What to hold of each of several assets through one period. Nothing is trained or stored.
@@ -175,10 +176,11 @@ class _Ballast:
         ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank; ``assets``
         chooses among them. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what
         the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
-        as ``ground_norm``, ``utility``, ``caution``, ``radius`` or ``support``.
+        as ``ground_norm``, ``utility``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is what
+        share of wealth is in each asset already, by its name.
         """
         whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
-        question = _given({"problem": whole, "wealth": wealth})
+        question = _given({"problem": whole, "wealth": wealth, "holdings": holdings})
         return _having_read(cast(AssetsAdvised, await self._transport.json("POST", "/advise", body=question)), found)
 
     async def _train_assets(

@@ -6,15 +6,16 @@ use ballast::control::policy::levels::{LevelAdvised, LevelsAdvised, WhyNothing};
 
 use super::percent;
 
-/// What the record paid beyond the bank, how well that is known, what the caution leaves of it, and what half of it would hold.
-pub fn why_nothing(why: &WhyNothing, noun: &str) -> String {
-    let [seen, error, left] = [why.premium_seen, why.standard_error, why.premium_left].map(|z| percent(z.abs(), 2));
+/// What a record paid beyond the bank, how well that is known, what the caution leaves of it, and what half of it would hold.
+pub fn why_nothing(record: &str, why: &WhyNothing, noun: &str) -> String {
+    let [seen, error] = [why.premium_seen, why.standard_error].map(|premium| percent(premium.abs(), 2));
     let text = match why.premium_seen > 0.0 {
-        true => format!("The record beat the bank by {seen} a {noun}; the chance error of that is {error}."),
-        false => format!("The record paid {seen} a {noun} less than the bank; the chance error of that is {error}."),
+        true => format!("{record} beat the bank by {seen} a {noun}; the chance error of that is {error}."),
+        false => format!("{record} paid {seen} a {noun} less than the bank; the chance error of that is {error}."),
     };
-    let as_well = (why.premium_seen > 0.0 && why.premium_left < 0.0)
-        .then(|| format!("At this caution it may as well be {left} less than the bank."));
+    let left = why.premium_left.filter(|left| why.premium_seen > 0.0 && *left < 0.0);
+    let as_well =
+        left.map(|left| format!("At this caution it may as well be {} less than the bank.", percent(left.abs(), 2)));
     let half = why.at_half_the_caution.map(|share| match share > 0.0 {
         true => format!("Half the caution would hold {}.", percent(share, 1)),
         false => "Half the caution would hold nothing either.".into(),

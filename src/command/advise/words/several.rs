@@ -24,18 +24,23 @@ pub fn told_of_several(advised: &AssetsAdvised, wealth: f64, noun: &str, periods
         money(advice.certainty_equivalent),
         money(advice.floor)
     );
+    if let Some(why) = &advised.why_nothing {
+        let _ = writeln!(text, "{}\n", caution::why_nothing("The assets by inverse volatility", why, noun));
+    }
     let width = advice.allocation.keys().map(String::len).max().unwrap_or_default();
     let _ = writeln!(
         text,
-        "  {:<width$}{:>9}{:>12}   mean log-return a {noun}: seen, and by the worst law",
-        "", "hold", "of wealth"
+        "  {:<width$}{:>9}{:>9}{:>12}   mean log-return a {noun}: seen, and by the worst law",
+        "", "hold", "trade", "hold"
     );
     for (asset, share) in &advice.allocation {
         let means = advice
             .worst_means
             .get(asset)
             .map_or(String::new(), |mean| format!("{:>10}{:>10}", percent(mean.seen, 2), percent(mean.worst, 2)));
-        let _ = writeln!(text, "  {asset:<width$}{:>9}{:>12}   {means}", percent(*share, 1), money(share * wealth));
+        let trade = advice.trade.get(asset).map_or(String::new(), |share| format!("{:+.1} %", 100.0 * share));
+        let held = percent(*share, 1);
+        let _ = writeln!(text, "  {asset:<width$}{held:>9}{trade:>9}{:>12}   {means}", money(share * wealth));
     }
     if let Some(levels) = &advice.levels {
         text += &format!("\n{}", caution::told(levels, periods));

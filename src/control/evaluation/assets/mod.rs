@@ -18,13 +18,13 @@ use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::assets::{AssetsProblem, DATES, check_names, check_rows};
-use crate::control::request::backtest::{ALPHA, RELATIVE, defaults, too_long, usual_window};
+use crate::control::request::backtest::{ALPHA, defaults, too_long, usual_window};
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::caution_rules::check_support;
 use crate::control::request::frequency::Frequency;
 use crate::control::request::frontier::asked_of;
 use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::rules::{TRADING_COST, whole, within};
+use crate::control::request::rules::{RELATIVE_RISK_AVERSION, TRADING_COST, whole, within};
 use crate::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
 use crate::control::request::support::Support;
 
@@ -135,7 +135,7 @@ impl AssetsChoices {
         within("alpha", self.alpha, ALPHA.0, ALPHA.1)?;
         check_support(self.support)
             .map_err(|error| FieldError { field: error.field.replacen("problem.", "", 1), ..error })?;
-        within("risk_aversion", self.risk_aversion, RELATIVE.0, RELATIVE.1)?;
+        within("risk_aversion", self.risk_aversion, RELATIVE_RISK_AVERSION.0, RELATIVE_RISK_AVERSION.1)?;
         within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)
     }
 }
@@ -454,7 +454,7 @@ mod tests {
             let line = named(&walked, &format!("Robust, {name}, knows 3 years"));
             let problem = AssetsProblem { caution: Some(level), ..walked.backtest.problem(12, Some(12)) };
             let fund = OnePeriod::new(&problem.fund(walked.backtest.choices.seed).unwrap(), Kept::default());
-            let advice = AssetsAdvice::of(&problem, &fund).unwrap();
+            let (advice, _) = AssetsAdvice::of(&problem, &[0.0; 3], &fund).unwrap();
             assert_eq!(line.held[0], advice.allocation.into_values().collect::<Vec<f64>>(), "{name}");
             assert!((line.radii[0] - advice.radius).abs() < 1e-12, "{name}");
         }
