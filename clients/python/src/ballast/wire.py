@@ -39,23 +39,6 @@ SimpleReturn: TypeAlias = list[SimpleReturnItem]
 Window: TypeAlias = int | None
 
 
-class AssetsChoices(TypedDict):
-    """How a record of several assets is walked through."""
-
-    windows: list[int | None]
-    """Periods that strategies know; null is all since the first."""
-    every: int
-    """Periods from one measuring of the radius, and one choice of the static strategy, to the next."""
-    alpha: float
-    """Miscoverage of the radius."""
-    risk_aversion: float
-    """Relative."""
-    trading_cost: float
-    """Lost of what is traded, as a share of it."""
-    seed: int
-    """Of the bridges and of the resamples."""
-
-
 class AssetsNow(TypedDict):
     """What stands of a period of several assets with all corrections made."""
 
@@ -1238,16 +1221,19 @@ class WealthReport(TypedDict):
 
 
 class WhyNothing(TypedDict):
-    """Why an advice holds nothing."""
+    """Why an advice holds nothing: of several assets by the fund of inverse volatilities."""
 
     premium_seen: float
     """Mean simple return of the record beyond the bank, per step."""
     standard_error: float
     """Its standard error."""
-    premium_left: float
-    """The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something."""
+    premium_left: NotRequired[float | None]
+    """
+    The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something. Null of several
+    assets, of each of which `worst_means` tells it.
+    """
     at_half_the_caution: NotRequired[float | None]
-    """Share of wealth that would be held within half of the radius; null where the radius is not simulated."""
+    """Share of wealth that would be held within half of the radius, in all assets together; null where the radius is not simulated."""
 
 
 class WithoutOne(TypedDict):
@@ -1360,12 +1346,33 @@ class AssetsBacktestRequest(TypedDict):
     """Periods from one measuring of the radius, and one choice of the static strategy, to the next. Default: a year of them."""
     alpha: NotRequired[float | None]
     """Miscoverage of the radius. Default: 0.1."""
+    support: NotRequired[Support]
+    """The log-returns of each asset that the adversary may use."""
     risk_aversion: NotRequired[float]
     """Relative: 1 is log utility."""
     trading_cost: NotRequired[float]
     """Lost of what is traded, as a share of it; no strategy knows of it."""
     seed: NotRequired[int]
     """The same request and seed give the same report, bit for bit."""
+
+
+class AssetsChoices(TypedDict):
+    """How a record of several assets is walked through."""
+
+    windows: list[int | None]
+    """Periods that strategies know; null is all since the first."""
+    every: int
+    """Periods from one measuring of the radius, and one choice of the static strategy, to the next."""
+    alpha: float
+    """Miscoverage of the radius."""
+    support: Support
+    """The log-returns of each asset that the adversary may use."""
+    risk_aversion: float
+    """Relative."""
+    trading_cost: float
+    """Lost of what is traded, as a share of it."""
+    seed: int
+    """Of the bridges and of the resamples."""
 
 
 class AssetsFigures(Performance):
@@ -1404,11 +1411,13 @@ class AssetsProblem(TypedDict):
     action_interval: NotRequired[list[ActionIntervalItem]]
     """Share of wealth that may be held in all assets together: `[0, highest]`."""
     trading_cost: NotRequired[float]
-    """Lost of what is moved between the bank and any asset, as a share of it; 0 of an advice."""
+    """Lost of what is moved between the bank and any asset, as a share of it. An advice takes it under power and log utility."""
     contributions: NotRequired[Contributions]
     """Money added at the end of each period, withdrawn where it is negative; none of an advice."""
+    risk_aversion: NotRequired[float | None]
+    """Relative risk aversion, in the place of `utility`: log utility at 1, power utility above."""
     utility: NotRequired[UtilitySpecification]
-    """Of wealth at the horizon."""
+    """Of wealth at the horizon. Default: power utility, risk aversion 3."""
     radius: NotRequired[RadiusRule | None]
     caution: NotRequired[CautionLevel | None]
     support: NotRequired[Support | None]
@@ -1751,8 +1760,10 @@ class ProblemSpecification(TypedDict):
     """Lost of what is moved between bank and asset, as a share of it, both ways alike."""
     contributions: NotRequired[Contributions]
     """Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers."""
+    risk_aversion: NotRequired[float | None]
+    """Relative risk aversion, in the place of `utility`: log utility at 1, power utility above."""
     utility: NotRequired[UtilitySpecification]
-    """Of terminal wealth."""
+    """Of terminal wealth. Default: power utility, risk aversion 3."""
     learning: NotRequired[Learning]
     """What older returns weigh in the law that is learned."""
     centre: NotRequired[CentreSpecification]
@@ -2061,6 +2072,8 @@ class AdviseAssets(TypedDict):
     """The assets and the investor."""
     wealth: NotRequired[float | None]
     """Wealth now. Default: the problem's initial wealth."""
+    holdings: NotRequired[dict[str, float]]
+    """Share of wealth in each asset now, before trading, by its name. Default: nothing of any."""
     seed: NotRequired[int]
     """Of the simulated bridges."""
 
@@ -2099,6 +2112,8 @@ class AssetsAdvice(TypedDict):
 
     allocation: dict[str, float]
     """Share of wealth in each asset; the rest is in the bank."""
+    trade: dict[str, float]
+    """The allocation less the holdings: shares of wealth to buy, or where they are negative to sell."""
     composition: dict[str, float]
     """Share of each asset in what is held; where next to nothing is, that of inverse volatilities."""
     total: float
@@ -2109,11 +2124,11 @@ class AssetsAdvice(TypedDict):
     is for a crash which nobody has seen. Null where `problem.support` rules one out already.
     """
     certainty_equivalent: float
-    """Wealth for certain that is worth as much as the allocation is against the worst law: at least this."""
+    """Wealth for certain that is worth as much as the allocation is against the worst law, less what trading costs: at least this."""
     bound: float
     """No allocation is worth more than this."""
     floor: float
-    """Wealth of the bank alone."""
+    """Wealth of selling everything now and staying in the bank."""
     radius: float
     """Radius of the ball, in log-return."""
     radius_factor: float
@@ -2133,6 +2148,7 @@ class AssetsAdvice(TypedDict):
 class AssetsAdvised(AssetsAdvice):
     """The advice on several assets."""
 
+    why_nothing: NotRequired[WhyNothing | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
     """What in the question may be a mistake."""
