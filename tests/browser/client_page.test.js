@@ -106,6 +106,16 @@ test("the worst market is told in months and losses", async () => {
   assert.match(said([]), /every month comes as those seen did/);
 });
 
+test("nothing held is told with what was paid, its chance error and what the market leaves", async () => {
+  const { whyNothing } = await dashboardModule("worst_market.js");
+  const move = (atom, moved_to) => ({ atom: Math.log(atom), moved_to: Math.log(moved_to), mass: 0.5 });
+  const said = (best, rate) => plain(whyNothing({ transport: [move(1.03, best), move(0.99, 0.99)] }, rate, 5, "month"));
+  // Paid 1 % on average, 2 % either side: over the root of four.
+  assert.equal(said(1.01, 0.002), "The record beat the bank by 0.80 % a month; the chance error of that is 1.00 %. In this market it is 0.20 % less.");
+  assert.match(said(1.02, 0.002), /In this market it beats it by 0\.30 %\.$/);
+  assert.equal(said(1.01, 0.012), "The record paid 0.20 % a month less than the bank; the chance error of that is 1.00 %.");
+});
+
 test("on a phone the advice comes first, and nothing to press stands above it", async () => {
   await page.setViewportSize({ width: 390, height: 844 });
   await go();

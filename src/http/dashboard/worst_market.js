@@ -30,8 +30,20 @@ export function assumed({ transport }, unit, cautious = true) {
   return `It assumes that ${often(mass)} ${verb(mass, "lose")} ${size(lowest)}${more}.`;
 }
 
+/** Why nothing is held: what the returns seen paid beyond the bank, how well `size` of them tell that, and what the market leaves of it. */
+export function whyNothing({ transport }, rate, size, unit) {
+  const mean = (of) => transport.reduce((sum, move) => sum + move.mass * of(move), 0);
+  const paid = mean(({ atom }) => Math.expm1(atom));
+  const error = Math.sqrt(mean(({ atom }) => (Math.expm1(atom) - paid) ** 2) / (size - 1));
+  const left = mean(({ moved_to }) => Math.expm1(moved_to)) - rate;
+  const beyond = paid - rate;
+  const told = (value) => percent(Math.abs(value), 2);
+  if (beyond <= 0) return `The record paid ${told(beyond)} a ${unit} less than the bank; the chance error of that is ${told(error)}.`;
+  return `The record beat the bank by ${told(beyond)} a ${unit}; the chance error of that is ${told(error)}. In this market it ${left > 0 ? `beats it by ${told(left)}` : `is ${told(left)} less`}.`;
+}
+
 /** The section; the robust step takes a while, so it comes after the rest of the page stands. `then()` when it has. */
-export function worstMarket({ id, cautious, calendar: { unit }, leaving }, advice, then) {
+export function worstMarket({ id, policy, cautious, calendar: { unit }, leaving }, advice, then) {
   const paper = h("div", { class: "words quant" }, advice.quant);
   const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step anew\u2026"));
   const told = async () => {
@@ -40,7 +52,9 @@ export function worstMarket({ id, cautious, calendar: { unit }, leaving }, advic
     const { worst_case } = anew;
     paper.append(paperWords(anew, unit));
     if (worst_case.transport.length === 0) return [h("p", { class: "sentence" }, assumedNormal(worst_case, unit))];
-    return [h("p", { class: "sentence" }, assumed(worst_case, unit, cautious)), lawChart(worst_case)];
+    const { rate_per_step } = policy.specification.problem;
+    const why = cautious && anew.allocation === 0 ? [h("p", { class: "sentence" }, whyNothing(worst_case, rate_per_step, anew.effective_size, unit))] : [];
+    return [...why, h("p", { class: "sentence" }, assumed(worst_case, unit, cautious)), lawChart(worst_case)];
   };
   told().then(
     (nodes) => {
