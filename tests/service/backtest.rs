@@ -319,7 +319,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
     assert_eq!((report["dates"].as_array().unwrap().len(), &report["dates"][0]), (16, &json!("2013-01")));
     let names: Vec<&str> =
         report["strategies"].as_array().unwrap().iter().map(|one| one["strategy"].as_str().unwrap()).collect();
-    assert_eq!((names.len(), names[0], names[20]), (22, "Robust, bold, knows 3 years", "Equal shares"));
+    assert_eq!((names.len(), names[0], names[20]), (22, "Robust, balanced, knows 3 years", "Equal shares"));
 
     let (mut wealth, mut held) = (100.0, [0.0, 0.0]);
     let mut highest: f64 = 100.0;

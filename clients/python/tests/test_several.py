@@ -48,7 +48,7 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
 
     names = [line.get_label() for line in job.plot(strategies=["Equal shares", strategies.index[0]]).get_lines()]
     assert names == ["Equal shares", strategies.index[0]]
-    with pytest.raises(ValueError, match="'adaptive': must be of Robust, bold, knows 2 years; Robust"):
+    with pytest.raises(ValueError, match="'adaptive': must be of Robust, balanced, knows 2 years; Robust"):
         job.plot(strategies=["adaptive"])
     lines = {line.get_label(): line for line in job.plot().get_lines()}
     assert list(lines["Equal shares"].get_ydata()) == wealth["Equal shares"].tolist()  # type: ignore[arg-type]
@@ -58,7 +58,7 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
     means = job.held()
     assert means.loc["Equal shares"].tolist() == pytest.approx([0.5, 0.5])
     assert list(means.index) == list(strategies.index)
-    with pytest.raises(ValueError, match="must be one of Robust, bold, knows 2 years; Robust"):
+    with pytest.raises(ValueError, match="must be one of Robust, balanced, knows 2 years; Robust"):
         frames.held(report, "adaptive")
 
 

@@ -48,9 +48,9 @@ pub struct AssetsStrategy {
     pub window: Option<usize>,
 }
 
-/// What of the radius is walked with: under the norm `scaled_one`, and under `sup`.
+/// What of the radius is walked with, the default first: under the norm `scaled_one`, and under `sup`.
 const LEVELS: [CautionLevel; 4] =
-    [CautionLevel::Bold, CautionLevel::Balanced, CautionLevel::Cautious, CautionLevel::Paper];
+    [CautionLevel::Balanced, CautionLevel::Bold, CautionLevel::Cautious, CautionLevel::Paper];
 const SUP_LEVELS: [CautionLevel; 2] = [CautionLevel::Balanced, CautionLevel::Paper];
 /// What trusts the record.
 const NONE: CautionLevel = CautionLevel::Scale(0.0);
