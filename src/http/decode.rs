@@ -280,7 +280,7 @@ impl<'de> Visitor<'de> for Along<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::request::specification::Specification;
+    use crate::control::request::specification::{ProblemSpecification, Specification};
 
     fn refused(body: &str) -> (String, Value, String) {
         let problem = json::<Specification>(body.as_bytes()).unwrap_err();
@@ -355,7 +355,11 @@ mod tests {
             read(r#"{"problem": {"history": [1.0, -0.0], "rate_per_step": 0.0, "horizon": 3.0}, "seed": 7.0}"#)
                 .unwrap();
         let whole = r#"{"problem": {"history": [1, -0.0], "rate_per_step": 0, "horizon": 3}, "seed": 7}"#;
-        assert_eq!(dotted, read(whole).unwrap());
+        let completed = |read: Specification| Specification {
+            problem: ProblemSpecification { utility: Default::default(), ..read.problem },
+            ..read
+        };
+        assert_eq!(completed(dotted), completed(read(whole).unwrap()));
         assert_eq!(refused(r#"{"problem": {"history": [1.0], "horizon": 3.5}}"#).0, "problem.horizon");
         let twice = r#"{"problem": {"history": [1.0], "horizon": 3.0, "horizon": 3}}"#;
         assert!(read(twice).is_err(), "a field given twice");

@@ -353,7 +353,7 @@ async fn what_is_wrong_with_several_assets_is_named() {
         let (status, refused) = app.post("/advise", &question).await;
         assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(field)), "{question}: {refused}");
     }
-    for (field, value) in [("trading_cost", json!(0.01)), ("horizon", json!(2)), ("contributions", json!(1.0))] {
+    for (field, value) in [("trading_cost", json!(0.2)), ("horizon", json!(2)), ("contributions", json!(1.0))] {
         let (status, refused) = app.post("/advise", &with(&|problem| problem[field] = value.clone())).await;
         let named = format!("problem.{field}");
         assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(named.as_str())), "{refused}");

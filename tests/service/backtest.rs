@@ -334,7 +334,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
         let found = report["periods"][20]["wealth"][quarter - 12].as_f64().unwrap();
         assert!((found / wealth - 1.0).abs() < 1e-12, "{quarter}: {found} {wealth}");
     }
-    let equal = &report["strategies"][16];
+    let equal = &report["strategies"][20];
     assert!((equal["final_wealth"].as_f64().unwrap() / wealth - 1.0).abs() < 1e-12, "{equal} {wealth}");
     assert!((equal["max_drawdown"].as_f64().unwrap() - fall).abs() < 1e-12, "{equal} {fall}");
     assert_eq!((&equal["effective_assets"], &equal["mean_allocations"]["health"]), (&json!(2.0), &json!(0.5)));

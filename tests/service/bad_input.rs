@@ -224,7 +224,7 @@ fn the_description_is_as_strict_as_the_rules_of_single_fields() {
     assert_eq!(loose, DECIDED_TOGETHER);
 }
 
-const DECIDED_TOGETHER: [&str; 20] = [
+const DECIDED_TOGETHER: [&str; 21] = [
     "problem.action_interval[0]",
     "problem.action_interval[1]",
     "problem.contributions",
@@ -233,6 +233,7 @@ const DECIDED_TOGETHER: [&str; 20] = [
     "problem.trading_cost",
     "problem.utility.risk_aversion",
     "problem.utility.risk_aversion_relative",
+    "problem.risk_aversion",
     "problem.centre.law.kind",
     "problem.centre.law",
     "problem.centre.kind",
@@ -672,7 +673,7 @@ async fn every_field_of_a_walk_forward_of_several_assets_is_named() {
         assert_named(&problem, field);
     }
     let (status, job) = app.post("/backtest", &walk_of_assets()).await;
-    assert_eq!((status, &job["progress"]["steps_total"]), (reqwest::StatusCode::ACCEPTED, &json!(10)), "{job}");
+    assert_eq!((status, &job["progress"]["steps_total"]), (reqwest::StatusCode::ACCEPTED, &json!(12)), "{job}");
 }
 
 /// Names of the properties of a schema of the description.
