@@ -346,7 +346,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
             of("energy").zip(of("health")).all(|(one, other)| one >= 0.0 && other >= 0.0 && one + other < 1.0 + 1e-9)
         );
     }
-    assert_eq!(read("periods.csv").lines().count(), 1 + 16 * 18);
+    assert_eq!(read("periods.csv").lines().count(), 1 + 16 * 22);
     assert!(
         read("periods.csv")
             .starts_with("date,strategy,allocation,radius,traded,wealth,drawdown,held: energy,held: health\n")
