@@ -77,6 +77,17 @@ def test_prices_and_rates_by_date_are_the_same_record(ballast: Ballast) -> None:
         ballast.backtest_assets(TABLE.to_numpy(), kind="simple", rate=0.0, assets=["energy", "health"])
 
 
+def test_what_is_held_already_is_traded_from_at_a_cost_and_risk_aversion_has_one_spelling(ballast: Ballast) -> None:
+    asked = {"rate_per_step": 0.002, "trading_cost": 0.02, "holdings": {"energy": 0.2, "health": 0.3}}
+    advised = ballast.advise_assets(TABLE, **asked, risk_aversion=6.0)
+    for name, held in asked["holdings"].items():
+        assert advised["trade"][name] == pytest.approx(advised["allocation"][name] - held)
+    assert advised["floor"] == pytest.approx(100.2 * (1.0 - 0.02 * 0.5))
+    assert ballast.advise_assets(TABLE, **asked, utility={"kind": "power", "risk_aversion": 6.0}) == advised
+    one = ballast.advise(TABLE["energy"], rate_per_step=0.002, risk_aversion=6.0)
+    assert one == ballast.advise(TABLE["energy"], rate_per_step=0.002, utility={"kind": "power", "risk_aversion": 6.0})
+
+
 def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Ballast) -> None:
     training = ballast.train_assets(
         TABLE,

@@ -73,6 +73,7 @@ class _Ballast:
         action_interval: Sequence[float] | None = None,
         trading_cost: float | None = None,
         contributions: float | Sequence[float] | None = None,
+        risk_aversion: float | None = None,
         utility: wire.UtilitySpecification | None = None,
         learning: wire.Learning | None = None,
         radius: wire.RadiusRule | None = None,
@@ -114,6 +115,7 @@ class _Ballast:
             "action_interval": None if action_interval is None else list(action_interval),
             "trading_cost": trading_cost,
             "contributions": _amounts(contributions),
+            "risk_aversion": risk_aversion,
             "utility": utility,
             "learning": learning,
             "radius": radius,
@@ -143,7 +145,7 @@ class _Ballast:
         """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
 
         ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``, and so is every other field of the
-        problem that is given by name, such as ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are
+        problem that is given by name, such as ``risk_aversion`` or ``trading_cost``. ``wealth`` and ``holding`` are
         what the investor has, and what share of it is in the asset already. ``sensitivity=True`` also says how
         near the advice is to changing.
         """
@@ -176,7 +178,7 @@ class _Ballast:
         ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank; ``assets``
         chooses among them. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what
         the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
-        as ``ground_norm``, ``utility``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is what
+        as ``ground_norm``, ``risk_aversion``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is what
         share of wealth is in each asset already, by its name.
         """
         whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
@@ -331,6 +333,7 @@ class _Ballast:
         windows: Sequence[int | None] | None = None,
         every: int | None = None,
         alpha: float | None = None,
+        support: wire.Support | None = None,
         risk_aversion: float | None = None,
         trading_cost: float | None = None,
         seed: int | None = None,
@@ -356,6 +359,7 @@ class _Ballast:
             "windows": None if windows is None else list(windows),
             "every": every,
             "alpha": alpha,
+            "support": support,
             "risk_aversion": risk_aversion,
             "trading_cost": trading_cost,
             "seed": seed,
@@ -384,7 +388,7 @@ class _Ballast:
         """Queues the frontier of caution: what multiples of the radius lose on records like this one.
 
         ``returns`` are of one asset as in ``advise``, or, with more than one column, of several as in
-        ``advise_assets``. Every other field of the problem is given by name, such as ``utility`` or ``radius``.
+        ``advise_assets``. Every other field of the problem is given by name, such as ``risk_aversion`` or ``radius``.
         """
         if assets is None and len(getattr(returns, "columns", ())) < 2:
             found = await self._one(returns, kind, choices)

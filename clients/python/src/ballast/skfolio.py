@@ -28,6 +28,7 @@ class RobustAllocation(Advised, BaseOptimization):
         rate_per_step: float | None = None,
         bank: str | int | None = None,
         initial_wealth: float | None = None,
+        risk_aversion: float | None = None,
         utility: wire.UtilitySpecification | None = None,
         radius: wire.RadiusRule | None = None,
         ground_norm: wire.GroundNorm | None = None,
@@ -50,6 +51,7 @@ class RobustAllocation(Advised, BaseOptimization):
         self.rate_per_step = rate_per_step
         self.bank = bank
         self.initial_wealth = initial_wealth
+        self.risk_aversion = risk_aversion
         self.utility = utility
         self.radius = radius
         self.ground_norm = ground_norm

@@ -31,6 +31,7 @@ class Advised:
     #: Constructor's arguments that are fields of the problem.
     _PROBLEM = (
         "initial_wealth",
+        "risk_aversion",
         "utility",
         "radius",
         "ground_norm",
@@ -71,8 +72,8 @@ class RobustAllocation(Advised, BaseEstimator):
     ``X`` has the simple returns of an asset in each column, as fractions, the oldest period first. What the bank pays
     a period is ``rate_per_step``, or the last number of the column ``bank`` of ``X``, which is then no asset: its
     name in a DataFrame, its place in an array. Exactly one of the two is given. ``url`` is where the service listens;
-    its key comes from ``BALLAST_KEY``. ``initial_wealth``, ``utility``, ``radius``, ``ground_norm``,
-    ``action_interval``, ``caution``, ``support`` and ``periods_per_year`` are fields of the problem of
+    its key comes from ``BALLAST_KEY``. ``initial_wealth``, ``risk_aversion``, ``utility``, ``radius``,
+    ``ground_norm``, ``action_interval``, ``caution``, ``support`` and ``periods_per_year`` are fields of the problem of
     ``POST /advise``; what is left out the service chooses.
 
     After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: in the assets what is advised, in the
@@ -87,6 +88,7 @@ class RobustAllocation(Advised, BaseEstimator):
         rate_per_step: float | None = None,
         bank: str | int | None = None,
         initial_wealth: float | None = None,
+        risk_aversion: float | None = None,
         utility: wire.UtilitySpecification | None = None,
         radius: wire.RadiusRule | None = None,
         ground_norm: wire.GroundNorm | None = None,
@@ -99,6 +101,7 @@ class RobustAllocation(Advised, BaseEstimator):
         self.rate_per_step = rate_per_step
         self.bank = bank
         self.initial_wealth = initial_wealth
+        self.risk_aversion = risk_aversion
         self.utility = utility
         self.radius = radius
         self.ground_norm = ground_norm
