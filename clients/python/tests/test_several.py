@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ballast import AsyncBallast, Ballast, frames
+from ballast import AsyncBallast, Ballast, frames, wire
 
 matplotlib.use("Agg")
 
@@ -78,14 +78,16 @@ def test_prices_and_rates_by_date_are_the_same_record(ballast: Ballast) -> None:
 
 
 def test_what_is_held_already_is_traded_from_at_a_cost_and_risk_aversion_has_one_spelling(ballast: Ballast) -> None:
-    asked = {"rate_per_step": 0.002, "trading_cost": 0.02, "holdings": {"energy": 0.2, "health": 0.3}}
-    advised = ballast.advise_assets(TABLE, **asked, risk_aversion=6.0)
-    for name, held in asked["holdings"].items():
-        assert advised["trade"][name] == pytest.approx(advised["allocation"][name] - held)
+    held = {"energy": 0.2, "health": 0.3}
+    advised = ballast.advise_assets(TABLE, rate_per_step=0.002, trading_cost=0.02, holdings=held, risk_aversion=6.0)
+    for name, share in held.items():
+        assert advised["trade"][name] == pytest.approx(advised["allocation"][name] - share)
     assert advised["floor"] == pytest.approx(100.2 * (1.0 - 0.02 * 0.5))
-    assert ballast.advise_assets(TABLE, **asked, utility={"kind": "power", "risk_aversion": 6.0}) == advised
+    utility: wire.UtilitySpecification = {"kind": "power", "risk_aversion": 6.0}
+    spelled = ballast.advise_assets(TABLE, rate_per_step=0.002, trading_cost=0.02, holdings=held, utility=utility)
+    assert spelled == advised
     one = ballast.advise(TABLE["energy"], rate_per_step=0.002, risk_aversion=6.0)
-    assert one == ballast.advise(TABLE["energy"], rate_per_step=0.002, utility={"kind": "power", "risk_aversion": 6.0})
+    assert one == ballast.advise(TABLE["energy"], rate_per_step=0.002, utility=utility)
 
 
 def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Ballast) -> None:
