@@ -178,8 +178,8 @@ class _Ballast:
         ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank; ``assets``
         chooses among them. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what
         the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
-        as ``ground_norm``, ``risk_aversion``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is what
-        share of wealth is in each asset already, by its name.
+        as ``ground_norm``, ``risk_aversion``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is
+        what share of wealth is in each asset already, by its name.
         """
         whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth, "holdings": holdings})
