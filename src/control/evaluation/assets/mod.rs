@@ -407,7 +407,6 @@ mod tests {
         let best = grid.map(mean).fold(f64::NEG_INFINITY, f64::max);
         // Twelve periods of a hundredth of a basis point.
         assert!(mean([plug_in[0], plug_in[1]]) > best - 12.0 * 2.0 * 1e-6, "{plug_in:?}");
-        let total = |name: &str| named(&walked, name).account.allocations[0];
         // At a radius of few doubts all are the same, and at the usual one the whole of it leaves little.
         let all: f64 = plug_in.iter().sum();
         let careful = walk_at(record(2, 24, log_return), 0.1);
