@@ -207,7 +207,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   const told = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
   assert.equal(await page.locator("h1").textContent(), "Backtest of fund and bonds, March 2006 to December 2017");
   const words = await main();
-  assert.match(words, /18 ways to hold 2 assets, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
+  assert.match(words, /22 ways to hold 2 assets, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
   for (const sentence of told.sentences) assert.ok(words.includes(plain(sentence)), sentence);
   const shown = await cells("Strategies, by what a year of each is worth");
   assert.equal(shown.length, 1 + told.strategies.length);
