@@ -99,9 +99,8 @@ fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> 
     let asked = |returns: &Returns| arguments.question(returns, holding).answer();
     let advised = asked(returns).map_err(|error| by_option(error, count, &arguments.record))?;
     let told = || {
-        // Of a record of a few months: too short for its quarters.
-        let coarser: Vec<(&str, Option<f64>)> = (returns.coarser().iter())
-            .map(|returns| (returns.noun(), asked(returns).ok().map(|advised| advised.advice.allocation)))
+        let coarser: Vec<(&str, Result<f64, FieldError>)> = (returns.coarser().iter())
+            .map(|returns| (returns.noun(), asked(returns).map(|advised| advised.advice.allocation)))
             .collect();
         let text = words::told(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
         words::told_of_coarser(text, &coarser)

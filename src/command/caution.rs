@@ -60,7 +60,7 @@ pub fn support(text: &str) -> Result<Support, String> {
         factor => {
             let factor: f64 = factor.parse().map_err(|_| "must be a number, or none".to_owned())?;
             let support = Support::WorstSeen { factor };
-            check_support(support).map_err(|FieldError { rule, .. }| rule).map(|()| support)
+            check_support("--support", support).map_err(|FieldError { rule, .. }| rule).map(|()| support)
         }
     }
 }

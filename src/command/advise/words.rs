@@ -5,6 +5,7 @@ mod several;
 
 use std::fmt::Write;
 
+use ballast::control::error::FieldError;
 use ballast::control::policy::advice::{Advice, AdviceSource};
 use ballast::control::policy::sensitivity::{NextAdvice, Return, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
@@ -37,14 +38,14 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
     text.trim_end().to_owned()
 }
 
-/// The same with what the record would advise by longer periods, where it was asked; `None` of those that say nothing.
-pub fn told_of_coarser(text: String, coarser: &[(&str, Option<f64>)]) -> String {
+/// The same with what the record would advise by longer periods, where it was asked, or why there is none.
+pub fn told_of_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)]) -> String {
     if coarser.is_empty() {
         return text;
     }
-    let of = |(noun, share): &(&str, Option<f64>)| match share {
-        Some(share) => format!("{} by {noun}s", percent(*share, 1)),
-        None => format!("nothing by {noun}s, which are too few or too alike"),
+    let of = |(noun, share): &(&str, Result<f64, FieldError>)| match share {
+        Ok(share) => format!("{} by {noun}s", percent(*share, 1)),
+        Err(FieldError { rule, .. }) => format!("no advice by {noun}s (their returns {rule})"),
     };
     let shares: Vec<String> = coarser.iter().map(of).collect();
     format!("{text}\n\nThe same record would say {}. Give returns as far apart as you decide.", shares.join(", "))

@@ -52,13 +52,14 @@ impl Interior<'_> {
             self.entering = (0..others.len()).filter(counts).collect();
         }
         if all < self.upper {
-            (self.upper, self.tangent) = (all, Tangent { shares: shares.to_vec(), mean, slopes });
+            (self.upper, self.tangent) = (all, Some(Tangent { shares: shares.to_vec(), mean, slopes }));
         }
     }
 
-    /// A tangent at shares of the assets searched among as one at shares of all.
-    pub fn of_all_assets(&self, tangent: &Tangent) -> Tangent {
-        Tangent { shares: self.of_all(&tangent.shares), ..tangent.clone() }
+    /// The tangent at shares of the assets searched among as one at shares of all.
+    pub fn tangent_of_all(&mut self) -> Option<Tangent> {
+        let tangent = self.tangent.take()?;
+        Some(Tangent { shares: self.of_all(&tangent.shares), ..tangent })
     }
 
     /// A row of the assets searched among as one of all.

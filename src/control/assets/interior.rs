@@ -92,8 +92,8 @@ pub(super) struct Interior<'a> {
     /// What the best is worth at least, and every allocation at most, in relative utility.
     pub lower: f64,
     pub upper: f64,
-    /// Of the law that told the lowest upper bound.
-    pub tangent: Tangent,
+    /// Of the law that told the lowest upper bound; none where no law told one.
+    pub tangent: Option<Tangent>,
     pub evaluations: usize,
 }
 
@@ -180,7 +180,7 @@ impl<'a> Interior<'a> {
             pairs_before: Vec::new(),
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
-            tangent: Tangent::default(),
+            tangent: None,
             evaluations: 0,
         };
         interior.price_the_start(near.is_some());

@@ -165,7 +165,7 @@ impl AssetsStep {
     /// A search that found nothing better leaves all in the bank where that is allowed, whatever became of it; and nothing is worth
     /// more than the best growth seen.
     fn at_least_the_bank(&self, found: AssetsSolution) -> AssetsSolution {
-        let most = self.growths.iter().copied().fold(1.0, f64::max).ln();
+        let most = self.most_growth();
         let bound = if found.bound < most && found.bound >= found.value { found.bound } else { most };
         if found.value >= 0.0 || self.total.lowest > 0.0 {
             return AssetsSolution { value: found.value.min(bound), bound, ..found };
@@ -181,7 +181,7 @@ impl AssetsStep {
         mut held: Vec<usize>,
         near: Option<&AssetsSolution>,
         mut barrier: f64,
-    ) -> (AssetsSolution, Tangent) {
+    ) -> (AssetsSolution, Option<Tangent>) {
         let mut start = near.map(|near| (held.iter().map(|&asset| near.allocation[asset]).collect(), near.multiplier));
         let (mut upper, mut evaluations) = (f64::INFINITY, 0);
         loop {
@@ -191,7 +191,7 @@ impl AssetsStep {
             upper = interior.upper.min(upper);
             evaluations += interior.evaluations;
             if interior.entering.is_empty() {
-                return (among.told(&interior, upper, evaluations), interior.of_all_assets(&interior.tangent));
+                return (among.told(&interior, upper, evaluations), interior.tangent_of_all());
             }
             let entering = std::mem::take(&mut interior.entering);
             let (shares, price) = interior.point.split_at(held.len());
@@ -270,6 +270,11 @@ impl AssetsStep {
             distance += mass * worst.cost;
         }
         (mean - price * self.radius, distance)
+    }
+
+    /// The log of the best growth over the bank that was seen, or of the bank's: no allocation is worth more.
+    fn most_growth(&self) -> f64 {
+        self.growths.iter().copied().fold(1.0, f64::max).ln()
     }
 
     fn atoms(&self) -> usize {

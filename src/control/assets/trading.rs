@@ -27,7 +27,7 @@ pub(super) struct Trading {
 }
 
 /// What a law of the ball says of every allocation: at `shares` it gives the mean utility `mean`, which rises by `slopes`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tangent {
     pub shares: Vec<f64>,
     pub mean: f64,
@@ -117,7 +117,7 @@ impl AssetsStep {
         let may = self.total.lowest <= 0.0;
         AssetsSolution {
             value: if may { (-cost * self.trading.turnover(&nothing)).ln_1p() } else { f64::NEG_INFINITY },
-            bound: self.growths.iter().copied().fold(1.0, f64::max).ln(),
+            bound: self.most_growth(),
             multiplier: 0.0,
             mean_moves: nothing.clone(),
             allocation: nothing,
@@ -125,8 +125,9 @@ impl AssetsStep {
         }
     }
 
-    /// A solution of the search in log certainty equivalent less the cost. Holdings that it hardly changes are kept.
-    fn less_cost(&self, found: AssetsSolution, tangent: Tangent, cost: f64) -> AssetsSolution {
+    /// A solution of the search in log certainty equivalent less the cost. Holdings that it hardly changes are kept. Where no law told
+    /// a tangent there is no bound.
+    fn less_cost(&self, found: AssetsSolution, tangent: Option<Tangent>, cost: f64) -> AssetsSolution {
         let trading = &self.trading;
         let kept = |(held, share): (&f64, &f64)| if (share - held).abs() < LEAST_SHARE { *held } else { *share };
         let kept: Vec<f64> = trading.holdings.iter().zip(&found.allocation).map(kept).collect();
@@ -143,14 +144,20 @@ impl AssetsStep {
                 (allocation, value) = (kept, other);
             }
         }
+        let bound = tangent.map_or(f64::INFINITY, |tangent| self.bound_by(&tangent, cost));
+        AssetsSolution { allocation, value, bound, ..found }
+    }
+
+    /// What no allocation is worth more than, less the cost, by the tangent of a law.
+    fn bound_by(&self, tangent: &Tangent, cost: f64) -> f64 {
+        let trading = &self.trading;
         let lost = cost * trading.turnover(&tangent.shares);
         let slope = self.utility.inverse_slope(tangent.mean);
         let slopes: Vec<f64> = tangent.slopes.iter().map(|rise| slope * rise).collect();
         let free = Trading { holdings: trading.holdings.clone(), price: cost / (1.0 - lost) };
         let along: f64 = slopes.iter().zip(&tangent.shares).map(|(slope, share)| slope * share).sum();
-        let bound = self.utility.inverse(tangent.mean) + (-lost).ln_1p() + free.most(&slopes, self.total) - along
-            + free.taken(&tangent.shares);
-        AssetsSolution { allocation, value, bound, ..found }
+        self.utility.inverse(tangent.mean) + (-lost).ln_1p() + free.most(&slopes, self.total) - along
+            + free.taken(&tangent.shares)
     }
 
     /// p at an allocation: `c / (1 - c T) dU/dV`.

@@ -182,7 +182,7 @@ pub fn check_rows(
         Learning::Equal {}.check_deviation(&format!("{named}, {name}"), &column)?;
     }
     let Some(support) = support else { return Ok(()) };
-    check_support(support)?;
+    check_support("problem.support", support)?;
     for (date, row) in rows.iter().enumerate() {
         for (asset, &value) in row.iter().enumerate() {
             check_within(support, || format!("{named}[{date}][{asset}]"), value)?;

@@ -45,7 +45,7 @@ impl ProblemSpecification {
             let rule = "must be absent in the parametric frameworks: a normal law has no bounds";
             return Err(FieldError::new("problem.support", "an object", rule));
         }
-        check_support(given)?;
+        check_support("problem.support", given)?;
         let mut seen = self.history.iter().enumerate();
         seen.try_for_each(|(index, z)| check_within(given, || format!("problem.history[{index}]"), *z))
     }
@@ -72,15 +72,15 @@ impl ProblemSpecification {
     }
 }
 
-/// Checks the numbers of a support.
+/// Checks the numbers of a support, in the field `named`.
 ///
 /// # Errors
 /// The first that breaks its rule.
-pub fn check_support(support: Support) -> Result<(), FieldError> {
+pub fn check_support(named: &str, support: Support) -> Result<(), FieldError> {
     match support {
-        Support::WorstSeen { factor } => rules::within("problem.support.factor", factor, FACTOR.0, FACTOR.1),
+        Support::WorstSeen { factor } => rules::within(&format!("{named}.factor"), factor, FACTOR.0, FACTOR.1),
         Support::None {} => Ok(()),
-        Support::Between { min, max } => rules::interval("problem.support", Interval { min, max }, -LIMIT, LIMIT),
+        Support::Between { min, max } => rules::interval(named, Interval { min, max }, -LIMIT, LIMIT),
     }
 }
 

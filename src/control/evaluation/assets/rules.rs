@@ -53,7 +53,7 @@ const LEVELS: [CautionLevel; 4] =
     [CautionLevel::Balanced, CautionLevel::Bold, CautionLevel::Cautious, CautionLevel::Paper];
 const SUP_LEVELS: [CautionLevel; 2] = [CautionLevel::Balanced, CautionLevel::Paper];
 /// What trusts the record.
-const NONE: CautionLevel = CautionLevel::Scale(0.0);
+pub const NONE: CautionLevel = CautionLevel::Scale(0.0);
 
 /// Those that are walked for each window, and the two that know nothing.
 pub fn strategies(windows: &[Option<usize>]) -> Vec<AssetsStrategy> {
