@@ -77,12 +77,13 @@ impl fmt::Display for Holding {
 }
 
 /// The option that says what a field of the question is.
-const OPTIONS: [(&str, &str); 6] = [
+const OPTIONS: [(&str, &str); 7] = [
     ("problem.learning.half_life", "--half-life"),
     ("problem.trading_cost", "--trading-cost"),
     ("problem.periods_per_year", "--periods-per-year"),
     ("wealth", "--wealth"),
     ("holding", "--holding"),
+    ("holdings", "--holding"),
     ("sensitivity", "--sensitivity"),
 ];
 
@@ -187,9 +188,8 @@ fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
         );
         return FieldError::new(record.source(), format!("{count} returns"), rule);
     }
-    if let Some(column) = error.field.strip_prefix("holdings") {
-        let value = format!("{}={}", column.trim_start_matches('.'), error.value);
-        return FieldError { field: "--holding".into(), value, ..error };
+    if let Some(column) = error.field.strip_prefix("holdings.") {
+        return FieldError { value: format!("{column}={}", error.value), field: "--holding".into(), ..error };
     }
     match OPTIONS.iter().chain(&caution::OPTIONS).find(|(field, _)| *field == error.field) {
         Some((_, option)) => FieldError { field: (*option).into(), ..error },
