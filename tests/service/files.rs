@@ -1,10 +1,11 @@
 //! The files of a folder that is served: what becomes of the service once they are others.
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until};
+use crate::support::process::Process;
 use crate::support::{App, process, specification};
 use ballast::store::{Damage, Store, backup};
 use tempfile::TempDir;
@@ -104,11 +105,21 @@ async fn a_backup_copied_over_the_database_ends_the_service() {
     assert_eq!(served.ended().await, Some(STORE_FAILED));
 }
 
-fn serve_again(data: &Path) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    let command = command.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(data).env_remove("BALLAST_STORE");
-    let output = command.output().unwrap();
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+/// The exit code of a service that may not have `data`, and what it said.
+fn refused(data: &Path) -> (Option<i32>, String) {
+    let served = process::try_serve(|command| {
+        command.arg("--data").arg(data).env_remove("BALLAST_STORE").stderr(Stdio::piped());
+    });
+    match served {
+        Ok((child, _)) => {
+            drop(Process(child));
+            panic!("{} is served twice", data.display());
+        }
+        Err((child, _)) => {
+            let output = child.wait_with_output().unwrap();
+            (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        }
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -119,8 +130,11 @@ async fn two_services_never_have_one_folder() {
     // Stopped, the first does not see that its lock is gone.
     let pid = rustix::process::Pid::from_child(&served.0);
     rustix::process::kill_process(pid, rustix::process::Signal::STOP).unwrap();
+    // A signal is answered a little later, and a first that looked until then would give the folder up.
+    let stopped = rustix::process::waitpid(Some(pid), rustix::process::WaitOptions::UNTRACED).unwrap();
+    assert!(stopped.is_some_and(|(_, status)| status.stopped()));
     removed(&lock);
-    let (code, said) = serve_again(&data);
+    let (code, said) = refused(&data);
     assert!(code == Some(1) && said.contains("ballast.sqlite is locked by another process"), "{code:?}: {said}");
     rustix::process::kill_process(pid, rustix::process::Signal::CONT).unwrap();
     assert_eq!(served.ended().await, Some(STORE_FAILED));
