@@ -14,8 +14,6 @@ use crate::numerics::levelling::{Levelling, Phase};
 /// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
 const NEWTON_STEPS: usize = 40;
 const NEWTON_TOLERANCE: f64 = 1e-13;
-/// The logarithm of the level of a branch and its cost move by no more in a step.
-const NEAR: f64 = 0.4;
 /// At 1 a local minimum and a maximum meet.
 const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
@@ -32,12 +30,8 @@ pub(super) struct Branch {
     pub bend: f64,
     /// The level to which positions are lowered; infinite where the atom is left.
     pub level: f64,
-    /// The logarithm of the level, which branches are compared by.
-    log_level: f64,
     /// True where the level follows allocation and price: at a local minimum inside a phase.
     pub follows: bool,
-    /// The branch of the point before that it goes on from; `None` of a new one, and where there was no point before.
-    pub continues: Option<usize>,
 }
 
 /// All branches of all atoms; those of an atom lie together, the first leaves it.
@@ -88,50 +82,6 @@ impl Branches {
         }
     }
 
-    /// Finds the branches at a point with what each continues, and keeps beside them, as moves that stay, those of `before` that none
-    /// of now continues and that `counts` still: what is gone may come back, far below. Cost O(n d ln d), and for each atom the
-    /// product of its branches then and now.
-    pub fn find_after(
-        &mut self,
-        step: &AssetsStep,
-        allocation: &[f64],
-        price: f64,
-        before: &Branches,
-        counts: impl Fn(usize, usize) -> bool,
-    ) {
-        self.start(step);
-        let mut goes_on = Vec::new();
-        for atom in 0..step.atoms() {
-            let from = self.all.len();
-            self.find_of(step, atom, allocation, price);
-            let then = before.of(atom);
-            goes_on.clear();
-            goes_on.resize(then.len(), false);
-            self.all[from].continues = Some(then.start);
-            for branch in &mut self.all[from + 1..] {
-                branch.continues = before.nearest(atom, branch);
-                branch.continues.into_iter().for_each(|continued| goes_on[continued - then.start] = true);
-            }
-            for gone in then.clone().skip(1).filter(|gone| !goes_on[gone - then.start] && counts(atom, *gone)) {
-                let (level, cost, row) = (before.all[gone].level, before.all[gone].cost, before.excess(gone));
-                self.push(step.utility, price, allocation, row.iter().copied(), cost, level);
-                self.all.last_mut().into_iter().for_each(|kept| kept.continues = Some(gone));
-            }
-            self.first.push(self.all.len());
-        }
-    }
-
-    /// The moved branch of an atom that is nearest to another by level and cost, if it is as near as a step may take it. The level
-    /// alone does not tell them apart: what stays keeps its cost while the allocation changes under it.
-    fn nearest(&self, atom: usize, other: &Branch) -> Option<usize> {
-        let apart = |branch: &usize| {
-            let branch = &self.all[*branch];
-            (branch.log_level - other.log_level).abs().max((branch.cost - other.cost).abs())
-        };
-        let moved = self.of(atom).skip(1).filter(|branch| apart(branch) < NEAR);
-        moved.min_by(|left, right| apart(left).total_cmp(&apart(right)))
-    }
-
     fn start(&mut self, step: &AssetsStep) {
         interruption::checkpoint();
         self.assets = step.assets();
@@ -144,40 +94,22 @@ impl Branches {
         self.last = Inside::default();
     }
 
-    /// Adds a move that stays as it is.
-    fn push(
-        &mut self,
-        utility: RelativeUtility,
-        price: f64,
-        allocation: &[f64],
-        excess: impl Iterator<Item = f64>,
-        cost: f64,
-        level: f64,
-    ) {
+    /// Adds the atom left where it is.
+    fn leave(&mut self, utility: RelativeUtility, allocation: &[f64], growths: &[f64]) {
         let start = self.excesses.len();
-        self.excesses.extend(excess);
+        self.excesses.extend(growths.iter().map(|growth| growth - 1.0));
         let row = &self.excesses[start..];
         let wealth = 1.0 + row.iter().zip(allocation).map(|(excess, share)| excess * share).sum::<f64>();
         self.still.extend(row);
         self.still.push(0.0);
-        let (value, slope) = utility.at(wealth);
+        let (payoff, slope) = utility.at(wealth);
         let bend = utility.relative_aversion(wealth) / wealth;
-        let payoff = value + price * cost;
-        self.all.push(Branch {
-            cost,
-            payoff,
-            slope,
-            bend,
-            level,
-            log_level: level.ln(),
-            follows: false,
-            continues: None,
-        });
+        self.all.push(Branch { cost: 0.0, payoff, slope, bend, level: f64::INFINITY, follows: false });
     }
 
     fn find_of(&mut self, step: &AssetsStep, atom: usize, allocation: &[f64], price: f64) {
         let growths = step.growth(atom);
-        self.push(step.utility, price, allocation, growths.iter().map(|growth| growth - 1.0), 0.0, f64::INFINITY);
+        self.leave(step.utility, allocation, growths);
         if step.radius <= 0.0 {
             return;
         }
@@ -212,7 +144,7 @@ impl Branches {
             let (value, slope) = known.unwrap_or_else(|| step.utility.at(wealth));
             let aversion = step.utility.relative_aversion(wealth) / wealth;
             // Where the level follows only just, it would follow without bounds: such a move counts as one that stays.
-            let (room, follows) = (1.0 - aversion * moving, follows && aversion * moving < MOST_FOLLOWED);
+            let (room, follows) = (1.0 - aversion * moving, moving > 0.0 && aversion * moving < MOST_FOLLOWED);
             if follows {
                 self.still.push(moving / price);
             } else {
@@ -221,8 +153,7 @@ impl Branches {
                 self.still.push(0.0);
             }
             let bend = if follows { aversion / room } else { aversion };
-            let (payoff, log_level) = (value + price * cost, level.ln());
-            self.all.push(Branch { cost, payoff, slope, bend, level, log_level, follows, continues: None });
+            self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows });
         });
         (self.levelling, self.last) = (levelling, last);
         self.bounded &= bounded;

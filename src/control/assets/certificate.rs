@@ -1,7 +1,8 @@
 //! The bounds that the search tells of every point: they hold whatever its state.
 
 use super::AssetsStep;
-use super::interior::{Interior, dot};
+use super::cuts::dot;
+use super::interior::Interior;
 use super::trading::Tangent;
 use crate::numerics::dispatch::dispatched;
 
@@ -11,23 +12,28 @@ const ENTERING: f64 = 1.0;
 const ENTERING_TOO: f64 = 0.5;
 
 impl Interior<'_> {
-    /// Both bounds of the step, at this point and from the multipliers' law.
-    pub fn tell_bounds(&mut self) {
-        let assets = self.step.assets();
-        let (shares, price) = (&self.point[..assets], self.point[assets]);
-        let lower = self.step.dual(&self.branches, price).0 - self.step.trading.taken(shares);
+    /// The lower bound of this point, of which the dual is given.
+    pub fn tell_lower(&mut self, dual: f64) {
+        let (shares, price) = self.point.split_at(self.step.assets());
+        let lower = dual - self.step.trading.taken(shares);
         if lower > self.lower {
-            (self.lower, self.best, self.best_price) = (lower, shares.to_vec(), price);
+            (self.lower, self.best, self.best_price) = (lower, shares.to_vec(), price[0]);
         }
+    }
+
+    /// The upper bound by the law of the multipliers, and the assets that would raise it.
+    pub fn tell_upper(&mut self) {
+        let assets = self.step.assets();
+        let shares = &self.point[..assets];
         let masses = self.law();
         let (mut mean, mut gradient, mut others) = (0.0, vec![0.0; assets], vec![0.0; self.whole.assets()]);
         dispatched!({
             for atom in 0..self.step.atoms() {
-                for branch in self.branches.of(atom) {
-                    let (found, mass) = (&self.branches.all[branch], masses[branch]);
-                    mean += mass * (found.payoff - price * found.cost);
+                for cut in self.cuts.of(atom) {
+                    let (found, mass) = (&self.cuts.all[cut], masses[cut]);
+                    mean += mass * found.utility;
                     let weight = mass * found.slope;
-                    for (sum, excess) in gradient.iter_mut().zip(self.branches.excess(branch)) {
+                    for (sum, excess) in gradient.iter_mut().zip(self.cuts.excess(cut)) {
                         *sum += weight * excess;
                     }
                     if assets < others.len() {
@@ -75,36 +81,36 @@ impl Interior<'_> {
         let mut moves = vec![0.0; self.whole.assets()];
         for atom in 0..self.step.atoms() {
             let growths = self.whole.growth(atom);
-            for branch in self.branches.of(atom).skip(1) {
-                let level = self.branches.all[branch].level;
+            for cut in self.cuts.of(atom).skip(1) {
+                let level = self.cuts.all[cut].level;
                 let unheld = |(asset, growth): (usize, &f64)| self.whole.unheld(asset, *growth, level);
                 let mut moved: Vec<f64> = growths.iter().enumerate().map(unheld).collect();
-                let held = self.held.iter().zip(self.branches.excess(branch));
+                let held = self.held.iter().zip(self.cuts.excess(cut));
                 held.for_each(|(&asset, excess)| moved[asset] = excess + 1.0);
                 for (sum, (moved, growth)) in moves.iter_mut().zip(moved.iter().zip(growths)) {
-                    *sum += masses[branch] * (moved / growth).ln();
+                    *sum += masses[cut] * (moved / growth).ln();
                 }
             }
         }
         moves
     }
 
-    /// The masses of the branches that the multipliers make, in the ball: a law that is too far is mixed with the centre.
+    /// The masses of the moves that the multipliers make, in the ball: a law that is too far is mixed with the centre.
     fn law(&self) -> Vec<f64> {
-        let mut masses = vec![0.0; self.pairs.len()];
+        let mut masses = vec![0.0; self.cuts.all.len()];
         let mut distance = 0.0;
         for (atom, mass) in self.step.masses.iter().enumerate() {
-            let of = self.branches.of(atom);
-            let whole: f64 = self.pairs[of.clone()].iter().map(|pair| pair.multiplier).sum();
-            for branch in of {
-                masses[branch] = mass * self.pairs[branch].multiplier / whole;
-                distance += masses[branch] * self.branches.all[branch].cost;
+            let of = self.cuts.of(atom);
+            let whole: f64 = self.cuts.all[of.clone()].iter().map(|cut| cut.multiplier).sum();
+            for cut in of {
+                masses[cut] = mass * self.cuts.all[cut].multiplier / whole;
+                distance += masses[cut] * self.cuts.all[cut].cost;
             }
         }
         let kept = if distance > self.step.radius { self.step.radius / distance } else { 1.0 };
         masses.iter_mut().for_each(|mass| *mass *= kept);
         for (atom, mass) in self.step.masses.iter().enumerate() {
-            masses[self.branches.first[atom]] += (1.0 - kept) * mass;
+            masses[self.cuts.of(atom).start] += (1.0 - kept) * mass;
         }
         masses
     }

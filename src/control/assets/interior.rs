@@ -1,43 +1,49 @@
-//! The search for the best allocation and price of distance: an interior point method on
+//! The search for the best allocation and price of distance: what is known of the adversary is solved by an interior point method,
 //!
-//!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for every branch m of atom j,
+//!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for every move m known of atom j (`cuts.rs`),
 //!
-//! and the bounds of the shares, of their sum and of gamma. Branches are found anew at every point: a branch whose level follows
-//! is a smooth concave function of (a, gamma), with
+//! within the bounds of the shares, of their sum and of gamma, and at what is found the adversary is asked anew. Every multiplier
+//! m >= 0, sum_m m_jm = p_j, makes a law in the ball or, after a mixture with the centre, one that is.
 //!
-//!   grad f = (U' (e^z' / (1 + r) - 1), D),
-//!   -hess f = U' [ sum_i p_i v_i v_i' + bend s s' ],  v_i = e_i / a_i - e_gamma / gamma over what moves, s = grad of what does not,
-//!
-//! of which every multiplier m >= 0, sum_m m_jm = p_j, makes a law in the ball or, after a mixture with the centre, one that is.
-//! Multipliers and slacks follow Newton steps on `slack x multiplier = barrier x p_j`; where a branch has come or gone, or lies
-//! lower than the step foresaw, t_j gives way. Where trading costs, u_i >= |a_i - h_i| join the point, and `p sum u_i` is taken off
-//! (`trading.rs`). Source: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7.
+//! A barrier of mu p_j for each move makes it smooth, with t_j where it is best. Steps are Newton's on `slack x multiplier = mu p_j`;
+//! they raise the barrier function, which the step's length is found by. Where the answer of the adversary lies far below what was
+//! known, the search goes back on half of its way, and mu stays as large as a share of what was not known. Where trading costs,
+//! u_i >= |a_i - h_i| join the point, and `p sum u_i` is taken off (`trading.rs`). Sources: Boyd and Vandenberghe (2004), Convex
+//! Optimization, section 11.7; Reemtsen and Rueckmann (1998), Semi-Infinite Programming, chapter 7 (exchange methods).
 
 mod newton;
-mod price;
 
 use self::newton::Direction;
 use super::AssetsStep;
 use super::branches::Branches;
+use super::cuts::{Cut, Cuts, dot};
 use super::trading::Tangent;
 
-/// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
-const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
-/// Points at most.
-const STEP_LIMIT: usize = 100;
-/// Halvings of a step that falls far below what it foresaw, at most.
+/// Questions to the adversary at most, and steps between two.
+const ROUNDS: usize = 60;
+const STEPS: usize = 60;
+/// What the barrier is brought to, of what it was, and of what was not known of the adversary.
+const REDUCTION: f64 = 0.1;
+const OF_UNKNOWN: f64 = 0.1;
+/// Rounding takes what steps at a lower barrier gain.
+const LEAST_BARRIER: f64 = 1e-12;
+/// A gain of a step below this share of the barrier ends a round.
+const LEAST_GAIN: f64 = 0.2;
+/// Barriers that the adversary's answer may lie below what was known, before the search goes back; and how often it does.
+const BELOW_KNOWN: f64 = 30.0;
 const HALVINGS: usize = 10;
-/// How much of the barrier atoms may give way by, together, before a step is halved.
-const GIVING_WAY: f64 = 10.0;
-/// Of its slack before a branch keeps at least this, and one that is new this of the barrier.
-const KEPT_SLACK: f64 = 0.1;
-const NEW_SLACK: f64 = 0.3;
-/// A branch that has all of its atom has the barrier for its slack; none has less than this of it.
-const LEAST_SLACK: f64 = 0.01;
-/// Slack times multiplier beyond this of the barrier tells that a multiplier is that of another branch.
+/// Of the gain that a step foresees, what it must make; steps shorter than this are taken whatever they make.
+const GAIN_MADE: f64 = 1e-4;
+const LEAST_LENGTH: f64 = 1e-8;
+/// Rounding of a mean of utilities.
+const ROUNDING: f64 = 1e-15;
+/// Newton steps for t_j at most, and their end as a share of the barrier.
+const TOP_STEPS: usize = 30;
+const TOP_TOLERANCE: f64 = 1e-10;
+/// Radius that the search has at least.
+const LEAST_RADIUS: f64 = 1e-9;
+/// Multipliers are kept within this factor of the central path.
 const OFF_CENTRE: f64 = 100.0;
-/// Branches of less of their atom's mass are let go with their place.
-const LEAST_MASS: f64 = 1e-6;
 /// Shares of the start by which one near a similar step is drawn inside.
 const DRAWN_INSIDE: f64 = 0.002;
 /// Shares of a start sum to this over the risk aversion at most, above the least they may sum to.
@@ -59,13 +65,6 @@ impl Bound {
     }
 }
 
-/// Slack and multiplier of a branch.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pair {
-    pub slack: f64,
-    pub multiplier: f64,
-}
-
 /// The search.
 pub(super) struct Interior<'a> {
     /// The step with the assets searched among, which are `held` of the `whole`.
@@ -82,10 +81,11 @@ pub(super) struct Interior<'a> {
     /// Barrier of a bound, over that of all atoms.
     pub bound_weight: f64,
     pub barrier: f64,
-    pub branches: Branches,
-    pub pairs: Vec<Pair>,
-    before: Branches,
-    pairs_before: Vec<Pair>,
+    /// The adversary's answer at the point.
+    branches: Branches,
+    /// What is known of the adversary.
+    pub cuts: Cuts,
+    known_before: Cuts,
     /// The allocation of the best lower bound, and its price.
     pub best: Vec<f64>,
     pub best_price: f64,
@@ -97,24 +97,20 @@ pub(super) struct Interior<'a> {
     pub evaluations: usize,
 }
 
-pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
-}
-
 /// t with `sum 1 / (f_m - t) = 1 / barrier`, by Newton's method on its reciprocal, which is concave.
-fn top(branches: &Branches, atom: usize, barrier: f64) -> f64 {
-    let least = branches.all[branches.worst(atom)].payoff;
+fn top(cuts: &[Cut], barrier: f64) -> f64 {
+    let least = cuts.iter().map(|cut| cut.payoff).fold(f64::INFINITY, f64::min);
     let mut top = least - barrier;
-    for _ in 0..20 {
+    for _ in 0..TOP_STEPS {
         let (mut sum, mut squares) = (0.0, 0.0);
-        for branch in branches.of(atom) {
-            let inverse = 1.0 / (branches.all[branch].payoff - top);
+        for cut in cuts {
+            let inverse = 1.0 / (cut.payoff - top);
             sum += inverse;
             squares += inverse * inverse;
         }
         let step = (1.0 / sum - barrier) * sum * sum / squares;
         top += step;
-        if step.abs() < 1e-6 * barrier {
+        if step.abs() < TOP_TOLERANCE * barrier {
             break;
         }
     }
@@ -175,35 +171,46 @@ impl<'a> Interior<'a> {
             bound_weight: 1.0 / assets as f64,
             barrier,
             branches: Branches::default(),
-            pairs: Vec::new(),
-            before: Branches::default(),
-            pairs_before: Vec::new(),
+            cuts: Cuts::default(),
+            known_before: Cuts::default(),
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
             tangent: None,
             evaluations: 0,
         };
-        interior.price_the_start(near.is_some());
         interior.open();
+        interior.ask();
+        interior.learn();
         interior
     }
 
-    fn find(&mut self) {
+    /// Asks the adversary at the point. The dual there, which is a lower bound.
+    fn ask(&mut self) -> f64 {
         let (shares, price) = self.point.split_at(self.step.assets());
         self.branches.find(self.step, shares, price[0]);
         self.evaluations += 1;
+        let dual = self.step.dual(&self.branches, price[0]).0;
+        self.tell_lower(dual);
+        dual
     }
 
-    /// The first point: everything on the central path but the shares.
-    fn open(&mut self) {
-        self.pairs.clear();
-        for atom in 0..self.step.atoms() {
-            self.centre(atom);
+    /// Joins the adversary's answer to what is known.
+    fn learn(&mut self) {
+        std::mem::swap(&mut self.cuts, &mut self.known_before);
+        self.cuts.renew(self.step, &self.branches, &self.point, &self.known_before);
+        self.merit();
+        for (atom, mass) in self.step.masses.iter().enumerate() {
+            let of = self.cuts.of(atom);
+            self.cuts.all[of].iter_mut().for_each(|cut| cut.multiplier = mass * self.barrier / cut.slack);
         }
+    }
+
+    /// What is traded, and the multipliers of the bounds, at the start: on the central path.
+    fn open(&mut self) {
         let barrier = self.barrier * self.bound_weight;
         let (assets, price) = (self.step.assets(), self.step.trading.price);
         for (asset, held) in self.step.trading.holdings.iter().enumerate() {
-            // On the central path the multipliers of its two bounds sum to the price.
+            // The multipliers of its two bounds sum to the price.
             let moved = price * (self.point[asset] - held);
             self.point[assets + 1 + asset] = (barrier + barrier.hypot(moved)) / price;
         }
@@ -212,113 +219,121 @@ impl<'a> Interior<'a> {
         }
     }
 
-    /// Puts an atom, the next to have its pairs, on the central path.
-    fn centre(&mut self, atom: usize) {
-        let (mass, barrier) = (self.step.masses[atom], self.barrier);
-        let top = top(&self.branches, atom, barrier);
-        self.tops[atom] = top;
-        self.pairs.extend(self.branches.all[self.branches.of(atom)].iter().map(|branch| {
-            let slack = branch.payoff - top;
-            Pair { slack, multiplier: mass * barrier / slack }
-        }));
-    }
-
     /// Runs until the bounds are within the tolerance, or other assets would enter.
     pub fn run(&mut self, tolerance: f64) {
-        let mut length = 1.0;
-        for _ in 0..STEP_LIMIT {
-            self.tell_bounds();
-            if self.upper - self.lower < tolerance || !self.entering.is_empty() {
+        for _ in 0..ROUNDS {
+            let goes_on = self.solve_known();
+            let unknown = self.known() - self.ask();
+            self.cuts.follow(self.step, &self.point);
+            self.tell_upper();
+            let found = self.upper - self.lower < tolerance || !self.entering.is_empty();
+            if found || !goes_on || self.barrier < LEAST_BARRIER {
                 return;
             }
-            self.lower_barrier(length);
-            let Some(direction) = self.direction() else { return };
-            length = self.go(&direction);
+            self.go_back(unknown);
+            self.learn();
+            self.barrier = (REDUCTION * self.barrier).max((OF_UNKNOWN * unknown.abs()).min(self.barrier));
         }
     }
 
-    fn lower_barrier(&mut self, length: f64) {
-        let (mut products, mut weight) = (0.0, 0.0);
-        for (atom, mass) in self.step.masses.iter().enumerate() {
-            for pair in &self.pairs[self.branches.of(atom)] {
-                products += pair.slack * pair.multiplier;
-                weight += mass;
-            }
-        }
-        for bound in &self.bounds {
-            products += bound.multiplier * bound.slack(&self.point);
-            weight += self.bound_weight;
-        }
-        let reduction = REDUCTIONS.iter().find(|(least, _)| length > *least).map_or(1.0, |(_, reduction)| *reduction);
-        self.barrier = reduction * products / weight;
-    }
-
-    /// Takes the step, or as many halves of it as keep the atoms from giving way by far more than the barrier. Answers the shorter
-    /// length of the point's and the multipliers'.
-    fn go(&mut self, direction: &Direction) -> f64 {
-        std::mem::swap(&mut self.branches, &mut self.before);
-        std::mem::swap(&mut self.pairs, &mut self.pairs_before);
-        let (point, tops) = (self.point.clone(), self.tops.clone());
-        let along = |from: &[f64], by: &[f64], length: f64| -> Vec<f64> {
-            from.iter().zip(by).map(|(from, by)| from + length * by).collect()
-        };
-        let mut length = direction.length;
-        for halving in 0..=HALVINGS {
-            self.point = along(&point, &direction.point, length);
-            self.tops = along(&tops, &direction.tops, length);
-            let assets = self.step.assets();
-            let (before, known) = (&self.before, &self.pairs_before);
-            let counts = |atom: usize, branch: usize| known[branch].multiplier > LEAST_MASS * self.step.masses[atom];
-            self.branches.find_after(self.step, &self.point[..assets], self.point[assets], before, counts);
-            self.evaluations += 1;
-            let given: f64 = (0..self.tops.len()).map(|atom| self.step.masses[atom] * self.give_way(atom)).sum();
-            if given <= GIVING_WAY * self.barrier || halving == HALVINGS {
+    /// Brings the point to the best by what is known, but for the barrier. False where no step can be told.
+    fn solve_known(&mut self) -> bool {
+        let mut merit = self.merit();
+        self.tame();
+        for _ in 0..STEPS {
+            let Some(direction) = self.direction() else { return false };
+            merit = self.go(&direction, merit);
+            if direction.gain.is_nan() || direction.gain < LEAST_GAIN * self.barrier {
                 break;
             }
+        }
+        merit.is_finite()
+    }
+
+    /// In a ball of no radius the price would rise without end.
+    fn radius(&self) -> f64 {
+        self.step.radius.max(LEAST_RADIUS)
+    }
+
+    /// Of the point, by what is known of the adversary.
+    fn known(&self) -> f64 {
+        let atoms = self.step.masses.iter().enumerate();
+        let mean: f64 = atoms.map(|(atom, mass)| mass * self.cuts.least(atom)).sum();
+        mean - self.point[self.step.assets()] * self.step.radius
+    }
+
+    /// Halves the way from where the adversary was asked before, as long as its answer lies `unknown` below what was known.
+    fn go_back(&mut self, mut unknown: f64) {
+        for _ in 0..HALVINGS {
+            if unknown <= BELOW_KNOWN * self.barrier {
+                return;
+            }
+            let from = self.cuts.origin();
+            self.point.iter_mut().zip(from).for_each(|(at, from)| *at = 0.5 * (*at + from));
+            self.cuts.evaluate(self.step, &self.point);
+            unknown = self.known() - self.ask();
+        }
+    }
+
+    /// Takes the step, or as many halves of it as raise the barrier function by a part of what was foreseen; its value then.
+    fn go(&mut self, direction: &Direction, before: f64) -> f64 {
+        let from = self.point.clone();
+        let mut length = direction.length;
+        let merit = loop {
+            let along = from.iter().zip(&direction.point);
+            self.point.iter_mut().zip(along).for_each(|(at, (from, step))| *at = from + length * step);
+            self.cuts.evaluate(self.step, &self.point);
+            let merit = self.merit();
+            if merit >= before + GAIN_MADE * length * direction.gain - ROUNDING * (1.0 + before.abs())
+                || length < LEAST_LENGTH
+            {
+                break merit;
+            }
             length *= 0.5;
-        }
-        self.pairs.clear();
-        for atom in 0..self.tops.len() {
-            self.pair_up(atom, direction);
-        }
-        for (bound, step) in self.bounds.iter_mut().zip(&direction.bounds) {
-            bound.multiplier += direction.dual_length * step;
-        }
-        length.min(direction.dual_length)
+        };
+        let steps = self.cuts.all.iter_mut().zip(&direction.multipliers);
+        steps.for_each(|(cut, step)| cut.multiplier += direction.dual_length * step);
+        let steps = self.bounds.iter_mut().zip(&direction.bounds);
+        steps.for_each(|(bound, step)| bound.multiplier += direction.dual_length * step);
+        self.tame();
+        merit
     }
 
-    /// Lowers t_j until every branch has a share of the slack it had, and answers by how much.
-    fn give_way(&mut self, atom: usize) -> f64 {
-        let mut way: f64 = 0.0;
-        for branch in self.branches.of(atom) {
-            let least = match self.branches.all[branch].continues {
-                Some(before) => (KEPT_SLACK * self.pairs_before[before].slack).max(LEAST_SLACK * self.barrier),
-                None => NEW_SLACK * self.barrier,
-            };
-            way = way.max(least - (self.branches.all[branch].payoff - self.tops[atom]));
+    /// The barrier function at the point, with t of every atom, and so the slacks, where it is best.
+    fn merit(&mut self) -> f64 {
+        let (assets, barrier) = (self.step.assets(), self.barrier);
+        let traded: f64 = self.point[assets + 1..].iter().sum();
+        let mut merit = -self.point[assets] * self.radius() - self.step.trading.price * traded;
+        for bound in &self.bounds {
+            merit += barrier * self.bound_weight * bound.slack(&self.point).ln();
         }
-        self.tops[atom] -= way;
-        way
+        for (atom, mass) in self.step.masses.iter().enumerate() {
+            let of = self.cuts.of(atom);
+            let cuts = &mut self.cuts.all[of];
+            let top = top(cuts, barrier);
+            let mut logarithms = 0.0;
+            for cut in cuts {
+                cut.slack = cut.payoff - top;
+                logarithms += (cut.slack / barrier).ln();
+            }
+            self.tops[atom] = top;
+            merit += mass * (top + barrier * logarithms);
+        }
+        merit
     }
 
-    /// The pairs of an atom after a step: multipliers go on with their branches, new ones start on the central path.
-    fn pair_up(&mut self, atom: usize, direction: &Direction) {
-        let (from, central) = (self.pairs.len(), self.barrier * self.step.masses[atom]);
-        let mut off_centre = false;
-        for branch in self.branches.of(atom) {
-            let slack = self.branches.all[branch].payoff - self.tops[atom];
-            let multiplier = match self.branches.all[branch].continues {
-                Some(before) => {
-                    off_centre |= self.pairs_before[before].multiplier * slack > OFF_CENTRE * central;
-                    self.pairs_before[before].multiplier + direction.dual_length * direction.multipliers[before]
-                }
-                None => central / slack,
-            };
-            self.pairs.push(Pair { slack, multiplier });
+    /// Brings multipliers that are far off the central path nearer to it.
+    fn tame(&mut self) {
+        let near = |multiplier: f64, central: f64| multiplier.max(central / OFF_CENTRE).min(central * OFF_CENTRE);
+        for (atom, mass) in self.step.masses.iter().enumerate() {
+            let of = self.cuts.of(atom);
+            for cut in &mut self.cuts.all[of] {
+                cut.multiplier = near(cut.multiplier, self.barrier * mass / cut.slack);
+            }
         }
-        if off_centre {
-            self.pairs.truncate(from);
-            self.centre(atom);
+        for bound in &mut self.bounds {
+            let central = self.barrier * self.bound_weight / bound.slack(&self.point);
+            bound.multiplier = near(bound.multiplier, central);
         }
     }
 }

@@ -1,0 +1,244 @@
+//! What the search knows of the adversary: of each atom, moves that it found. A move bounds what the atom pays from above, at every
+//! allocation a and price of distance gamma, by a concave function:
+//!
+//!   one that stays     U(w(a)) + gamma D;
+//!   one that follows   min over what moves of `U(w) + U' (w(a) - w) + gamma D`, less `U' bend (s . dx)^2 / 2`,
+//!
+//! the tangent and its bend at the origin, the point where the move was found, s the derivative of what does not move by itself. The
+//! second is that of the branch to second order, and bounds near the origin alone: where it is kept longer, it stays.
+
+use super::AssetsStep;
+use super::branches::Branches;
+use crate::control::request::assets::MOST_ASSETS;
+use crate::numerics::dispatch::dispatched;
+
+/// A move found before is kept while it has this share of its atom's mass.
+const LEAST_MASS: f64 = 0.01;
+/// Moves whose costs and growths differ by no more than this share are the same.
+const SAME: f64 = 0.02;
+
+/// One move of an atom, and the pair of slack and multiplier of `t_j <= payoff`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cut {
+    /// Distance that it moves the atom by.
+    pub cost: f64,
+    /// The level to which positions are lowered; infinite where the atom is left.
+    pub level: f64,
+    /// U and U' at the point.
+    pub utility: f64,
+    pub slope: f64,
+    /// What it lets the atom pay at the point, at most.
+    pub payoff: f64,
+    /// The curvature of the payoff along `still`.
+    pub curvature: f64,
+    pub follows: Option<Following>,
+    pub slack: f64,
+    pub multiplier: f64,
+}
+
+/// The tangent of utility at the origin, `at_bank + slope (w - 1)`, of a move that follows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Following {
+    at_bank: f64,
+    pub slope: f64,
+}
+
+/// All moves known of all atoms; those of an atom lie together, the first leaves it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Cuts {
+    assets: usize,
+    /// Where those of an atom start, and the end.
+    first: Vec<usize>,
+    pub all: Vec<Cut>,
+    /// Growth over the bank, less 1, asset by asset.
+    excesses: Vec<f64>,
+    /// The derivative of what does not move by itself, by the allocation and by gamma.
+    stills: Vec<f64>,
+    /// The derivative of the payoff.
+    gradients: Vec<f64>,
+    /// The growth over the bank of what moves by itself at the point; 0 of what does not.
+    moving: Vec<f64>,
+    /// The point at which the moves that follow were found.
+    origin: Vec<f64>,
+}
+
+/// Of the entries that both have.
+pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
+}
+
+impl Cuts {
+    pub fn of(&self, atom: usize) -> std::ops::Range<usize> {
+        self.first[atom]..self.first[atom + 1]
+    }
+
+    pub fn excess(&self, cut: usize) -> &[f64] {
+        &self.excesses[cut * self.assets..][..self.assets]
+    }
+
+    pub fn still(&self, cut: usize) -> &[f64] {
+        &self.stills[cut * (self.assets + 1)..][..self.assets + 1]
+    }
+
+    pub fn gradient(&self, cut: usize) -> &[f64] {
+        &self.gradients[cut * (self.assets + 1)..][..self.assets + 1]
+    }
+
+    pub fn moving(&self, cut: usize) -> &[f64] {
+        &self.moving[cut * self.assets..][..self.assets]
+    }
+
+    /// Where the moves that follow were found.
+    pub fn origin(&self) -> &[f64] {
+        &self.origin
+    }
+
+    /// What the moves let an atom pay at most.
+    pub fn least(&self, atom: usize) -> f64 {
+        self.all[self.of(atom)].iter().map(|cut| cut.payoff).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Takes the branches found at a point, and of the moves known before those that count and that are none of them.
+    pub fn renew(&mut self, step: &AssetsStep, branches: &Branches, point: &[f64], before: &Cuts) {
+        self.assets = step.assets();
+        self.origin.clear();
+        self.origin.extend_from_slice(point);
+        self.first.clear();
+        self.first.push(0);
+        self.all.clear();
+        self.excesses.clear();
+        self.stills.clear();
+        for (atom, mass) in step.masses.iter().enumerate() {
+            for branch in branches.of(atom) {
+                let (found, excess) = (&branches.all[branch], branches.excess(branch));
+                let at_bank = found.payoff - point[self.assets] * found.cost - found.slope * dot(excess, point);
+                let follows = found.follows.then_some(Following { at_bank, slope: found.slope });
+                self.push(found.cost, found.level, found.slope * found.bend, follows);
+                self.excesses.extend_from_slice(excess);
+                self.stills.extend_from_slice(branches.still(branch));
+            }
+            let new = self.first[atom]..self.all.len();
+            // Before the first there were none.
+            let known = if before.first.is_empty() { 0..0 } else { before.of(atom) };
+            for old in known.filter(|old| before.all[*old].multiplier > LEAST_MASS * mass) {
+                let (cut, excess) = (&before.all[old], before.excess(old));
+                if new.clone().all(|new| !self.is_same(new, cut.cost, excess)) {
+                    self.push(cut.cost, cut.level, 0.0, None);
+                    self.excesses.extend_from_slice(excess);
+                    self.stills.extend_from_slice(excess);
+                    self.stills.push(0.0);
+                }
+            }
+            self.first.push(self.all.len());
+        }
+        self.gradients.resize(self.stills.len(), 0.0);
+        self.moving.resize(self.excesses.len(), 0.0);
+        self.evaluate(step, point);
+    }
+
+    fn push(&mut self, cost: f64, level: f64, curvature: f64, follows: Option<Following>) {
+        let (utility, slope, payoff, slack, multiplier) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        self.all.push(Cut { cost, level, utility, slope, payoff, curvature, follows, slack, multiplier });
+    }
+
+    fn is_same(&self, cut: usize, cost: f64, excess: &[f64]) -> bool {
+        let known = self.all[cut].cost;
+        let mut growths = self.excess(cut).iter().zip(excess);
+        (known - cost).abs() <= SAME * known.max(cost)
+            && growths.all(|(left, right)| (left - right).abs() <= SAME * (1.0 + left.max(*right)))
+    }
+
+    /// Puts payoffs and their derivatives at a point. Cost O(n d) for n moves of d assets.
+    pub fn evaluate(&mut self, step: &AssetsStep, point: &[f64]) {
+        dispatched!({
+            for atom in 0..step.atoms() {
+                for cut in self.of(atom) {
+                    match self.all[cut].follows {
+                        Some(following) => self.evaluate_following(step, atom, cut, point, following),
+                        None => self.evaluate_still(step, cut, point),
+                    }
+                }
+            }
+        });
+    }
+
+    #[inline(always)]
+    fn evaluate_still(&mut self, step: &AssetsStep, cut: usize, point: &[f64]) {
+        let (assets, found) = (self.assets, &mut self.all[cut]);
+        let excess = &self.excesses[cut * assets..][..assets];
+        let wealth = 1.0 + dot(excess, point);
+        (found.utility, found.slope) = step.utility.at(wealth);
+        found.payoff = found.utility + point[assets] * found.cost;
+        found.curvature = found.slope * step.utility.relative_aversion(wealth) / wealth;
+        let gradient = &mut self.gradients[cut * (assets + 1)..][..=assets];
+        gradient.iter_mut().zip(excess).for_each(|(entry, excess)| *entry = found.slope * excess);
+        gradient[assets] = found.cost;
+    }
+
+    #[inline(always)]
+    fn evaluate_following(&mut self, step: &AssetsStep, atom: usize, cut: usize, point: &[f64], following: Following) {
+        let along = self.along(cut, point);
+        let level = self.level(step, atom, cut, point, following.slope);
+        let (assets, found) = (self.assets, &mut self.all[cut]);
+        let (shares, price, growths) = (&point[..assets], point[assets], step.growth(atom));
+        let still = &self.stills[cut * (assets + 1)..][..=assets];
+        let gradient = &mut self.gradients[cut * (assets + 1)..][..=assets];
+        let moving = &mut self.moving[cut * assets..][..assets];
+        let (bent, mut wealth) = (found.curvature * along, 1.0);
+        let mut moved = [0.0; MOST_ASSETS];
+        for index in 0..assets {
+            let (share, growth) = (shares[index], growths[index]);
+            let (position, floor) = (share * growth, share * step.least_growths[index].min(growth));
+            let lowered = step.ground.lowered(index, position, floor, level);
+            let moves = lowered < position && lowered > floor;
+            moved[index] = if lowered < position { lowered / share } else { growth };
+            wealth += lowered - share;
+            gradient[index] = following.slope * (moved[index] - 1.0) - bent * still[index];
+            moving[index] = if moves { moved[index] } else { 0.0 };
+        }
+        let cost = step.ground.cost(assets, level, |index| growths[index] / moved[index]);
+        gradient[assets] = cost - bent * still[assets];
+        found.payoff = following.at_bank + following.slope * (wealth - 1.0) + price * cost - 0.5 * bent * along;
+    }
+
+    /// `s . dx` of a move that follows.
+    #[inline(always)]
+    fn along(&self, cut: usize, point: &[f64]) -> f64 {
+        let since = point.iter().zip(&self.origin).map(|(at, from)| at - from);
+        self.still(cut).iter().zip(since).map(|(still, since)| still * since).sum()
+    }
+
+    /// The level at which a move that follows is best where U' is `slope`.
+    #[inline(always)]
+    fn level(&self, step: &AssetsStep, atom: usize, cut: usize, point: &[f64], slope: f64) -> f64 {
+        let price = point[self.assets];
+        if !step.ground.is_sup() {
+            return price / slope;
+        }
+        // Where all move together, the level is a share of what moved at the origin.
+        let positions = point.iter().zip(step.growth(atom)).zip(self.still(cut));
+        let moved = positions.filter(|(_, still)| **still == -1.0).map(|((share, growth), _)| share * growth);
+        price / (slope * moved.sum::<f64>())
+    }
+
+    /// Puts the moves that follow where they are best at a point, for the law: U' has changed too since the origin.
+    pub fn follow(&mut self, step: &AssetsStep, point: &[f64]) {
+        let assets = self.assets;
+        for atom in 0..step.atoms() {
+            for cut in self.of(atom) {
+                let Some(following) = self.all[cut].follows else { continue };
+                let slope = following.slope - self.all[cut].curvature * self.along(cut, point);
+                let level = self.level(step, atom, cut, point, if slope > 0.0 { slope } else { following.slope });
+                let (found, growths) = (&mut self.all[cut], step.growth(atom));
+                let excess = &mut self.excesses[cut * assets..][..assets];
+                for (index, (excess, growth)) in excess.iter_mut().zip(growths).enumerate() {
+                    let (share, floor) = (point[index], step.least_growths[index].min(*growth));
+                    *excess = step.ground.lowered(index, share * growth, share * floor, level) / share - 1.0;
+                }
+                found.level = level;
+                found.cost = step.ground.cost(assets, level, |index| growths[index] / (1.0 + excess[index]));
+                (found.utility, found.slope) = step.utility.at(1.0 + dot(excess, point));
+            }
+        }
+    }
+}
