@@ -135,7 +135,10 @@ pub fn inverse_volatility(rows: &[Vec<f64>]) -> Vec<f64> {
     let (count, width) = (rows.len().max(1) as f64, rows.first().map_or(0, Vec::len));
     let deviation = |column: usize| {
         let mean = rows.iter().map(|row| row[column]).sum::<f64>() / count;
-        (rows.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / count).sqrt()
+        let deviation = (rows.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / count).sqrt();
+        // What a sum of the same number again and again is rounded by is no deviation.
+        let largest = rows.iter().map(|row| row[column].abs()).fold(0.0, f64::max);
+        if deviation > count * f64::EPSILON * largest { deviation } else { 0.0 }
     };
     let deviations: Vec<f64> = (0..width).map(deviation).collect();
     let least = deviations.iter().copied().filter(|deviation| *deviation > 0.0).fold(f64::INFINITY, f64::min);
@@ -164,6 +167,21 @@ mod tests {
             }
         }
         sum
+    }
+
+    #[test]
+    fn a_column_that_does_not_vary_weighs_as_the_one_that_varies_least() {
+        // The mean of 0.004 of so many rows is another number than 0.004 for some counts.
+        for count in 2..300 {
+            let rows: Vec<Vec<f64>> =
+                (0..count).map(|row| vec![0.004, 0.02 * f64::from(row % 2), 0.01 * f64::from(row % 2)]).collect();
+            let weights = inverse_volatility(&rows);
+            let expected = [0.4, 0.2, 0.4];
+            assert!(
+                weights.iter().zip(expected).all(|(weight, expected)| (weight - expected).abs() < 1e-12),
+                "{weights:?}"
+            );
+        }
     }
 
     #[test]
