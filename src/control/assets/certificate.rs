@@ -107,7 +107,8 @@ impl Interior<'_> {
                 distance += masses[cut] * self.cuts.all[cut].cost;
             }
         }
-        let kept = if distance > self.step.radius { self.step.radius / distance } else { 1.0 };
+        // A distance that is no number is that of no law, and tells no bound.
+        let kept = if distance <= self.step.radius { 1.0 } else { self.step.radius / distance };
         masses.iter_mut().for_each(|mass| *mass *= kept);
         for (atom, mass) in self.step.masses.iter().enumerate() {
             masses[self.cuts.of(atom).start] += (1.0 - kept) * mass;
