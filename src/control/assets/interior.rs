@@ -18,6 +18,7 @@ use super::AssetsStep;
 use super::branches::Branches;
 use super::cuts::{Cut, Cuts, dot};
 use super::trading::Tangent;
+use crate::numerics::interruption;
 
 /// Questions to the adversary at most, and steps between two.
 const ROUNDS: usize = 60;
@@ -241,9 +242,13 @@ impl<'a> Interior<'a> {
         let mut merit = self.merit();
         self.tame();
         for _ in 0..STEPS {
+            interruption::checkpoint();
             let Some(direction) = self.direction() else { return false };
-            merit = self.go(&direction, merit);
-            if direction.gain.is_nan() || direction.gain < LEAST_GAIN * self.barrier {
+            let next = self.go(&direction, merit);
+            // A step that rounding takes the gain of is the last too.
+            let gains = next > merit + ROUNDING * (1.0 + merit.abs());
+            merit = next;
+            if !gains || direction.gain < LEAST_GAIN * self.barrier {
                 break;
             }
         }
