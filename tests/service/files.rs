@@ -1,7 +1,7 @@
 //! The files of a folder that is served: what becomes of the service once they are others.
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until};
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 /// The exit code of a process whose store failed.
 const STORE_FAILED: i32 = 74;
 
-struct Served(Child, App);
+struct Served(Process, App);
 
 impl Served {
     fn new() -> Served {
@@ -22,7 +22,7 @@ impl Served {
         let (child, url) = process::serve(|command| {
             command.arg("--data").arg(data);
         });
-        Served(child, App::at(url, folder))
+        Served(Process(child), App::at(url, folder))
     }
 
     fn file(&self, name: &str) -> PathBuf {
@@ -30,16 +30,8 @@ impl Served {
     }
 
     async fn ended(&mut self) -> Option<i32> {
-        let child = &mut self.0;
+        let child = &mut self.0.0;
         until("the end of the process", async || child.try_wait().unwrap()).await.code()
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
     }
 }
 
@@ -128,7 +120,7 @@ async fn two_services_never_have_one_folder() {
     let data = served.1.folder().join("data");
     let lock = served.file("ballast.lock");
     // Stopped, the first does not see that its lock is gone.
-    let pid = rustix::process::Pid::from_child(&served.0);
+    let pid = rustix::process::Pid::from_child(&served.0.0);
     rustix::process::kill_process(pid, rustix::process::Signal::STOP).unwrap();
     // A signal is answered a little later, and a first that looked until then would give the folder up.
     let stopped = rustix::process::waitpid(Some(pid), rustix::process::WaitOptions::UNTRACED).unwrap();
@@ -170,7 +162,7 @@ async fn a_folder_that_had_keys_is_not_served_without() {
     let (child, url) = process::serve(|command| {
         command.args(["--require-keys", "--data"]).arg(&data);
     });
-    let served = Served(child, App::at(url, folder));
+    let served = Served(Process(child), App::at(url, folder));
     assert_eq!(served.1.get("/jobs").await.0, 401);
 }
 
@@ -183,7 +175,7 @@ async fn a_service_that_is_open_says_so_in_its_log() {
     let (child, url) = process::serve(|command| {
         command.arg("--data").arg(data).stderr(file);
     });
-    let _served = Served(child, App::at(url, folder));
+    let _served = Served(Process(child), App::at(url, folder));
     let said = std::fs::read_to_string(log).unwrap();
     assert!(said.contains("WARN") && said.contains("holds no key: every caller is answered"), "{said}");
 }

@@ -187,12 +187,9 @@ impl Cuts {
         let (bent, mut wealth) = (found.curvature * along, 1.0);
         let mut moved = [0.0; MOST_ASSETS];
         for index in 0..assets {
-            let (share, growth) = (shares[index], growths[index]);
-            let (position, floor) = (share * growth, share * step.least_growths[index].min(growth));
-            let lowered = step.ground.lowered(index, position, floor, level);
-            let moves = lowered < position && lowered > floor;
-            moved[index] = if lowered < position { lowered / share } else { growth };
-            wealth += lowered - share;
+            let moves;
+            (moved[index], moves) = lowered(step, index, shares[index], growths[index], level);
+            wealth += shares[index] * (moved[index] - 1.0);
             gradient[index] = following.slope * (moved[index] - 1.0) - bent * still[index];
             moving[index] = if moves { moved[index] } else { 0.0 };
         }
@@ -232,13 +229,98 @@ impl Cuts {
                 let (found, growths) = (&mut self.all[cut], step.growth(atom));
                 let excess = &mut self.excesses[cut * assets..][..assets];
                 for (index, (excess, growth)) in excess.iter_mut().zip(growths).enumerate() {
-                    let (share, floor) = (point[index], step.least_growths[index].min(*growth));
-                    *excess = step.ground.lowered(index, share * growth, share * floor, level) / share - 1.0;
+                    *excess = lowered(step, index, point[index], *growth, level).0 - 1.0;
                 }
                 found.level = level;
                 found.cost = step.ground.cost(assets, level, |index| growths[index] / (1.0 + excess[index]));
                 (found.utility, found.slope) = step.utility.at(1.0 + dot(excess, point));
             }
         }
+    }
+}
+
+/// The growth of an asset of which a share is held once positions are lowered to a level, and whether it moves by itself there.
+#[inline(always)]
+fn lowered(step: &AssetsStep, index: usize, share: f64, growth: f64, level: f64) -> (f64, bool) {
+    let (position, floor) = (share * growth, share * step.least_growths[index].min(growth));
+    let lowered = step.ground.lowered(index, position, floor, level);
+    (if lowered < position { lowered / share } else { growth }, lowered < position && lowered > floor)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::*;
+    use crate::control::assets::AssetsLaw;
+    use crate::control::problem::actions::ActionInterval;
+    use crate::control::problem::utility::RelativeUtility;
+    use crate::numerics::levelling::{Ground, inverse_volatility};
+    use crate::numerics::streams::stream;
+
+    /// By the branches that are found anew where it is compared, and by differences of its own payoffs.
+    #[test]
+    fn a_move_is_its_branch_to_second_order_and_bounds_it() {
+        const ASSETS: usize = 4;
+        let mut random = stream(8, "cuts", 0, 0);
+        let (mut followed, mut stayed) = (0, 0);
+        for case in 0..60 {
+            let returns: Vec<Vec<f64>> =
+                (0..20).map(|_| (0..ASSETS).map(|_| 0.3 * random.random::<f64>() - 0.14).collect()).collect();
+            let ground = if case % 2 == 0 { Ground::Sup } else { Ground::Weighted(inverse_volatility(&returns)) };
+            let utility =
+                [RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }]
+                    [case % 3];
+            let floor = [f64::NEG_INFINITY, -0.3, -0.13][case % 4 % 3];
+            let law = AssetsLaw { returns: &returns, radius: 0.01, floors: vec![floor; ASSETS] };
+            let step = AssetsStep::new(law, ground, utility, 0.002, ActionInterval { lowest: 0.0, highest: 1.0 });
+            let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+            let mut point: Vec<f64> = (0..ASSETS).map(|_| draw(0.02, 0.24)).collect();
+            point.push(draw(0.1, 2.0));
+            let way: Vec<f64> = point.iter().map(|entry| entry * draw(-1.0, 1.0)).collect();
+            let at = |length: f64| -> Vec<f64> { point.iter().zip(&way).map(|(at, way)| at + length * way).collect() };
+            let found_at = |length: f64| {
+                let (mut branches, mut cuts, at) = (Branches::default(), Cuts::default(), at(length));
+                branches.find(&step, &at[..ASSETS], at[ASSETS]);
+                cuts.renew(&step, &branches, &at, &Cuts::default());
+                cuts
+            };
+            let here = found_at(0.0);
+            let payoffs = |length: f64| -> Vec<f64> {
+                let mut cuts = here.clone();
+                cuts.evaluate(&step, &at(length));
+                cuts.all.iter().map(|cut| cut.payoff).collect()
+            };
+            let (up, down) = (payoffs(1e-5), payoffs(-1e-5));
+            // The error of a move that follows, if it is found again with the same that moves.
+            let error = |atom: usize, cut: usize, length: f64| -> Option<f64> {
+                let there = found_at(length);
+                let pattern = |cuts: &Cuts, cut: usize| {
+                    cuts.still(cut)[..ASSETS].iter().map(|still| *still == -1.0).collect::<Vec<bool>>()
+                };
+                let same = there.of(atom).find(|other| pattern(&there, *other) == pattern(&here, cut))?;
+                Some((payoffs(length)[cut] - there.all[same].payoff).abs())
+            };
+            for atom in 0..step.atoms() {
+                for cut in here.of(atom) {
+                    let along = dot(here.gradient(cut), &way);
+                    // Central differences: their error is 1e-10 of the third derivative.
+                    assert!(((up[cut] - down[cut]) / 2e-5 - along).abs() < 1e-5 * (1.0 + along.abs()), "{case} {atom}");
+                    if here.all[cut].follows.is_none() {
+                        stayed += 1;
+                        continue;
+                    }
+                    let (Some(far), Some(near)) = (error(atom, cut, 2e-2), error(atom, cut, 1e-2)) else { continue };
+                    // An error of third order falls to an eighth on half the way, one of second order to a quarter.
+                    assert!(near < far / 6.0 + 1e-12 || far < 1e-9, "{case} {atom}: {far:e} {near:e}");
+                    followed += 1;
+                }
+                // What is known of an atom bounds what it pays elsewhere but for what follows.
+                let elsewhere = found_at(0.5).least(atom);
+                let kept = here.of(atom).filter(|cut| here.all[*cut].follows.is_none()).map(|cut| payoffs(0.5)[cut]);
+                assert!(kept.fold(f64::INFINITY, f64::min) > elsewhere - 1e-12, "{case} {atom}");
+            }
+        }
+        assert!(followed > 200 && stayed > 1000, "{followed} {stayed}");
     }
 }

@@ -76,8 +76,6 @@ pub(super) struct Interior<'a> {
     pub entering: Vec<usize>,
     /// The shares, then the price gamma, then where trading costs what is traded of each asset.
     pub point: Vec<f64>,
-    /// t_j.
-    pub tops: Vec<f64>,
     pub bounds: Vec<Bound>,
     /// Barrier of a bound, over that of all atoms.
     pub bound_weight: f64,
@@ -167,7 +165,6 @@ impl<'a> Interior<'a> {
             best: point[..assets].to_vec(),
             best_price: point[assets],
             point,
-            tops: vec![0.0; step.atoms()],
             bounds,
             bound_weight: 1.0 / assets as f64,
             barrier,
@@ -321,7 +318,6 @@ impl<'a> Interior<'a> {
                 cut.slack = cut.payoff - top;
                 logarithms += (cut.slack / barrier).ln();
             }
-            self.tops[atom] = top;
             merit += mass * (top + barrier * logarithms);
         }
         merit

@@ -69,9 +69,9 @@ impl Interior<'_> {
     pub(super) fn direction(&self) -> Option<Direction> {
         let size = self.step.assets() + 1;
         let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
-        let mut stiffnesses = vec![0.0; self.tops.len()];
+        let mut stiffnesses = vec![0.0; self.step.atoms()];
         // Sums of `multiplier / slack` times gradients, atom by atom.
-        let mut gradients = vec![0.0; self.tops.len() * size];
+        let mut gradients = vec![0.0; self.step.atoms() * size];
         dispatched!({
             for (atom, (stiffness, gradient)) in
                 stiffnesses.iter_mut().zip(gradients.chunks_exact_mut(size)).enumerate()
