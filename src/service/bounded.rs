@@ -1,13 +1,16 @@
-//! Work that requests cause, bounded and taken in turn over tenants.
+//! Work that requests cause, bounded and shared fairly between tenants.
 //!
-//! A piece of work begins in one of the first places, of which a tenant has half at most, and has it for 100 ms. What takes
-//! longer goes on in one of the places for long work, of which there are fewer than processors, and gives it up to the next
-//! one each 250 ms. So whoever asks something short waits for moments of others, however long their questions are, and long
-//! questions share what is left.
-//! Whoever finds no place waits in the queue of the tenant, and a place that becomes free goes to the tenants in turn.
+//! A piece of work passes up to three stages. It begins in a place of the first stage, of which a tenant has half at most, and
+//! keeps it for 100 ms. Until it has worked for a second it shares the places of the second stage, where the piece that has
+//! worked least comes first. Longer pieces share the places of the third stage in turns of 250 ms. So a short question waits
+//! for moments, however long the questions of others are, and long questions share what is left.
+//! Each stage has a queue for every tenant, and the tenants take turns.
+//!
+//! A queue of the second or third stage is bounded. When it is full, the tenant with the most pieces in it loses one; if every
+//! tenant has one, the piece that has worked longest is refused.
 //!
 //! A piece whose caller is gone, by a time limit, a closed connection or the end of the service, ends at its next checkpoint (see
-//! [`interruption`]). Whoever has waited too long for a first place is told to come back.
+//! [`interruption`]). A piece that has waited too long for a place of the first stage is refused.
 //! Checked by: the tests below and `tests/operation/interruption.rs`.
 
 use std::collections::{HashMap, VecDeque};
@@ -24,14 +27,20 @@ use super::spans;
 use crate::numerics::interruption::{self, Stopped, Watcher};
 use crate::store::Tenant;
 
-/// How long a piece has its first place: most questions end within it.
-const MOMENT: Duration = Duration::from_millis(100);
-/// How long a piece has a place for long work while others wait for one.
-const SHIFT: Duration = Duration::from_millis(250);
-/// Long pieces that may wait for such a place, each on a thread of its own.
-pub(super) const LONG_WAITING: usize = 16;
-/// Those of one tenant.
-const LONG_WAITING_OF_ONE: usize = 8;
+/// How long a piece is in the first stage, which most pieces end in.
+const FIRST: Duration = Duration::from_millis(100);
+/// How long a piece has worked when it enters the third stage.
+const SECOND: Duration = Duration::from_secs(1);
+/// How long a piece keeps a place of the second stage while others wait.
+const SECOND_TURN: Duration = Duration::from_millis(100);
+/// How long a piece keeps a place of the third stage while others wait.
+const LONG_TURN: Duration = Duration::from_millis(250);
+/// Pieces that may wait in the second stage, each on a thread of its own.
+const SECOND_WAITING: usize = 16;
+/// Pieces that may wait in the third stage. Few, because those that share a place must all end before their time limits.
+const LONG_WAITING: usize = 4;
+/// Threads that waiting pieces of one [`Bounded`] may hold.
+pub(super) const WAITING_THREADS: usize = SECOND_WAITING + LONG_WAITING;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
@@ -40,43 +49,79 @@ pub struct Bounded {
     pub name: &'static str,
     /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
     pub of_one: usize,
-    lines: Arc<[Mutex<Line>; 2]>,
+    lines: Arc<[Mutex<Line>; 3]>,
     wait: Duration,
 }
 
 /// How many pieces of work may be under way.
 #[derive(Debug, Clone, Copy)]
 pub struct Size {
-    /// In their first moment.
+    /// In the first stage.
     pub first: usize,
-    /// After it.
+    /// In the second stage, and in the third.
     pub long: usize,
 }
 
-/// For whom places are.
+/// How far a piece has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum Stage {
     First,
+    Second,
     Long,
 }
 
-/// Places of one kind, and who waits for them.
+impl Stage {
+    /// The stage of a piece that has worked for so long.
+    fn after(worked: Duration) -> Stage {
+        match worked {
+            worked if worked < FIRST => Stage::First,
+            worked if worked < SECOND => Stage::Second,
+            _ => Stage::Long,
+        }
+    }
+
+    fn turn(self) -> Duration {
+        match self {
+            Stage::First => FIRST,
+            Stage::Second => SECOND_TURN,
+            Stage::Long => LONG_TURN,
+        }
+    }
+
+    /// Pieces of a lower rank come first; those of equal rank take turns.
+    fn rank(self, worked: Duration) -> u128 {
+        if self == Stage::Second { worked.as_millis() / SECOND_TURN.as_millis() } else { 0 }
+    }
+}
+
+/// The places of one stage, and who waits for them.
 struct Line {
     /// Places that nobody has; while there are any, all who wait have as many as one tenant may.
     free: usize,
     /// Places that one tenant may have.
     of_one: usize,
+    /// Pieces that may wait.
+    most_waiting: usize,
     /// Places that each tenant has; none of them 0.
     running: HashMap<Tenant, usize>,
     /// Tenants that wait, whose turn is next first; each has a queue.
     ring: VecDeque<Tenant>,
-    queues: HashMap<Tenant, VecDeque<oneshot::Sender<Place>>>,
+    queues: HashMap<Tenant, VecDeque<Waiting>>,
 }
+
+/// A piece that waits for a place.
+struct Waiting {
+    rank: u128,
+    grant: oneshot::Sender<Granted>,
+}
+
+/// What a waiting piece gets.
+type Granted = Result<Place, ServiceError>;
 
 /// The right to work, given up when dropped.
 struct Place {
     bounded: Bounded,
-    kind: Kind,
+    stage: Stage,
     tenant: Tenant,
 }
 
@@ -86,20 +131,30 @@ struct Piece {
     tenant: Tenant,
     /// Closed once the caller is gone.
     caller: watch::Receiver<()>,
-    /// Why this one may not go on: too many long pieces wait.
+    /// Why it may not go on: too many pieces wait.
     refused: OnceLock<ServiceError>,
+    held: Mutex<Held>,
+}
+
+/// The place of a piece and the time it has had.
+struct Held {
     /// `None` while it waits.
-    place: Mutex<Option<(Place, Instant)>>,
+    place: Option<Place>,
+    since: Instant,
+    /// What it had worked before.
+    before: Duration,
 }
 
 impl Bounded {
     pub fn new(name: &'static str, Size { first, long }: Size, wait: Duration) -> Self {
-        let line = |free, of_one| {
+        let line = |free, of_one, most_waiting| {
             let (running, queues) = (HashMap::new(), HashMap::new());
-            Mutex::new(Line { free, of_one, running, ring: VecDeque::new(), queues })
+            Mutex::new(Line { free, of_one, most_waiting, running, ring: VecDeque::new(), queues })
         };
         let of_one = first.div_ceil(2);
-        Bounded { name, of_one, lines: Arc::new([line(first, of_one), line(long, long)]), wait }
+        // How long a caller waits for the first stage is bounded, not how many do.
+        let lines = [line(first, of_one, usize::MAX), line(long, long, SECOND_WAITING), line(long, long, LONG_WAITING)];
+        Bounded { name, of_one, lines: Arc::new(lines), wait }
     }
 
     /// Runs `work` on a thread that may block. It ends early where the future is dropped.
@@ -132,7 +187,7 @@ impl Bounded {
             tenant: tenant.clone(),
             caller,
             refused: OnceLock::new(),
-            place: Mutex::new(Some((place, Instant::now()))),
+            held: Mutex::new(Held { place: Some(place), since: Instant::now(), before: Duration::ZERO }),
         });
         let (done, answer) = oneshot::channel();
         tokio::task::spawn_blocking(move || {
@@ -155,37 +210,37 @@ impl Bounded {
 
     /// Pieces that wait for a place.
     pub fn waiting(&self) -> usize {
-        [Kind::First, Kind::Long].map(|kind| self.line(kind).waiting()).into_iter().sum()
+        [Stage::First, Stage::Second, Stage::Long].map(|stage| self.line(stage).waiting()).into_iter().sum()
     }
 
     async fn first_place(&self, tenant: &Tenant) -> Result<Place, ServiceError> {
-        let asked = self.line(Kind::First).ask(tenant);
-        let Some(granted) = asked else { return Ok(self.place(Kind::First, tenant.clone())) };
+        let asked = self.line(Stage::First).ask(tenant, 0);
+        let Some(granted) = asked else { return Ok(self.place(Stage::First, tenant.clone())) };
         let granted = tokio::time::timeout(self.wait, granted).await;
         let late = |_| {
-            let line = self.line(Kind::First);
+            let line = self.line(Stage::First);
             let is_own = line.running.contains_key(tenant) && line.is_full_of(tenant);
             if is_own { Refused::OwnWork.into() } else { ServiceError::Busy }
         };
-        granted.map_err(late)?.map_err(ServiceError::internal)
+        granted.map_err(late)?.map_err(ServiceError::internal)?
     }
 
-    fn place(&self, kind: Kind, tenant: Tenant) -> Place {
-        Place { bounded: self.clone(), kind, tenant }
+    fn place(&self, stage: Stage, tenant: Tenant) -> Place {
+        Place { bounded: self.clone(), stage, tenant }
     }
 
-    fn line(&self, kind: Kind) -> MutexGuard<'_, Line> {
+    fn line(&self, stage: Stage) -> MutexGuard<'_, Line> {
         // No code panics while holding the lock.
-        self.lines[kind as usize].lock().unwrap_or_else(PoisonError::into_inner)
+        self.lines[stage as usize].lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let next = self.bounded.line(self.kind).give_back(&self.tenant);
-        if let Some((tenant, waiting)) = next {
+        let next = self.bounded.line(self.stage).give_back(&self.tenant);
+        if let Some((tenant, grant)) = next {
             // Whoever stopped waiting in this instant drops it, and so hands it on.
-            drop(waiting.send(self.bounded.place(self.kind, tenant)));
+            drop(grant.send(Ok(self.bounded.place(self.stage, tenant))));
         }
     }
 }
@@ -196,42 +251,66 @@ impl Watcher for Piece {
     }
 
     fn give_way(&self) {
-        let mut held = self.place.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some((Place { kind, .. }, since)) = &mut *held else { return };
-        let share = if *kind == Kind::First { MOMENT } else { SHIFT };
-        if since.elapsed() < share {
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(stage) = held.place.as_ref().map(|place| place.stage) else { return };
+        let turn = held.since.elapsed();
+        if turn < stage.turn() {
             return;
         }
-        let granted = {
-            let mut line = self.bounded.line(Kind::Long);
-            let waiting = line.waiting();
-            if *kind == Kind::Long && waiting == 0 {
-                *since = Instant::now();
-                return;
+        held.before += turn;
+        held.since = Instant::now();
+        let next = Stage::after(held.before);
+        let entered = self.enter(next, next == stage, next.rank(held.before));
+        let granted = match entered {
+            Entered::Stays => return,
+            Entered::Refused(refused) => return drop(self.refused.set(refused)),
+            Entered::Granted => Some(Ok(self.bounded.place(next, self.tenant.clone()))),
+            Entered::Waits(granted) => {
+                held.place = None;
+                self.wait_for(granted)
             }
-            let refused = if line.waiting_of(&self.tenant) >= LONG_WAITING_OF_ONE {
-                Some(Refused::OwnWork.into())
-            } else {
-                (waiting >= LONG_WAITING).then_some(ServiceError::Busy)
-            };
-            if let Some(refused) = refused {
-                self.refused.get_or_init(|| refused);
-                return;
+        };
+        held.since = Instant::now();
+        held.place = match granted {
+            Some(Ok(place)) => Some(place),
+            Some(Err(refused)) => {
+                let _ = self.refused.set(refused);
+                None
             }
-            line.ask(&self.tenant)
+            None => None,
         };
-        *held = None;
-        let place = match granted {
-            None => Some(self.bounded.place(Kind::Long, self.tenant.clone())),
-            Some(granted) => self.wait_for(granted),
-        };
-        *held = place.map(|place| (place, Instant::now()));
     }
 }
 
+/// What comes of a piece whose turn is over.
+enum Entered {
+    /// Nobody waits: it keeps its place.
+    Stays,
+    Granted,
+    Waits(oneshot::Receiver<Granted>),
+    Refused(ServiceError),
+}
+
 impl Piece {
-    /// `None` where the caller went away first.
-    fn wait_for(&self, granted: oneshot::Receiver<Place>) -> Option<Place> {
+    /// Asks for a place in a stage, in which it `is_in` already or not.
+    fn enter(&self, stage: Stage, is_in: bool, rank: u128) -> Entered {
+        let mut line = self.bounded.line(stage);
+        let waiting = line.waiting();
+        if is_in && waiting == 0 {
+            return Entered::Stays;
+        }
+        if !is_in && waiting >= line.most_waiting {
+            let Some((grant, refused)) = line.give_up_one(&self.tenant, rank) else {
+                let own = line.waiting_of(&self.tenant) > 0;
+                return Entered::Refused(if own { Refused::OwnWork.into() } else { ServiceError::Busy });
+            };
+            drop(grant.send(Err(refused)));
+        }
+        line.ask(&self.tenant, rank).map_or(Entered::Granted, Entered::Waits)
+    }
+
+    /// Waits for a place or a refusal; `None` if the caller goes away first.
+    fn wait_for(&self, granted: oneshot::Receiver<Granted>) -> Option<Granted> {
         let mut caller = self.caller.clone();
         Handle::current().block_on(async {
             tokio::select! {
@@ -258,22 +337,22 @@ impl Line {
     }
 
     /// Takes a place if there is one for the tenant: `None`. Else waits for it.
-    fn ask(&mut self, tenant: &Tenant) -> Option<oneshot::Receiver<Place>> {
+    fn ask(&mut self, tenant: &Tenant, rank: u128) -> Option<oneshot::Receiver<Granted>> {
         if self.may(tenant) {
             self.take(tenant);
             return None;
         }
-        let (waiting, granted) = oneshot::channel();
+        let (grant, granted) = oneshot::channel();
         let queue = self.queues.entry(tenant.clone()).or_default();
         if queue.is_empty() {
             self.ring.push_back(tenant.clone());
         }
-        queue.push_back(waiting);
+        queue.push_back(Waiting { rank, grant });
         Some(granted)
     }
 
-    /// Whoever has the place of the tenant next, who goes to the end of the ring.
-    fn give_back(&mut self, tenant: &Tenant) -> Option<(Tenant, oneshot::Sender<Place>)> {
+    /// Takes a place back, and gives it to the piece of the lowest rank, of equal ones to that of the tenant whose turn is next.
+    fn give_back(&mut self, tenant: &Tenant) -> Option<(Tenant, oneshot::Sender<Granted>)> {
         self.free += 1;
         if let Some(running) = self.running.get_mut(tenant) {
             *running -= 1;
@@ -281,26 +360,48 @@ impl Line {
                 self.running.remove(tenant);
             }
         }
-        for _ in 0..self.ring.len() {
-            let tenant = self.ring.pop_front()?;
-            if !self.may(&tenant) {
-                self.ring.push_back(tenant);
-                continue;
-            }
-            let Some(queue) = self.queues.get_mut(&tenant) else { continue };
-            queue.retain(|waiting| !waiting.is_closed());
-            let first = queue.pop_front();
-            if queue.is_empty() {
-                self.queues.remove(&tenant);
-            } else {
-                self.ring.push_back(tenant.clone());
-            }
-            if let Some(first) = first {
-                self.take(&tenant);
-                return Some((tenant, first));
-            }
+        self.forget_gone();
+        let next = self.ring.iter().filter(|tenant| self.may(tenant));
+        let tenant = next.min_by_key(|tenant| self.queues.get(*tenant).and_then(first).map(|(_, rank)| rank))?.clone();
+        let queue = self.queues.get_mut(&tenant)?;
+        let (at, _) = first(queue)?;
+        let Waiting { grant, .. } = queue.remove(at)?;
+        // The tenant goes to the end of the ring.
+        self.ring.retain(|waiting| *waiting != tenant);
+        if queue.is_empty() {
+            self.queues.remove(&tenant);
+        } else {
+            self.ring.push_back(tenant.clone());
         }
-        None
+        self.take(&tenant);
+        Some((tenant, grant))
+    }
+
+    /// Removes from a full queue the piece that should make room for one of `tenant`, if any should, and gives why it is refused.
+    fn give_up_one(&mut self, tenant: &Tenant, rank: u128) -> Option<(oneshot::Sender<Granted>, ServiceError)> {
+        self.forget_gone();
+        let worst = |(tenant, queue): (&Tenant, &VecDeque<Waiting>)| {
+            let (at, rank) = queue.iter().map(|waiting| waiting.rank).enumerate().max_by_key(|&(_, rank)| rank)?;
+            Some(((queue.len(), rank), at, tenant.clone()))
+        };
+        let ((count, most), at, loser) = self.queues.iter().filter_map(worst).max_by_key(|(key, ..)| *key)?;
+        if (count, most) <= (self.waiting_of(tenant) + 1, rank) {
+            return None;
+        }
+        let queue = self.queues.get_mut(&loser)?;
+        let Waiting { grant, .. } = queue.remove(at)?;
+        self.forget_gone();
+        Some((grant, if count > 1 { Refused::OwnWork.into() } else { ServiceError::Busy }))
+    }
+
+    /// Forgets the pieces that wait no more.
+    fn forget_gone(&mut self) {
+        self.queues.retain(|_, queue| {
+            queue.retain(|waiting| !waiting.grant.is_closed());
+            !queue.is_empty()
+        });
+        let Line { ring, queues, .. } = self;
+        ring.retain(|tenant| queues.contains_key(tenant));
     }
 
     fn waiting(&self) -> usize {
@@ -308,8 +409,13 @@ impl Line {
     }
 
     fn waiting_of(&self, tenant: &Tenant) -> usize {
-        self.queues.get(tenant).map_or(0, |queue| queue.iter().filter(|waiting| !waiting.is_closed()).count())
+        self.queues.get(tenant).map_or(0, |queue| queue.iter().filter(|waiting| !waiting.grant.is_closed()).count())
     }
+}
+
+/// The place in a queue, and the rank, of its first piece of the lowest rank.
+fn first(queue: &VecDeque<Waiting>) -> Option<(usize, u128)> {
+    queue.iter().map(|waiting| waiting.rank).enumerate().min_by_key(|&(_, rank)| rank)
 }
 
 #[cfg(test)]
@@ -328,16 +434,16 @@ mod tests {
     }
 
     /// Work that ends when told to, and says what it is when it begins.
-    struct Held {
+    struct Task {
         release: mpsc::Sender<()>,
         done: tokio::task::JoinHandle<Result<bool, ServiceError>>,
     }
 
-    fn hold(bounded: &Bounded, of: &str, begun: &mpsc::Sender<String>, name: &str) -> Held {
+    fn hold(bounded: &Bounded, of: &str, begun: &mpsc::Sender<String>, name: &str) -> Task {
         let ((release, held), bounded, of) = (mpsc::channel::<()>(), bounded.clone(), tenant(of));
         let (begun, name) = (begun.clone(), name.to_owned());
         let work = move || begun.send(name).is_ok() && held.recv().is_ok();
-        Held { release, done: tokio::spawn(async move { bounded.run(&of, work).await }) }
+        Task { release, done: tokio::spawn(async move { bounded.run(&of, work).await }) }
     }
 
     /// Work that passes checkpoints and counts them, until `enough`.
@@ -358,13 +464,14 @@ mod tests {
         (passed, tokio::spawn(async move { bounded.run(&of, work).await }))
     }
 
-    /// Waits until every place is free: of so many of each kind.
-    async fn all_free(bounded: &Bounded, places: [usize; 2]) {
-        let is_free = |(kind, places): (Kind, usize)| {
-            let line = bounded.line(kind);
+    /// Waits until every place is free: so many of the first stage, and of each of the others.
+    async fn all_free(bounded: &Bounded, [first, long]: [usize; 2]) {
+        let is_free = |(stage, places): (Stage, usize)| {
+            let line = bounded.line(stage);
             line.free == places && line.ring.is_empty() && line.queues.is_empty() && line.running.is_empty()
         };
-        until(|| [Kind::First, Kind::Long].into_iter().zip(places).all(is_free)).await;
+        let stages = [(Stage::First, first), (Stage::Second, long), (Stage::Long, long)];
+        until(|| stages.into_iter().all(is_free)).await;
     }
 
     async fn until(mut reached: impl FnMut() -> bool) {
@@ -453,10 +560,11 @@ mod tests {
         all_free(&bounded, [1, 1]).await;
     }
 
+    /// A tenant fills the queue; the next piece of its own is refused, and one of another takes a place in it.
     #[tokio::test]
-    async fn long_work_of_one_tenant_is_bounded() {
+    async fn a_full_queue_takes_from_the_tenant_with_most() {
         let bounded = bounded(1, 1);
-        let mut all: Vec<_> = (0..LONG_WAITING_OF_ONE + 2).map(|_| busy(&bounded, "north", u64::MAX).1).collect();
+        let mut all: Vec<_> = (0..SECOND_WAITING + 3).map(|_| busy(&bounded, "north", u64::MAX).1).collect();
         until(|| all.iter().any(tokio::task::JoinHandle::is_finished)).await;
         let first = all.iter().position(tokio::task::JoinHandle::is_finished).unwrap();
         let refused = all.swap_remove(first).await.unwrap();
@@ -466,13 +574,32 @@ mod tests {
         all_free(&bounded, [1, 1]).await;
     }
 
+    /// Of many tenants with a long piece each, one that has worked long makes room for one that begins.
+    #[tokio::test]
+    async fn a_short_piece_goes_before_long_ones_however_many_there_are() {
+        let bounded = bounded(1, 1);
+        let name = |number: usize| format!("tenant-{number}");
+        let all: Vec<_> = (0..SECOND_WAITING).map(|number| busy(&bounded, &name(number), u64::MAX)).collect();
+        // All of them are past the first stage.
+        until(|| all.iter().all(|(passed, _)| passed.load(Ordering::Relaxed) > 0)).await;
+        until(|| bounded.line(Stage::First).running.is_empty()).await;
+        for _ in 0..5 {
+            let asked = Instant::now();
+            assert!(busy(&bounded, "south", 150).1.await.unwrap().is_ok());
+            // 150 checkpoints of a millisecond and more, and one turn of another; in turn over all it would be some seconds.
+            assert!(asked.elapsed() < Duration::from_millis(1000), "{:?}", asked.elapsed());
+        }
+        all.iter().for_each(|(_, done)| done.abort());
+        all_free(&bounded, [1, 1]).await;
+    }
+
     #[tokio::test]
     async fn work_whose_caller_went_away_ends() {
         let bounded = bounded(1, 1);
         let (passed, done) = busy(&bounded, "north", u64::MAX);
         until(|| passed.load(Ordering::Relaxed) > 0).await;
         done.abort();
-        until(|| bounded.line(Kind::First).free == 1).await;
+        until(|| bounded.line(Stage::First).free == 1).await;
         let ended = passed.load(Ordering::Relaxed);
         tokio::time::sleep(Duration::from_millis(30)).await;
         assert_eq!(passed.load(Ordering::Relaxed), ended);
