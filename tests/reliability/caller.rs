@@ -77,8 +77,17 @@ impl Caller {
 
     /// A question as it goes over the wire.
     pub fn request(&self, method: &str, path: &str) -> String {
+        self.request_with(method, path, "")
+    }
+
+    /// A question with a body of JSON, if any; the connection ends with the answer where there is one.
+    pub fn request_with(&self, method: &str, path: &str, body: &str) -> String {
         let key = self.key.as_deref().unwrap_or_default();
-        format!("{method} {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {key}\r\n\r\n")
+        let head = format!("{method} {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {key}\r\n");
+        if body.is_empty() {
+            return head + "\r\n";
+        }
+        format!("{head}content-type: application/json\r\ncontent-length: {}\r\n\r\n{body}", body.len())
     }
 
     /// Every job, newest first.

@@ -2,7 +2,8 @@
 //! acknowledged. Prints a table; fails where anything is lost, doubled, stale or panicked, and where no row ran.
 //!
 //! `cargo test --test reliability` is the short form. `cargo test --test reliability -- --trials 100 kill` runs a hundred
-//! trials of every row whose name contains `kill`; `BALLAST_RELIABILITY_TRIALS` does the same for all rows. Rows that need
+//! trials of every row whose name contains `kill`; `BALLAST_RELIABILITY_TRIALS` does the same for all rows, and
+//! `BALLAST_ATTACK_SECONDS` has attacks of one tenant on another last longer than two seconds. Rows that need
 //! root, a loop device, strace or PostgreSQL say so where they have to be left out; under `BALLAST_RELIABILITY=required`
 //! none may be.
 //!
@@ -15,6 +16,7 @@ mod kills;
 mod ledger;
 mod load;
 mod mount;
+mod moved;
 mod neighbours;
 mod power;
 mod replicas;
@@ -26,6 +28,8 @@ mod support;
 mod syncs;
 mod tenants;
 mod tracer;
+mod unread;
+mod work;
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -73,6 +77,11 @@ const ROWS: &[Row] = &[
     row!("connections, streams held", 1, neighbours::holders),
     row!("large jobs listed", 1, neighbours::listers),
     row!("queues filled by another", 1, neighbours::crowds),
+    row!("answers that nobody reads", 1, unread::unread),
+    row!("batches of 1,000 reports", 1, work::batches),
+    row!("searches of another", 1, work::searches),
+    row!("largest question of twenty", 1, work::questions),
+    row!("database moved or replaced", 6, moved::moved),
 ];
 
 /// Trials asked for, and the parts of names to choose rows by.

@@ -1,5 +1,6 @@
 //! Attacks of one tenant on another: calls for his sessions while reads fail, jobs larger than memory, more policies than it
-//! holds, connections and streams held, lists of large jobs, and queues filled. What was acknowledged to him stays, no advice of his is stale, and he is answered throughout.
+//! holds, connections and streams held, lists of large jobs, queues filled, answers that nobody reads, batches, searches and
+//! questions of many. What was acknowledged to him stays, no advice of his is stale, and he is answered throughout.
 
 use std::time::{Duration, Instant};
 
@@ -15,13 +16,19 @@ use crate::scene::{HORIZON, Outcome, Tally, import, specification, undisturbed};
 use crate::server::Site;
 use crate::support::patience::{patience, within};
 use crate::tenants::{Tenants, sessions};
+use crate::{unread, work};
 
-/// How long an attack lasts.
+/// How long an attack lasts; `BALLAST_ATTACK_SECONDS` asks for another time.
 const ATTACK: Duration = Duration::from_secs(2);
 /// Calls under way at a time.
 const AT_ONCE: usize = 16;
 /// On a machine that does nothing else advice takes a millisecond; one that builds beside it gets this much.
-const ANSWERED: Duration = Duration::from_millis(500);
+pub const ANSWERED: Duration = Duration::from_millis(500);
+
+pub fn attack_time() -> Duration {
+    let asked = std::env::var("BALLAST_ATTACK_SECONDS").ok();
+    asked.map_or(ATTACK, |seconds| Duration::from_secs(seconds.parse().expect("a number of seconds")))
+}
 
 #[derive(Debug, Clone, Copy)]
 pub enum Attack {
@@ -31,6 +38,10 @@ pub enum Attack {
     Hold,
     List,
     Crowd,
+    LeaveUnread,
+    Batch,
+    Search,
+    Ask,
 }
 
 impl Attack {
@@ -48,6 +59,10 @@ impl Attack {
             Attack::Hold => hold(tenants, tally).await,
             Attack::List => list(tenants, tally).await,
             Attack::Crowd => crowd(tenants, tally).await,
+            Attack::LeaveUnread => unread::leave(tenants, tally).await,
+            Attack::Batch => work::batch(tenants, tally).await,
+            Attack::Search => work::search(tenants, tally).await,
+            Attack::Ask => work::ask(tenants, tally).await,
         }
     }
 }
@@ -58,7 +73,7 @@ pub async fn strangers(trials: usize) -> Outcome {
 
 /// Every route of sessions by the owner's names, while the table of entries is away now and again.
 async fn intrude(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
-    let end = Instant::now() + ATTACK;
+    let end = Instant::now() + attack_time();
     let strangers = (0..4).map(|_| intruder(tenants, end));
     let file = tenants.site.data().join("ballast.sqlite");
     let (found, hidden) = tokio::join!(join_all(strangers), hide(&file, end));
@@ -124,7 +139,7 @@ async fn overreach(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
             tally.complain(format!("a job of {count} design points: {answer:?}"));
         }
     }
-    tokio::time::sleep(ATTACK).await;
+    tokio::time::sleep(attack_time()).await;
     tally.note = format!("{} MB resident at most", tenants.server.peak_mb());
     if tenants.server.peak_mb() > MOST_MB {
         tally.complain(tally.note.clone());
@@ -180,7 +195,7 @@ async fn hold(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
         // One that is refused is an attack that failed.
         held.extend(asked(&address, question).await);
     }
-    let end = Instant::now() + ATTACK;
+    let end = Instant::now() + attack_time();
     while Instant::now() < end {
         let ready = reqwest::get(format!("{}/readyz", tenants.server.url)).await.map(|answer| answer.status().as_u16());
         if ready.as_ref().ok() != Some(&200) {
@@ -225,14 +240,14 @@ async fn list(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
         }
     }
     let pulse = tenants.pulse("").await?;
-    let calls = until(Instant::now() + ATTACK, &tenants.neighbour, "/jobs?limit=1000").await;
+    let calls = until(Instant::now() + attack_time(), &tenants.neighbour, "/jobs?limit=1000").await;
     pulse.stop().await.told(within(ANSWERED), tally);
     tally.note += &format!(", {queued} large jobs listed {calls} times");
     Ok(calls)
 }
 
 /// Asks for `path` from many connections until `end`; how often.
-async fn until(end: Instant, caller: &Caller, path: &str) -> usize {
+pub async fn until(end: Instant, caller: &Caller, path: &str) -> usize {
     let asking = (0..AT_ONCE).map(async |_| {
         let (caller, mut calls) = (caller.another(), 0);
         while Instant::now() < end {
@@ -264,7 +279,7 @@ async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String
     let own = own.and_then(|(_, job)| job["job"].as_str().map(str::to_owned)).ok_or("no job of the owner's")?;
     let pulse = tenants.pulse("&mode=resolve").await?;
     let path = format!("/action?session={session}&explain=worst_case");
-    let calls = until(Instant::now() + ATTACK, neighbour, &path).await;
+    let calls = until(Instant::now() + attack_time(), neighbour, &path).await;
     pulse.stop().await.told(2 * within(ANSWERED), tally);
     until_ended(&tenants.owner, &own, tally).await;
     let ahead = neighbour.jobs().await.ok_or("no jobs of the neighbour's")?.iter().filter(has_succeeded).count();

@@ -156,10 +156,18 @@ impl Server {
 
     /// Most resident memory so far, in MB.
     pub fn peak_mb(&self) -> usize {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap_or_default();
-        let peak =
-            status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok());
-        peak.map_or(usize::MAX, |kilobytes: usize| kilobytes >> 10)
+        self.figure("VmHWM:").map_or(usize::MAX, |kilobytes| kilobytes >> 10)
+    }
+
+    /// Threads it has now.
+    pub fn threads(&self) -> usize {
+        self.figure("Threads:").unwrap_or(usize::MAX)
+    }
+
+    /// A figure of the process as `/proc` tells it.
+    fn figure(&self, name: &str) -> Option<usize> {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).ok()?;
+        status.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next()?.parse().ok())
     }
 
     /// Waits for its end; `None` where it does not come.

@@ -15,6 +15,7 @@ use crate::neighbours::Attack;
 use crate::scene::{Outcome, Tally, import};
 use crate::server::{Server, Site};
 use crate::support::issue_key;
+use crate::support::patience::until;
 
 const CLIENTS: usize = 3;
 /// Reports acknowledged before an attack and after it.
@@ -91,11 +92,21 @@ impl Tenants {
         let session = caller.open(&self.policy).await.ok_or("no session")?;
         let first = json!({ "session": session, "period": 1, "log_return": 0.01 });
         caller.post("/observe", &first).await.ok_or("no report")?;
-        let over = Arc::new(AtomicBool::new(false));
-        Ok(Pulse {
-            beating: tokio::spawn(beat(caller, format!("/action?session={session}{question}"), over.clone())),
-            over,
-        })
+        Ok(Pulse::of(caller, format!("/action?session={session}{question}")))
+    }
+
+    /// Callers of so many more tenants, of whom the server has learnt.
+    pub async fn others(&self, count: usize) -> Result<Vec<Caller>, String> {
+        let mut others = Vec::new();
+        for number in 0..count {
+            let ring = KeyRing::open(&self.site.data()).await.map_err(|error| error.to_string())?;
+            let key = issue_key(&ring, &format!("other-{number}"), "read").await;
+            others.push(Caller::with_key(&self.server.url, &key));
+        }
+        let last = others.last().ok_or("nobody")?;
+        until("the keys to be known", async || matches!(last.get("/sessions").await, Some((200, _))).then_some(()))
+            .await;
+        Ok(others)
     }
 }
 
@@ -114,6 +125,12 @@ pub struct Pace {
 }
 
 impl Pulse {
+    /// `caller` asks for `path`.
+    pub fn of(caller: Caller, path: String) -> Pulse {
+        let over = Arc::new(AtomicBool::new(false));
+        Pulse { beating: tokio::spawn(beat(caller, path, over.clone())), over }
+    }
+
     pub async fn stop(self) -> Pace {
         self.over.store(true, Ordering::Relaxed);
         self.beating.await.unwrap()

@@ -1,0 +1,188 @@
+//! Answers as large as they get, asked for by many of whom half read nothing: the process stays within its memory, and others
+//! do not wait.
+
+use std::time::{Duration, Instant};
+
+use futures_util::future::join_all;
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpSocket;
+
+use crate::caller::{Answer, Caller};
+use crate::neighbours::{ANSWERED, Attack, attack_time};
+use crate::scene::{Outcome, Tally, specification, undisturbed};
+use crate::server::Site;
+use crate::support::patience::within;
+use crate::support::trained;
+use crate::tenants::{Pulse, Tenants};
+
+/// Callers at each door; every second one reads nothing.
+const CALLERS: usize = 50;
+/// Resident at most, under a limit of 1 GB.
+const MOST_MB: usize = 1200;
+/// Periods of a session for each second of an attack.
+const PERIODS: usize = 150;
+const MOST_PERIODS: usize = 5000;
+const SESSIONS: usize = 300;
+const JOBS: usize = 20;
+/// Returns of a session, each of which a worst law explains.
+const RETURNS: usize = 2000;
+/// Bytes of a policy that is none.
+const NO_POLICY: usize = 8 << 20;
+const READ_AT_ONCE: usize = 64 << 10;
+
+pub async fn unread(trials: usize) -> Outcome {
+    Tenants::attacked(Site::limited(&["--memory-limit", "1GB"]), trials, Attack::LeaveUnread).await
+}
+
+/// A question with a large answer or a large body.
+struct Door {
+    name: &'static str,
+    request: String,
+}
+
+pub async fn leave(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
+    let (mut calls, mut notes) = (0, Vec::new());
+    for Door { name, request } in doors(&tenants.neighbour).await? {
+        let alive = Pulse::of(tenants.owner.another(), "/livez".to_owned());
+        let advice = tenants.pulse("").await?;
+        calls += call(&tenants.server.url, &request).await;
+        let [alive, advice] = [alive.stop().await, advice.stop().await];
+        for pace in [&alive, &advice] {
+            pace.told(within(ANSWERED), tally);
+        }
+        let peak = tenants.server.peak_mb();
+        if peak > MOST_MB {
+            tally.complain(format!("{name}: {peak} MB resident"));
+        }
+        notes.push(format!("{name} {peak} MB, {} and {} ms", alive.p99(), advice.p99()));
+    }
+    tally.note = format!("resident at most, p99 of /livez and /action: {}", notes.join("; "));
+    Ok(calls)
+}
+
+async fn doors(caller: &Caller) -> Result<Vec<Door>, String> {
+    let door = |name, request| Door { name, request };
+    let long = long(caller).await?;
+    let sweep = sweep(caller).await?;
+    label(caller).await?;
+    queue(caller).await?;
+    let no_policy = format!("{{\"steps\":[{}0]}}", "0,".repeat(NO_POLICY / 2));
+    Ok(vec![
+        door("history", caller.request("GET", &format!("/sessions/{long}/history"))),
+        door("sessions", caller.request("GET", "/sessions?limit=1000")),
+        door("jobs", caller.request("GET", "/jobs?limit=1000")),
+        door("what-if", caller.request_with("POST", "/what-if", &sweep)),
+        door("import", caller.request_with("POST", "/policies/import", &no_policy)),
+    ])
+}
+
+fn made_of(answer: Option<Answer>, name: &str) -> Result<String, String> {
+    match answer {
+        Some((201, made)) => made[name].as_str().map(str::to_owned).ok_or(format!("no {name} in {made}")),
+        other => Err(format!("no {name}: {other:?}")),
+    }
+}
+
+/// The name of a policy trained here, once it is imported.
+async fn imported(caller: &Caller, policy: &[u8]) -> Result<String, String> {
+    let policy: Value = serde_json::from_slice(policy).map_err(|error| error.to_string())?;
+    made_of(caller.post("/policies/import", &policy).await, "policy")
+}
+
+fn log_return(number: usize) -> f64 {
+    0.004 + 0.02 * (1.7 * number as f64).sin()
+}
+
+/// A session that goes on for as many periods as there is time for.
+async fn long(caller: &Caller) -> Result<String, String> {
+    let mut training = specification(2);
+    training["problem"]["learning"] = json!({ "kind": "decay", "half_life": 1 });
+    training["problem"]["utility"] = json!({ "kind": "power", "risk_aversion": 3 });
+    training["design"]["initial_laws"] = json!("resampled");
+    let policy = imported(caller, &trained(&training)).await?;
+    let opened = caller.post("/sessions", &json!({ "policy": policy, "rolling": true })).await;
+    let session = made_of(opened, "session")?;
+    for period in 1..=MOST_PERIODS.min(PERIODS * attack_time().as_secs() as usize) {
+        let report = json!({ "session": session, "period": period, "log_return": log_return(period) });
+        let answer = caller.post("/observe", &report).await;
+        if !matches!(answer, Some((200, _))) {
+            return Err(format!("period {period}: {answer:?}"));
+        }
+    }
+    Ok(session)
+}
+
+/// A question with the largest answer: so many points, each with the worst law of a session of many returns.
+async fn sweep(caller: &Caller) -> Result<String, String> {
+    let policy = imported(caller, &undisturbed(2)).await?;
+    let history: Vec<f64> = (0..RETURNS).map(log_return).collect();
+    let session = made_of(caller.post("/sessions", &json!({ "policy": policy, "history": history })).await, "session")?;
+    let range = json!({ "from": 0.5, "to": 1.5, "points": 50 });
+    Ok(json!({ "session": session, "explain": "worst_case", "sweep": { "radius_scale": range } }).to_string())
+}
+
+/// Sessions with labels at their limits.
+async fn label(caller: &Caller) -> Result<(), String> {
+    let policy = imported(caller, &undisturbed(2)).await?;
+    let wide = "\u{10348}";
+    let tags: Vec<String> = (0..20).map(|tag| format!("{}{tag:02}", wide.repeat(48))).collect();
+    let opening = json!({ "policy": policy, "name": wide.repeat(100), "notes": wide.repeat(2000), "tags": tags });
+    for _ in 0..SESSIONS {
+        made_of(caller.post("/sessions", &opening).await, "session")?;
+    }
+    Ok(())
+}
+
+/// Jobs of large requests behind one that does not end.
+async fn queue(caller: &Caller) -> Result<(), String> {
+    let mut large = specification(2);
+    large["problem"]["history"] = (0..20_000).map(|number| Value::from(log_return(number))).collect();
+    large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    for number in 0..JOBS {
+        large["seed"] = json!(number);
+        let answer = caller.train(&format!("unread-{number}"), &large).await;
+        if !matches!(answer, Some((202, _))) {
+            return Err(format!("a job: {answer:?}"));
+        }
+    }
+    Ok(())
+}
+
+/// Asks from all callers for as long as an attack lasts; how often.
+async fn call(url: &str, request: &str) -> usize {
+    let (address, end) = (url.trim_start_matches("http://"), Instant::now() + attack_time());
+    let calling = (0..CALLERS).map(async |number| {
+        let mut calls = 0;
+        while Instant::now() < end {
+            let asked = ask(address, request, number % 2 == 0);
+            let left = end.saturating_duration_since(Instant::now());
+            // One that was refused or cut off asks again soon.
+            if !matches!(tokio::time::timeout(left, asked).await, Ok(Ok(()))) {
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+            calls += 1;
+        }
+        calls
+    });
+    join_all(calling).await.into_iter().sum()
+}
+
+/// One question: its answer is read to the end, or not at all until the server gives up.
+async fn ask(address: &str, request: &str, reads: bool) -> std::io::Result<()> {
+    let socket = TcpSocket::new_v4()?;
+    if !reads {
+        socket.set_recv_buffer_size(4096)?;
+    }
+    let mut stream = socket.connect(address.parse().expect("an address")).await?;
+    stream.write_all(request.replacen("\r\n", "\r\nconnection: close\r\n", 1).as_bytes()).await?;
+    if !reads {
+        while stream.write_all(b" ").await.is_ok() {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+        return Ok(());
+    }
+    let mut buffer = vec![0; READ_AT_ONCE];
+    while stream.read(&mut buffer).await? > 0 {}
+    Ok(())
+}
