@@ -1,4 +1,5 @@
-//! What the bank pays, in a column beside returns or prices: in which unit, as written, said or told by what it comes to.
+//! The bank's rates in a column next to returns or prices. Their unit is as written, as chosen, or inferred from the
+//! yearly rate.
 
 use super::cells::Cell;
 use super::choices::{Choices, RateUnit, Unit};
@@ -9,12 +10,12 @@ use super::sheet::Column;
 use super::unit::{is_coarse, names_percent};
 use super::words::percent;
 
-/// Of what the bank pays a period; as `problem.rate_per_step`.
+/// The range of the bank's rate a period; the same as for `problem.rate_per_step`.
 const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
-/// No bank has paid more a year on average of many years.
+/// The most that any bank has paid a year on average over many years.
 pub const LARGEST_RATE: f64 = 0.1;
 
-/// A column of rates, oldest first, and how many of its periods make a year, as far as is known.
+/// A column of rates, oldest first, and the number of periods in a year as far as it is known.
 pub struct Bank<'a> {
     pub column: &'a Column<'a>,
     pub cells: Vec<&'a Cell<'a>>,
@@ -23,7 +24,7 @@ pub struct Bank<'a> {
 }
 
 impl Bank<'_> {
-    /// The middle one of those that are numbers, as written and without its sign: one odd cell does not move it.
+    /// Returns the median of the cells that are numbers, as written and without sign; one odd cell does not move it.
     fn middle(&self, cells: &[&Cell]) -> f64 {
         let mut values: Vec<f64> =
             cells.iter().filter_map(|cell| number(&cell.text, self.mark)).map(f64::abs).collect();
@@ -35,16 +36,16 @@ impl Bank<'_> {
         names_percent(&self.column.name) || self.cells.iter().any(|cell| has_percent(&cell.text))
     }
 
-    /// What it would pay a year, taken as fractions, where that is more than banks do.
+    /// Returns the rate a year, read as fractions, if it is more than banks pay.
     pub fn beyond(&self) -> Option<f64> {
         let yearly = self.middle(&self.cells) * self.periods;
         (!self.says_percent() && yearly > LARGEST_RATE).then_some(yearly)
     }
 
-    /// The rates of the last `used` periods, beside returns in `unit`; or why they are not used.
+    /// Returns the rates of the last `used` periods next to returns in `unit`, or the reason why they are not used.
     ///
     /// # Errors
-    /// It must be asked what they are counted in.
+    /// The unit of the rates must be asked for.
     pub fn rates(&self, used: usize, unit: Option<Unit>, said: &Choices) -> Result<Result<BankRate, String>, Stop> {
         let cells = &self.cells[self.cells.len() - used..];
         let is_percent = self.says_percent() || unit == Some(Unit::Percent);
@@ -72,7 +73,8 @@ impl Bank<'_> {
         Ok(rates.map(|rates| BankRate { column: self.column.name.clone(), rates }))
     }
 
-    /// Whether the rates are more than banks pay as fractions, or coarser than fractions are written, and could be percent.
+    /// Returns true if the rates could be percent: as fractions they exceed what banks pay, or are coarser than
+    /// fractions are written.
     fn may_be_percent(&self, cells: &[&Cell]) -> bool {
         let values: Option<Vec<f64>> = cells.iter().map(|cell| number(&cell.text, self.mark)).collect();
         let Some(values) = values else { return false };

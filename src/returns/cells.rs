@@ -1,5 +1,5 @@
-//! Text as rows of cells. A cell knows where it stands, so that whatever is wrong with it can be pointed at. What a cell means is
-//! not decided here, but for one thing: whether a comma parts numbers or is in them.
+//! Text as rows of cells. A cell knows its line and column, so that an error in it can be located. This module does not
+//! decide the meaning of a cell, with one exception: whether a comma separates numbers or is part of them.
 
 use std::borrow::Cow;
 
@@ -8,25 +8,25 @@ use super::dates::could_be_date;
 use super::number::{Mark, is_number, looks_numeric, number};
 use super::outcome::{Place, Stop};
 
-/// Of a text: a century of days of dozens of assets.
+/// The most bytes of a text: a century of days for dozens of assets.
 const MOST_BYTES: usize = 8_000_000;
 pub const MOST_LINES: usize = 200_000;
 const MOST_CELLS: usize = 1_000_000;
-/// Marks that part cells wherever they occur; a comma or a blank does so only where nothing else can be meant.
+/// Marks that always separate cells; a comma or a blank does so only if nothing else can be meant.
 const SEPARATORS: [char; 3] = ['\t', ';', '|'];
 const COMMA: char = ',';
 const BLANK: char = ' ';
-/// Lines by which the meaning of a comma is told: it is the same in all of them.
+/// The number of lines that decide the meaning of a comma, which is the same in all lines.
 const FIRST: usize = 200;
-/// Words that stand where a number is missing, and the most letters of them.
+/// Words that mark a missing number, and the most letters of such a word.
 const MISSING: [&str; 11] = ["n/a", "na", "#n/a", "#na", "nan", "null", "none", "<na>", "-", "--", "."];
 const LONGEST_MISSING: usize = 4;
-/// Letters of a value that are shown.
+/// The most letters of a value that are shown.
 const SHOWN: usize = 60;
 pub const SPREADSHEET: &str = "This is a spreadsheet file. Save it as CSV, or copy the column and paste it.";
 pub const NO_TEXT: &str = "This is no text in UTF-8, UTF-16 or Windows-1252. Save it as CSV in UTF-8.";
 
-/// What stands between two separators.
+/// The text between two separators.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell<'a> {
     pub text: Cow<'a, str>,
@@ -35,41 +35,41 @@ pub struct Cell<'a> {
 }
 
 impl Cell<'_> {
-    /// The heading of a column that the text does not have.
+    /// Returns the heading of a column that the text does not have.
     pub fn heading(text: &'static str) -> Cell<'static> {
         Cell { text: Cow::Borrowed(text), line: 1, column: 1 }
     }
 
-    /// Another text at this place.
+    /// Returns a cell with another text at the same place.
     pub fn with_text<'a>(&self, text: String) -> Cell<'a> {
         Cell { text: Cow::Owned(text), line: self.line, column: self.column }
     }
 
-    /// The cell breaks a rule, under the name of its column where it has one.
+    /// Returns a refusal that says that the cell breaks `rule`, with the name of its column if it has one.
     pub fn refused(&self, name: &str, rule: &str) -> Stop {
         let place = self.place();
         Stop::Refused { sentence: format!("{}: {rule}", self.called(name)), place: Some(place) }
     }
 
-    /// Whether the cell is blank, or says in a word that there is no number.
+    /// Returns true if the cell is blank, or has a word that says that there is no number.
     pub fn is_missing(&self) -> bool {
         self.text.is_empty()
             || (self.text.len() <= LONGEST_MISSING && MISSING.contains(&self.text.to_ascii_lowercase().as_str()))
     }
 
-    /// From 1.
+    /// Returns the line, from 1.
     pub fn line(&self) -> u32 {
         self.line
     }
 
-    /// Where the cell stands and what it holds, in words.
+    /// Returns the place of the cell and its value, in words.
     pub fn called(&self, name: &str) -> String {
         let Place { line, column, value } = self.place();
         let name = if name.is_empty() { format!("column {column}") } else { name.to_owned() };
         format!("line {line}: {name} is {value:?}")
     }
 
-    /// The text, shortened if it is long.
+    /// Returns the text, shortened if it is long.
     pub fn shown(&self) -> String {
         match self.text.char_indices().nth(SHOWN) {
             Some((end, _)) => format!("{}\u{2026}", &self.text[..end]),
@@ -82,14 +82,14 @@ impl Cell<'_> {
     }
 }
 
-/// A line without what ends it, counted from 1.
+/// A line without its line ending, counted from 1.
 #[derive(Clone, Copy)]
 struct Line<'a> {
     text: &'a str,
     number: u32,
 }
 
-/// Rows of cells, none of them blank throughout, and how many lines were remarks.
+/// Rows of cells without blank rows, and the number of lines that were comments.
 pub struct Rows<'a> {
     pub rows: Vec<Vec<Cell<'a>>>,
     pub remarks: usize,
@@ -97,7 +97,7 @@ pub struct Rows<'a> {
 
 impl<'a> Rows<'a> {
     /// # Errors
-    /// The text is none, too long, or a comma in it can be meant in two ways.
+    /// The text is too long or no text, or a comma in it has two possible meanings.
     pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
         let text = text.trim_start_matches('\u{feff}');
         let end = if text.contains('\n') { '\n' } else { '\r' };
@@ -116,7 +116,7 @@ impl<'a> Rows<'a> {
         let mut rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
         let filled = |row: &Vec<Cell>| row.iter().rposition(|cell| !cell.text.is_empty()).map_or(0, |last| last + 1);
         rows.retain(|row| filled(row) > 0);
-        // Separators at the ends of lines make blank cells.
+        // Separators at the ends of lines make blank cells, which are removed.
         let width = rows.iter().map(filled).max().unwrap_or(0);
         rows.iter_mut().for_each(|row| row.truncate(width));
         if rows.is_empty() {
@@ -141,26 +141,27 @@ fn check(text: &str, end: char) -> Result<(), Stop> {
     if text.contains(['\0', '\u{fffd}']) { Err(Stop::refused(NO_TEXT)) } else { Ok(()) }
 }
 
-/// A spreadsheet leaves #N/A where a number is missing: that is no remark.
+/// Returns true for a comment line. A spreadsheet writes #N/A for a missing number, so that is no comment.
 fn is_remark(line: &str) -> bool {
     let line = line.trim_start();
     line.starts_with('#') && !line.get(..3).is_some_and(|start| ["#N/", "#NA"].contains(&&*start.to_ascii_uppercase()))
 }
 
-/// The separator that a first line such as `sep=;` declares to a spreadsheet.
+/// Returns the separator that a first line such as `sep=;` declares to a spreadsheet.
 fn declared(line: &str) -> Option<char> {
     let mut rest = line.trim_matches(['"', '\r']).strip_prefix("sep=")?.chars();
     let separator = rest.next()?;
     ((separator == COMMA || SEPARATORS.contains(&separator)) && rest.next().is_none()).then_some(separator)
 }
 
-/// Lines that end in a number, but for separators: what parts their cells is told by them, and not by words around a table.
+/// Returns the lines that end in a number, apart from separators. They show how cells are separated; words around a
+/// table do not.
 fn numeric<'a>(lines: &[Line<'a>]) -> Vec<Line<'a>> {
     let ends_in_number = |line: &Line| {
         let rest = line.text.trim_end_matches(|letter: char| letter.is_whitespace() || "\",;|%)".contains(letter));
         rest.ends_with(|letter: char| letter.is_ascii_digit() || letter == '.')
     };
-    // The line above the first of them may be its heading.
+    // The line above the first such line may be its heading.
     let from = lines.iter().position(ends_in_number).unwrap_or(0).saturating_sub(1);
     let is_shown = |(index, line): &(usize, &Line)| *index == from || ends_in_number(line);
     let found: Vec<Line> = lines.iter().enumerate().filter(is_shown).map(|(_, line)| *line).collect();
@@ -184,13 +185,14 @@ fn separator(lines: &[Line], said: &Choices) -> Result<char, Stop> {
             None => comma(lines),
         };
     }
-    // Without commas words are cells, unless a quoted cell or a date of several words holds the blanks.
+    // Without commas each word is a cell, unless a quoted cell or a date of several words contains the blanks.
     let is_whole = |line: &Line| !line.text.trim().contains(char::is_whitespace) || could_be_date(line.text.trim());
     let quoted = lines.iter().any(|line| line.text.contains('"'));
     Ok(if quoted || lines.iter().all(is_whole) { COMMA } else { BLANK })
 }
 
-/// A comma parts cells, or it is a decimal or thousands mark within them; where the text allows both, a person must say.
+/// Decides whether a comma separates cells or is a decimal or thousands mark within them. If the text allows both, a
+/// person must choose.
 fn comma(lines: &[Line]) -> Result<char, Stop> {
     let (parting, inside) = (strangers(lines, COMMA)?, strangers(lines, BLANK)?);
     if parting < inside {
@@ -208,7 +210,8 @@ fn comma(lines: &[Line]) -> Result<char, Stop> {
     Err(Stop::asked("comma_parts", format!("Is {word} one number, or are {parted} numbers of their own?"), options))
 }
 
-/// How many cells would be neither numbers nor dates, were the lines parted so; headings are none of them.
+/// Counts the cells that would be neither numbers nor dates if lines were split by `separator`; a heading is not
+/// counted.
 fn strangers(lines: &[Line], separator: char) -> Result<usize, Stop> {
     let lines = &lines[..lines.len().min(FIRST)];
     let rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
@@ -221,7 +224,8 @@ fn cells(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
     if separator == BLANK { Ok(words(line)) } else { fields(line, separator) }
 }
 
-/// A comma at the end of a word ends it, quotes around it are taken off, and a percent sign belongs to the number before it.
+/// Splits a line at blanks. A comma at the end of a word is removed, and so are quotes around it; a percent sign
+/// belongs to the number before it.
 fn words(line: Line) -> Vec<Cell> {
     let mut found: Vec<Cell> = Vec::new();
     for word in line.text.split_whitespace() {
@@ -240,7 +244,8 @@ fn cell<'a>(line: Line<'a>, before: usize, text: Cow<'a, str>) -> Cell<'a> {
     Cell { text, line: line.number, column: u32::try_from(before + 1).unwrap_or(u32::MAX) }
 }
 
-/// Quotes hold a separator together and are taken off; a doubled one within them is one.
+/// Splits a line at `separator`. Quotes protect a separator within them and are removed; a doubled quote within quotes
+/// is one quote.
 fn fields(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
     let mut found = Vec::new();
     let mut rest = Some(line.text);
@@ -271,7 +276,7 @@ fn fields(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
     Ok(found)
 }
 
-/// Where the quote ends that `text` stands in.
+/// Returns the index of the closing quote, if `text` starts after the opening one.
 fn closing(text: &str) -> Option<usize> {
     let mut from = 0;
     loop {
@@ -283,7 +288,7 @@ fn closing(text: &str) -> Option<usize> {
     }
 }
 
-/// Which decimal mark `cells` have: asked for where 1,234 may be both.
+/// Returns the decimal mark of `cells`. If 1,234 can be read both ways, the caller is asked.
 pub fn mark<'a>(cells: impl Iterator<Item = &'a Cell<'a>>, said: &Choices) -> Result<Mark, Stop> {
     if let Some(comma) = said.decimal_comma {
         return Ok(if comma { Mark::Comma } else { Mark::Point });

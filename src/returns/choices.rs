@@ -1,26 +1,26 @@
-//! What a person says of a text beforehand, or answers when asked.
+//! The choices that a person makes about a text beforehand, or in answer to a question.
 
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What the numbers are.
+/// The kind of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// Gains over what was held: 0.012 of 100 that became 101.2.
+    /// Gains over the wealth held: 0.012 if 100 became 101.2.
     Simple,
-    /// Logarithms of what 1 became.
+    /// Logarithms of the value that 1 grew to.
     Log,
-    /// Prices or levels, of which each pair gives a return.
+    /// Prices or levels; each pair of them gives a return.
     Price,
-    /// What 1 becomes in a period: 1.012 is a gain of 1.2 %.
+    /// Value that 1 grows to in a period: 1.012 is a gain of 1.2 %.
     Gross,
-    /// Gains since the start of the record, of which each pair gives a return.
+    /// Gains since the start of the record; each pair of them gives a return.
     Cumulated,
 }
 
-/// What returns are counted in.
+/// The unit of returns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Unit {
@@ -30,7 +30,7 @@ pub enum Unit {
     Percent,
 }
 
-/// What the rates of the bank are counted in, where a column tells them.
+/// The unit of the bank's rates, if a column holds them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum RateUnit {
@@ -38,71 +38,71 @@ pub enum RateUnit {
     Fraction,
     /// 0.2 is 0.2 % a period.
     Percent,
-    /// They are rates of no period, and left out.
+    /// The rates are not per period, and are left out.
     Unused,
 }
 
-/// What is said of a text; what is left out follows from it, or is asked.
+/// Choices about a text. A choice that is left out is inferred from the text, or asked for.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema, Args)]
 #[serde(deny_unknown_fields, default)]
 pub struct Choices {
-    /// A column of returns or prices, by its name or its number from 1; several of them are several assets
+    /// A column of returns or prices, by its name or its number from 1; several columns are several assets
     #[arg(long = "column", id = "column")]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<String>,
-    /// What the numbers are
+    /// The kind of the numbers
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<Kind>,
-    /// What returns are counted in
+    /// The unit of returns
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
-    /// What the rates of the bank are counted in, where a column tells them
+    /// The unit of the bank's rates, if a column holds them
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_unit: Option<RateUnit>,
-    /// Whether 01/02/2020 is the first of February, and not the second of January
+    /// If true, 01/02/2020 is the first of February; if false, the second of January
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub day_first: Option<bool>,
-    /// Whether the first row is the newest, where no dates tell
+    /// If true, the first row is the newest; used only if no dates are understood
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub newest_first: Option<bool>,
-    /// Whether a comma is the decimal mark
+    /// If true, a comma is the decimal mark
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimal_comma: Option<bool>,
-    /// Whether a comma parts numbers, and is not within them
+    /// If true, a comma separates numbers; if false, it is part of a number
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub comma_parts: Option<bool>,
-    /// Whether numbers in several columns are one record, line by line
+    /// If true, numbers in several columns are one record, read line by line
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub one_record: Option<bool>,
-    /// Whether a record from which periods are missing is taken as it is, without the rows that have no number
+    /// If true, a record with missing periods is accepted as it is, without the rows that have no number
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<bool>,
-    /// Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year
-    /// beyond chance, or a return far from all others
+    /// If true, numbers that are unusual for an asset are right: a deviation above 30 % a period or 150 % a year, a
+    /// mean above 100 % a year beyond chance, or a return far from all others
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unusual: Option<bool>,
-    /// Whether the returns are those beyond the bank, to which what its column says is added
+    /// If true, the returns are in excess of the bank's, and the rates in its column are added
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excess: Option<bool>,
-    /// How many of the last returns count; all of them unless given
+    /// How many of the latest returns to use; all of them by default
     #[arg(skip)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub latest: Option<usize>,
 }
 
 impl Choices {
-    /// These, and `more`, which counts where both say something.
+    /// Returns these choices combined with `more`, which wins if both make a choice.
     #[must_use]
     pub fn with(&self, more: &Choices) -> Choices {
         Choices {

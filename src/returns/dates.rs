@@ -1,4 +1,4 @@
-//! Dates of a record's rows: in one form for the whole column, never guessed row by row, and never taken for numbers.
+//! Dates of a record's rows: in one form for the whole column, never guessed row by row, and never read as numbers.
 
 use jiff::civil::{Date, ISOWeekDate, Weekday};
 
@@ -22,7 +22,7 @@ const MONTHS: [&str; 12] = [
     "November",
     "December",
 ];
-/// Headings of columns that are dates even if their cells are not understood.
+/// Headings of columns that hold dates even if their cells are not understood.
 const HEADINGS: [&str; 21] = [
     "date",
     "dates",
@@ -46,22 +46,29 @@ const HEADINGS: [&str; 21] = [
     "monat",
     "jahr",
 ];
-/// Of records of returns; what lies outside is a number that looks like a date.
+/// The years of records of returns; outside this range a number only looks like a date.
 const YEARS: std::ops::RangeInclusive<i16> = 1700..=2200;
-/// 1-2020 and Jan-99 are the shortest dates that are no numbers.
+/// Letters of the shortest dates that are not numbers, such as 1-2020 and Jan-99.
 const SHORTEST: usize = 6;
-/// Of two digits: from 1969 to 2068, as POSIX has it.
+/// Start of the range of two-digit years: from 1969 to 2068, as in POSIX.
 const PIVOT: i16 = 69;
-/// Rows by which the forms of a column are told from those that cannot be its.
+/// The number of rows of which at least one must fit a form, or the form is not tried on the rest.
 const FIRST: usize = 50;
-/// A column is one of dates where so many of its cells are: written apart by marks, or in digits that might be numbers.
+/// A column holds dates if this share of its cells are dates: with marks between their parts, or in digits that may be
+/// numbers.
 const MARKED: f64 = 0.5;
 pub const IN_DIGITS: f64 = 0.9;
 
-/// How dates are written: `y` is a year of four digits and `u` one of two, `m` and `d` one or two digits, `A` and `B` a month and
-/// a day of two, `n` a month's name, `q` a quarter, `w` a week, `o` a month after a decimal point, of which 1 is October; `t` the
-/// time of day or nothing, `_` any marks and blanks or none, `/` a mark between numbers, `-` one of those that are no decimal
-/// point, `#` the day number of a spreadsheet, `@` seconds since 1970; other letters stand for themselves.
+/// The form in which dates are written, one letter for each part:
+///
+/// - `y` is a year of four digits, and `u` one of two
+/// - `m` and `d` are a month and a day of one or two digits, `A` and `B` of two
+/// - `n` is a month's name, `q` a quarter and `w` a week
+/// - `o` is a month after a decimal point, of which 1 is October
+/// - `t` is a time of day or nothing
+/// - `_` is any marks and blanks or none, `/` a mark between numbers, `-` one that is not a decimal point
+/// - `#` is the day number of a spreadsheet, `@` seconds since 1970
+/// - other letters stand for themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Form(&'static str);
 
@@ -93,20 +100,20 @@ const DAY_FIRST: Form = Form("d/m/yt");
 const MONTH_FIRST: Form = Form("m-d-yt");
 const SHORT_DAY_FIRST: Form = Form("d/m/ut");
 const SHORT_MONTH_FIRST: Form = Form("m-d-ut");
-/// 1871.01 to 1871.09, 1871.1, 1871.11 and 1871.12.
+/// Years with a month after the point: 1871.01 to 1871.09, 1871.1, 1871.11 and 1871.12.
 const DECIMAL_MONTH: Form = Form("y.o");
 const EPOCH: Form = Form("@");
-/// Five digits may be a price: they are dates under a heading of dates alone.
+/// Day numbers of a spreadsheet. Five digits may be a price, so they are dates only under a heading of dates.
 const SERIAL: Form = Form("#");
 pub const YEAR: Form = Form("y");
 
 impl Form {
-    /// Whether its dates could be plain numbers as well.
+    /// Returns true if its dates could also be plain numbers.
     pub fn is_digits(self) -> bool {
         matches!(self.0, "yAB" | "yA" | "y.o" | "@" | "#" | "y")
     }
 
-    /// Whether numbers that could be dates in this form go on as dates do.
+    /// Returns true if numbers that could be dates in this form progress as dates do.
     fn goes_on(self, texts: &[&str]) -> bool {
         let dates = || texts.iter().filter_map(|text| self.date(text)).collect::<Vec<Date>>();
         let months = |date: &Date| 12 * i32::from(date.year()) + i32::from(date.month());
@@ -117,7 +124,7 @@ impl Form {
         }
     }
 
-    /// The day that `text` is in this form, the first of a month or a year, or the last month's of a quarter.
+    /// Returns the day that `text` is in this form: the first of a month or a year, or of the last month of a quarter.
     pub fn date(self, text: &str) -> Option<Date> {
         let (mut year, mut month, mut day, mut week, mut rest) = (0, 1, 1, None, without_weekday(text.trim()));
         match self {
@@ -160,7 +167,7 @@ fn digits(rest: &mut &str, least: usize, most: usize) -> Option<i16> {
     if count < least { None } else { number.parse().ok() }
 }
 
-/// A month by three letters of its name or more; a Spanish `de` may stand on both sides.
+/// Reads a month by at least three letters of its name; a Spanish `de` may come before and after it.
 fn name(rest: &mut &str) -> Option<i16> {
     let start = rest.strip_prefix("de ").unwrap_or(rest);
     let (word, after) = start.split_at(start.find(|letter: char| !letter.is_alphabetic()).unwrap_or(start.len()));
@@ -169,7 +176,7 @@ fn name(rest: &mut &str) -> Option<i16> {
     month_names::month(word)
 }
 
-/// Two digits, or the one that is left of 10.
+/// Reads a month of two digits, or the single digit that is left of 10.
 fn decimal_month(rest: &mut &str) -> Option<i16> {
     if *rest == "1" {
         *rest = "";
@@ -178,7 +185,7 @@ fn decimal_month(rest: &mut &str) -> Option<i16> {
     digits(rest, 2, 2)
 }
 
-/// Without the name of a weekday before the date.
+/// Removes the name of a weekday before the date.
 fn without_weekday(text: &str) -> &str {
     const DAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
     let is_day = |start: &str| DAYS.iter().any(|day| start.eq_ignore_ascii_case(day));
@@ -188,30 +195,30 @@ fn without_weekday(text: &str) -> &str {
     text.trim_start_matches(char::is_alphabetic).trim_start_matches([',', '.', ' '])
 }
 
-/// Whether a heading says that its column holds dates.
+/// Returns true if a heading says that its column holds dates.
 pub fn heads_dates(name: &str) -> bool {
     let plain: String = name.to_lowercase().chars().filter(|letter| letter.is_alphanumeric()).collect();
     HEADINGS.contains(&plain.as_str())
 }
 
-/// The month from 1 that `text` alone names.
+/// Returns the month, from 1, if `text` is the name of one.
 pub fn month(text: &str) -> Option<usize> {
     let mut rest = text.trim();
     let found = name(&mut rest)?;
     usize::try_from(found).ok().filter(|_| rest.is_empty())
 }
 
-/// Tells whether `text` alone can be a year.
+/// Returns true if `text` can be a year.
 pub fn is_year(text: &str) -> bool {
     YEAR.date(text).is_some()
 }
 
-/// Whether `text` alone is a date that nobody would take for a number.
+/// Returns true if `text` is a date that nobody would take for a number.
 pub fn could_be_date(text: &str) -> bool {
     text.len() >= SHORTEST && FORMS.iter().any(|form| !form.is_digits() && form.date(text).is_some())
 }
 
-/// The forms that most of the texts are in, of all that fit them.
+/// Returns the forms that fit the most texts, among all forms that fit enough of them.
 fn best(texts: &[&str]) -> Vec<Form> {
     let share = |form: &Form| {
         let of = |texts: &[&str]| texts.iter().filter(|text| form.date(text).is_some()).count();
@@ -226,22 +233,22 @@ fn best(texts: &[&str]) -> Vec<Form> {
     fitting.into_iter().filter(|(_, share)| *share == most).map(|(form, _)| form).collect()
 }
 
-/// Whether a column holds dates; where it `stands_alone`, years may as well be prices.
+/// Returns true if a column holds dates. If it `stands_alone`, years do not count, because they may be prices.
 pub fn are_dates(texts: &[&str], stands_alone: bool) -> bool {
     !best(texts).is_empty() || (!stands_alone && are_years(texts))
 }
 
-/// Whether a column that is headed as dates holds some that are understood.
+/// Returns true if a column that is headed as dates holds dates that are understood.
 pub fn are_understood(texts: &[&str]) -> bool {
     are_dates(texts, false) || are_serials(texts)
 }
 
-/// Whole numbers that a spreadsheet shows as days, one after the other.
+/// Returns true if all texts are whole numbers that a spreadsheet shows as days, in order.
 fn are_serials(texts: &[&str]) -> bool {
     !texts.is_empty() && texts.iter().all(|text| SERIAL.date(text).is_some()) && SERIAL.goes_on(texts)
 }
 
-/// What numbers that stand for dates are taken for, as a sentence.
+/// Returns a sentence that says how numbers are read as dates.
 pub fn numbered(form: Form, texts: &[&str]) -> Option<String> {
     let what = match form {
         SERIAL => "the day numbers of a spreadsheet",
@@ -253,7 +260,7 @@ pub fn numbered(form: Form, texts: &[&str]) -> Option<String> {
     Some(format!("The dates are {what}: {first} is {}.", told(form.date(first)?, None)))
 }
 
-/// Whole numbers of four digits that go up or down by one.
+/// Returns true for whole numbers of four digits that all go up, or all go down, by one.
 fn are_years(texts: &[&str]) -> bool {
     let years: Option<Vec<i16>> = texts.iter().map(|text| YEAR.date(text).map(Date::year)).collect();
     let Some(years) = years else { return false };
@@ -261,7 +268,7 @@ fn are_years(texts: &[&str]) -> bool {
     steps.next().is_some_and(|first| first.abs() == 1 && steps.all(|step| step == first))
 }
 
-/// The form of a column of dates: asked for where day and month can change places.
+/// Returns the form of a column of dates. If day and month could be swapped, the caller is asked.
 pub fn form(texts: &[&str], said: &Choices) -> Result<Form, Stop> {
     let found = best(texts);
     let first = found.first().copied().unwrap_or(if are_serials(texts) { SERIAL } else { YEAR });
@@ -286,7 +293,7 @@ pub fn form(texts: &[&str], said: &Choices) -> Result<Form, Stop> {
     Err(Stop::asked("day_first", format!("Which day is {doubtful}?"), options))
 }
 
-/// A date in words, as fine as the periods are.
+/// Returns a date in words, to the precision of the frequency.
 pub fn told(date: Date, frequency: Option<Frequency>) -> String {
     let (year, month) = (date.year(), MONTHS[usize::from(date.month().unsigned_abs()) - 1]);
     match frequency {

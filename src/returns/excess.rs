@@ -1,5 +1,5 @@
-//! Returns beyond the bank, as research files have them: what the bank paid is added, as it is the whole return that is advised
-//! on.
+//! Returns in excess of the bank's, as research files have them. The bank's rate is added, because the advice is about
+//! the whole return.
 
 use super::bank::Bank;
 use super::choices::{Choices, Kind};
@@ -7,10 +7,11 @@ use super::heading::ColumnHeading;
 use super::kind::Returns;
 use super::outcome::Stop;
 
-/// The whole returns of the column `name`: asked for where its heading says that they are those beyond the bank.
+/// Returns the whole returns of the column `name`. If its heading names returns in excess of the bank's, the caller is
+/// asked.
 ///
 /// # Errors
-/// It must be asked, there is no column of the bank to add, or a cell of it breaks a rule.
+/// A question, no column of the bank to add, or a cell of that column that breaks a rule.
 pub fn whole(name: &str, returns: Returns, bank: Option<&Bank>, said: &Choices) -> Result<Returns, Stop> {
     let is_return = returns.kind == Kind::Simple || returns.kind == Kind::Log;
     match said.excess {

@@ -1,7 +1,7 @@
-//! What the heading of a column says of its numbers, by its words alone, in any case and in the languages of vendors' files.
+//! The meaning of a column's heading, read from its words alone, in any case and in the languages of vendors' files.
 
-/// Headings of the risky asset before those of `PRICES`, the best first: what counts dividends before what may not. Programs write
-/// these, and nothing is asked beside them.
+/// Headings of the risky asset that are tried before those in `PRICES`, the best first: headings that include dividends
+/// come before those that may not. Programs write these headings, so no question is asked about them.
 const HEADINGS: [&str; 14] = [
     "return",
     "returns",
@@ -18,7 +18,7 @@ const HEADINGS: [&str; 14] = [
     "closelast",
     "price",
 ];
-/// Words of a heading of returns.
+/// Words in a heading of returns.
 const RETURNS: [&str; 15] = [
     "ret",
     "return",
@@ -36,7 +36,7 @@ const RETURNS: [&str; 15] = [
     "rendement",
     "wertentwicklung",
 ];
-/// Words of a heading of prices, and headings of them by themselves, the best first.
+/// Words in a heading of prices. Each may also be the whole heading; the best come first.
 const PRICES: [&str; 11] = [
     "nav",
     "kurs",
@@ -51,7 +51,7 @@ const PRICES: [&str; 11] = [
     "last",
 ];
 const LEVELS: [&str; 4] = ["level", "index", "value", "adj"];
-/// Words of gains since the start of a record.
+/// Words in a heading of gains since the start of a record.
 const CUMULATED: [&str; 10] = [
     "cum",
     "cumul",
@@ -64,15 +64,15 @@ const CUMULATED: [&str; 10] = [
     "kumuliert",
     "kumulierte",
 ];
-/// Words of gains over a span that is not the row's own.
+/// Words in a heading of gains over a span other than the row's own.
 const OTHER_SPAN: [&str; 9] =
     ["ytd", "qtd", "mtd", "trailing", "rolling", "annualized", "annualised", "inception", "itd"];
-/// Words of gains beyond the bank's.
+/// Words in a heading of gains in excess of the bank's.
 const EXCESS: [&str; 7] = ["excess", "xret", "exret", "rmrf", "mktrf", "xsret", "active"];
-/// Currencies that a heading may name beside what it heads.
+/// Currencies that a heading may add to its name.
 const CURRENCIES: [&str; 14] =
     ["usd", "eur", "gbp", "gbx", "chf", "jpy", "cad", "aud", "pln", "sek", "nok", "dkk", "usdt", "btc"];
-/// Headings of prices of a day that are not its last, and of payments beside them.
+/// Headings of prices other than the last one of the day, and of payments that are listed with them.
 const OTHER_PRICES: [&str; 49] = [
     "open",
     "opening",
@@ -124,7 +124,7 @@ const OTHER_PRICES: [&str; 49] = [
     "splits",
     "capitalgains",
 ];
-/// Headings of counts: of pieces, trades or money that changed hands.
+/// Headings of counts of shares or trades, or of the money traded.
 const COUNTS: [&str; 34] = [
     "vol",
     "umsatz",
@@ -162,10 +162,10 @@ const COUNTS: [&str; 34] = [
     "totalvolume",
 ];
 const VOLUMES: [&str; 6] = ["volume", "volumes", "volumen", "wolumen", "volumefrom", "volumeto"];
-/// Factors of research: gains of one portfolio over another.
+/// Research factors: the gain of one portfolio over another.
 const FACTORS: [&str; 6] = ["smb", "hml", "rmw", "cma", "umd", "wml"];
 
-/// The time over which the numbers under a heading are gains, if not since the row before.
+/// The span of the gains under a heading, if it is not the time since the row before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Span {
     SinceStart,
@@ -188,7 +188,8 @@ fn words(name: &str) -> Vec<String> {
     words.map(str::to_owned).collect()
 }
 
-/// A heading without what vendors add to it: `4. close`, `PX_LAST` and `Close (EUR)` are `close`, `last` and `close`.
+/// Returns a heading without what vendors add to it: `4. close`, `PX_LAST` and `Close (EUR)` become `close`, `last` and
+/// `close`.
 pub fn core(name: &str) -> String {
     let mut words = words(name);
     if words.len() > 1 && words[0].bytes().all(|byte| byte.is_ascii_digit()) {
@@ -200,12 +201,13 @@ pub fn core(name: &str) -> String {
     words.concat()
 }
 
-/// Headings of the risky asset, the best first.
+/// Returns the headings of the risky asset, the best first.
 pub fn headings() -> impl Iterator<Item = &'static str> {
     HEADINGS.into_iter().chain(PRICES)
 }
 
-/// The reason why a column of this heading holds neither returns nor prices of an asset, as the end of a sentence.
+/// Returns the reason why a column with this heading holds neither returns nor prices of an asset, as the end of a
+/// sentence.
 pub fn aside(name: &str) -> Option<&'static str> {
     let core = core(name);
     let is = |headings: &[&str]| headings.contains(&core.as_str());
@@ -220,7 +222,7 @@ pub fn aside(name: &str) -> Option<&'static str> {
     }
 }
 
-/// 1Y, 12m or 3yr.
+/// Returns true for a horizon such as 1Y, 12m or 3yr.
 fn is_horizon(word: &str) -> bool {
     let unit = word.trim_start_matches(|letter: char| letter.is_ascii_digit());
     unit.len() < word.len() && ["y", "yr", "m", "mo"].contains(&unit)

@@ -1,4 +1,5 @@
-//! Which rows of the columns that are read have numbers: blank ones around them are left out, and holes among them found.
+//! The rows that have numbers in the columns that are read: blank rows around them are left out, and holes among them
+//! found.
 
 use super::choices::Choices;
 use super::outcome::Stop;
@@ -8,17 +9,17 @@ use super::words::counted;
 /// Rows that have a number in every column that is read.
 pub struct KeptRows {
     pub rows: Vec<usize>,
-    /// Rows among them that lack a number.
+    /// Rows in the same span that lack a number in some column.
     pub holes: Vec<usize>,
-    /// What is left out before and after them, in sentences.
+    /// Sentences about the rows before and after that are left out.
     pub remarks: Vec<String>,
 }
 
 impl KeptRows {
-    /// Columns that begin later than others cut the older end of all.
+    /// Selects the rows that all columns share. A column that begins later than others cuts the older rows of all.
     ///
     /// # Errors
-    /// A column without numbers, or one that ends before the others do.
+    /// A column has no numbers, or ends before the others.
     pub fn of(chosen: &[&Column], is_newest_first: bool) -> Result<Self, Stop> {
         let spans = chosen.iter().map(|column| span(column)).collect::<Result<Vec<_>, Stop>>()?;
         let outer = |of: fn(&(usize, usize)) -> usize| spans.iter().map(of);
@@ -54,10 +55,10 @@ impl KeptRows {
         Ok(KeptRows { rows, holes, remarks })
     }
 
-    /// The remark about holes that are passed over, or the question whether they may be.
+    /// Adds a remark about the holes that are skipped, or asks whether they may be.
     ///
     /// # Errors
-    /// Among returns, and among prices of more than a day, a hole may be a period that is missing.
+    /// Among returns, and among prices that are not daily, a hole may be a missing period, so the caller is asked.
     pub fn check_holes(&mut self, chosen: &[&Column], are_daily_prices: bool, said: &Choices) -> Result<(), Stop> {
         let Some(hole) = self.holes.first().copied() else { return Ok(()) };
         let odd = chosen.iter().find(|column| column.cells[hole].is_missing()).unwrap_or(&chosen[0]);
@@ -76,7 +77,7 @@ impl KeptRows {
     }
 }
 
-/// The first and the last row in which a column has a number.
+/// Returns the first and the last row in which a column has a number.
 fn span(column: &Column) -> Result<(usize, usize), Stop> {
     let is_given = |row: &usize| !column.cells[*row].is_missing();
     let mut given = (0..column.cells.len()).filter(is_given);

@@ -1,8 +1,8 @@
-//! What numbers of a record are: simple returns, log-returns, prices, or what some files have in their stead.
+//! The kind of the numbers in a record: simple returns, log-returns, prices, or forms that some files have instead.
 //!
-//! A heading, percent signs or marks of money say so, or the bulk of the numbers leaves one choice; where it leaves two, a person is
-//! asked. No single number decides: one that cannot be what the others are is refused by its cell. The bounds are those of
-//! investments: returns of a tenth of a percent to a third a period.
+//! A heading, percent signs or marks of money decide, or the bulk of the numbers if it leaves one kind. If it leaves
+//! two, a person is asked. No single number decides: one that does not fit the others is refused by its cell. The
+//! bounds are those of investments: returns of a tenth of a percent to a third a period.
 
 use super::cells::Cell;
 use super::choices::{Choices, Kind, Unit};
@@ -13,53 +13,53 @@ use super::number::{has_percent, money};
 use super::outcome::Stop;
 use super::words::percent;
 
-/// Numbers above zero that average more than this, as a return a period, are rather prices.
+/// If numbers above zero average more than this when read as returns a period, they are more likely prices.
 const LARGEST_MEAN: f64 = 0.2;
-/// More months are no record of an asset: without dates, so many numbers are rather days.
+/// No record of an asset has more months: without dates, more numbers than this are more likely days.
 const MOST_MONTHS: usize = 1300;
 const MONTHS_A_YEAR: f64 = 12.0;
 const DAYS_A_YEAR: f64 = 252.0;
-/// Steps of prices, as logarithms, deviate by at most so much.
+/// The largest deviation of the steps of prices, as logarithms.
 const LARGEST_STEP: f64 = 0.3;
-/// The service's bound on a log-return.
+/// The service's bound on the size of a log-return.
 const LARGEST_LOG_RETURN: f64 = 5.0;
 
 const SINCE_START: &str = "Gains since the start, cumulated";
 
-/// Numbers of one column, oldest first, with the cells they stand in.
+/// Numbers of one column, oldest first, with their cells.
 pub struct Numbers<'a> {
     pub name: &'a str,
     pub values: Vec<f64>,
     pub cells: Vec<&'a Cell<'a>>,
 }
 
-/// What stands beside numbers and tells what they may be.
+/// The facts about a record that help to interpret its numbers.
 pub struct Beside {
-    /// In a year: as the dates say, or else as most likely.
+    /// Periods in a year: as the dates show, or else the most likely number.
     pub periods: f64,
-    /// Whether the dates say so.
+    /// True if the dates show the periods.
     pub is_dated: bool,
-    /// What the bank would pay a year, taken as fractions, where that is more than banks do.
+    /// The bank's rate a year, read as fractions, if it is more than banks pay.
     pub bank: Option<f64>,
 }
 
 impl Beside {
-    /// Beside `count` numbers, with the periods of a year where dates say so.
+    /// Creates the facts for `count` numbers, with the periods in a year if dates show them.
     pub fn of(dated: Option<usize>, count: usize) -> Self {
         let likely = if count > MOST_MONTHS { DAYS_A_YEAR } else { MONTHS_A_YEAR };
         Beside { periods: dated.map_or(likely, |periods| periods as f64), is_dated: dated.is_some(), bank: None }
     }
 
-    /// A period, where it is only likely what one is.
+    /// Returns the noun for a period, if only its likely length is known.
     pub fn noun(&self) -> &'static str {
         if self.periods == DAYS_A_YEAR { "day" } else { "month" }
     }
 }
 
-/// Returns of a period each, as fractions.
+/// Returns by period, as fractions.
 pub struct Returns {
     pub kind: Kind,
-    /// None of prices and of what 1 becomes.
+    /// Unit of the numbers; `None` for prices and for the value that 1 grows to.
     pub unit: Option<Unit>,
     pub simple: Vec<f64>,
     pub logarithmic: Vec<f64>,
@@ -67,7 +67,7 @@ pub struct Returns {
 
 impl Numbers<'_> {
     /// # Errors
-    /// What is asked or refused.
+    /// A question or a refusal.
     pub fn returns(&self, said: &Choices, beside: &Beside) -> Result<Returns, Stop> {
         let signs = self.percent_signs()?;
         let is_money = self.marks_of_money()?;
@@ -85,7 +85,8 @@ impl Numbers<'_> {
         if said.unusual == Some(true) { Ok(returns) } else { self.doubted(returns, beside) }
     }
 
-    /// A percent sign counts for the column; where some cells have one and others none, they cannot mean the same.
+    /// Returns true if the cells have percent signs. If some cells have one and others have none, they cannot mean the
+    /// same, so the first that differs is refused.
     fn percent_signs(&self) -> Result<bool, Stop> {
         let signs = self.cells.first().is_some_and(|cell| has_percent(&cell.text));
         let rule = if signs {
@@ -97,7 +98,7 @@ impl Numbers<'_> {
         odd.map_or(Ok(signs), |odd| Err(odd.refused(self.name, rule)))
     }
 
-    /// Tells whether cells carry a mark of money, which must be one for all.
+    /// Returns true if cells carry a mark of money, which must be the same in all of them.
     fn marks_of_money(&self) -> Result<bool, Stop> {
         let mut marked = self.cells.iter().filter_map(|cell| Some((cell, money(&cell.text)?)));
         let Some((_, first)) = marked.next() else { return Ok(false) };
@@ -107,7 +108,8 @@ impl Numbers<'_> {
         }
     }
 
-    /// By its heading; numbers that are above zero but for odd ones may be prices without one.
+    /// Decides the kind by the heading. Without a heading of prices, numbers that are above zero except for odd ones
+    /// may still be prices.
     fn kind(&self, signs: bool, is_money: bool) -> Result<Kind, Stop> {
         let heading = ColumnHeading::of(self.name);
         if let Some(span) = heading.span {
@@ -127,7 +129,7 @@ impl Numbers<'_> {
                 self.ask_kind("Are these prices, what 1 becomes in a period, or returns that are all above zero?")
             );
         }
-        // An index of total return is no return, though its heading says so.
+        // An index of total return holds no returns, even if its heading says so.
         let as_returns = middle(&self.values) / 100.0 <= LARGEST_MEAN;
         if heading.is_return && as_returns {
             return if is_slow(&self.values) { Err(self.ask_slow()) } else { Ok(Kind::Simple) };
@@ -142,7 +144,7 @@ impl Numbers<'_> {
         }
     }
 
-    /// Tells whether the numbers are above zero, but for odd ones, and for zeros before a listing or after its end.
+    /// Returns true if the numbers are above zero, except for odd ones and for zeros before a listing or after its end.
     fn is_positive(&self) -> bool {
         let given = |value: &f64| *value != 0.0;
         let Some(first) = self.values.iter().position(given) else { return false };
@@ -152,7 +154,7 @@ impl Numbers<'_> {
         not_above == 0 || (not_above <= odd(listed.len()) && self.steps_as_prices())
     }
 
-    /// Tells whether most steps from one number above zero to the next are as small as those of prices.
+    /// Returns true if most steps between consecutive numbers above zero are as small as those of prices.
     fn steps_as_prices(&self) -> bool {
         let steps = self.values.windows(2).filter(|pair| pair[0] > 0.0 && pair[1] > 0.0);
         let steps: Vec<f64> = steps.map(|pair| (pair[1] / pair[0]).ln()).collect();
@@ -203,7 +205,7 @@ impl Numbers<'_> {
         Stop::asked("kind", question, options)
     }
 
-    /// Refuses the cell that cannot be what it is said to be.
+    /// Converts the numbers to returns, and refuses the first cell that cannot be of this kind.
     fn read_as(&self, kind: Kind, unit: Option<Unit>) -> Result<Returns, Stop> {
         let hundred = if unit == Some(Unit::Percent) { 100.0 } else { 1.0 };
         let simple: Vec<f64> = match kind {
@@ -238,18 +240,19 @@ impl Numbers<'_> {
         Ok(Returns { kind, unit, simple, logarithmic })
     }
 
-    /// Refuses the first cell whose value `fails`; returns may be fewer than the cells, whose last they are of.
+    /// Refuses the first cell whose value `fails`. There may be fewer returns than cells; they then belong to the last
+    /// cells.
     fn refuse(&self, values: &[f64], fails: impl Fn(f64) -> bool, rule: &str) -> Result<(), Stop> {
         let from = self.cells.len() - values.len();
         let found = values.iter().position(|value| fails(*value)).map(|index| self.cells[from + index]);
         found.map_or(Ok(()), |cell| Err(cell.refused(self.name, rule)))
     }
 
-    /// Asks whether what is unusual of an asset is right.
+    /// Asks whether numbers that are unusual for an asset are right.
     fn doubted(&self, returns: Returns, beside: &Beside) -> Result<Returns, Stop> {
         let Returns { kind, unit, ref simple, ref logarithmic } = returns;
         let from = self.cells.len() - logarithmic.len();
-        // Who writes logarithms writes crashes as they were.
+        // Log-returns are not checked for jumps: files that hold logarithms record crashes as they were.
         let jump = jump(logarithmic).filter(|_| kind != Kind::Log).map(|index| {
             let (cell, gain) = (self.cells[from + index].called(self.name), percent(simple[index]));
             format!("{cell}: a return of {gain} is far from all others, as after a split or a slip.")
@@ -276,7 +279,7 @@ impl Numbers<'_> {
     }
 }
 
-/// What numbers are, in words.
+/// Returns the kind and unit of numbers, in words.
 pub fn called(kind: Kind, unit: Option<Unit>) -> &'static str {
     match (kind, unit) {
         (Kind::Price, _) => "returns of prices",

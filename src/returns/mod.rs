@@ -1,9 +1,10 @@
-//! Text of returns, as people paste it and programs write it, read into returns: the one reader of the page, of the command
-//! line and of every client.
+//! Reads returns from text that people paste or programs write. The page, the command line and every client use this
+//! one reader.
 //!
-//! Text does not say what its numbers are. What follows from them is taken and told in a sentence; what does not follow is
-//! asked; and a cell that cannot be meant is refused by its line, its column and its value. Nothing is passed over in silence:
-//! an investor who is misread gets wrong advice that looks right. Checked by: `tests/service/returns.rs`.
+//! Text does not say what its numbers are. If their meaning follows from the text, it is used and stated in a sentence;
+//! if it does not follow, the caller is asked. A cell that cannot be right is refused by its line, its column and its
+//! value. Nothing is skipped silently, because a misread record gives wrong advice that looks right. Checked by:
+//! `tests/service/returns.rs`.
 
 mod bank;
 mod cells;
@@ -35,10 +36,11 @@ pub use reading::{Reading, read};
 pub use record::{BankRate, Record, Series};
 pub use sheet::{ColumnFound, Holds};
 
-/// The text of a file: UTF-16 if its first bytes say so, else UTF-8, else Windows-1252, which spreadsheets in Europe save.
+/// Returns the text of a file: UTF-16 if its first bytes say so, else UTF-8, else Windows-1252, which spreadsheets in
+/// Europe save.
 ///
 /// # Errors
-/// What kind of file it is instead, as a sentence.
+/// A sentence that says what kind of file it is instead.
 pub fn decoded(bytes: &[u8]) -> Result<String, String> {
     let units = |of: fn([u8; 2]) -> u16| bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
     let utf_16: Option<Vec<u16>> = match bytes {

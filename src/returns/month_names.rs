@@ -1,6 +1,6 @@
-//! Names of months as English, German, French and Spanish files write them.
+//! Names of months in English, German, French and Spanish files.
 
-/// Without accents and capitals; two spellings stand beside each other.
+/// Names without accents and capitals, with every spelling.
 const NAMES: [&[&str]; 12] = [
     &["january", "januar", "janner", "janvier", "enero"],
     &["february", "februar", "fevrier", "febrero"],
@@ -27,7 +27,7 @@ fn without_accent(letter: char) -> char {
     }
 }
 
-/// The month from 1 that `word` names, by its first three letters or more; `None` if it names none or could name two.
+/// Returns the month from 1 that `word` names by at least three letters, or `None` if it names none or could name two.
 pub fn month(word: &str) -> Option<i16> {
     let count = word.chars().take(LONGEST + 1).count();
     if !(SHORTEST..=LONGEST).contains(&count) {

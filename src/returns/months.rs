@@ -1,14 +1,14 @@
-//! A table of the months of years: a row a year, a column a month, read row by row.
+//! A table with a row for each year and a column for each month, read row by row.
 
 use super::cells::Cell;
 use super::dates::{is_year, month};
 use super::outcome::Stop;
 
 const MONTHS_A_YEAR: usize = 12;
-/// The name of such a table once it is one column.
+/// The heading of such a table's numbers once they are one column.
 const NAME: &str = "Jan to Dec";
 
-/// A heading that names the twelve months, from January on, with the rows below it.
+/// The columns of the year and of January in a table whose heading names the twelve months from January on.
 pub struct MonthsOfYears {
     year: usize,
     january: usize,
@@ -16,7 +16,7 @@ pub struct MonthsOfYears {
 
 impl MonthsOfYears {
     /// # Errors
-    /// There are months, and no column of years beside them.
+    /// There are months, but no column of years before them.
     pub fn of(heading: &[Cell], rows: &[Vec<Cell>]) -> Result<Option<Self>, Stop> {
         let is_month = |(index, cell): (usize, &Cell)| month(&cell.text) == Some(index + 1);
         let is_january = |from: &usize| {
@@ -33,7 +33,7 @@ impl MonthsOfYears {
         }
     }
 
-    /// The months one below the other, the oldest first; a year's own column is left out.
+    /// Puts the months into one column, the oldest first; a column with the year's own return is left out.
     pub fn unfolded<'a>(&self, rows: Vec<Vec<Cell<'a>>>) -> (Vec<Cell<'static>>, Vec<Vec<Cell<'a>>>) {
         let falls =
             rows.first().zip(rows.last()).is_some_and(|(first, last)| first[self.year].text > last[self.year].text);

@@ -1,10 +1,10 @@
-//! Numbers as people and programs write them: either decimal mark, thousands apart or not, a percent sign, any minus
-//! before or after or parentheses in its place, and a mark of money.
+//! Numbers as people and programs write them: with either decimal mark, with or without thousands separators, a percent
+//! sign or a mark of money, and with a minus before or after, or parentheses instead.
 //!
-//! No number here starts with a zero before another digit: 012 is what is left of 0,012 when a comma was taken for something
-//! else, and -0 likewise.
+//! No number starts with a zero before another digit: 012 is what is left of 0,012 if a comma was read as something
+//! else. For the same reason -0 is no number.
 
-/// What may stand between thousands, beside the mark that is not the decimal one.
+/// Letters that may separate thousands, besides the mark that is not the decimal one.
 const APART: [char; 5] = ['\'', '\u{2019}', '\u{a0}', '\u{202f}', ' '];
 
 /// A decimal mark.
@@ -23,7 +23,7 @@ impl Mark {
     }
 }
 
-/// Marks and codes of money, before a number or after it, the longer first.
+/// Marks and codes of money, before or after a number; longer ones come first.
 const MONEY: [&str; 19] = [
     "US$", "CHF", "EUR", "USD", "GBP", "GBX", "JPY", "CAD", "AUD", "SEK", "NOK", "DKK", "PLN", "z\u{142}", "Fr.", "$",
     "\u{20ac}", "\u{a3}", "\u{a5}",
@@ -37,7 +37,8 @@ struct Bare<'a> {
     rest: &'a str,
 }
 
-/// A sign may stand before or after the number or its mark of money, or parentheses around both; a second one is left.
+/// Splits off the sign, the percent sign and the mark of money. A sign may come before or after the number or its mark
+/// of money, or parentheses around both; a second sign is left in the rest.
 fn bare(text: &str) -> Bare<'_> {
     let without_percent = |text: &'_ str| -> usize { text.strip_suffix('%').map_or(text, str::trim_end).len() };
     let text = text.trim();
@@ -78,12 +79,12 @@ fn bare(text: &str) -> Bare<'_> {
     Bare { is_negative, money: before.or(after), rest }
 }
 
-/// The mark of money that `text` carries.
+/// Returns the mark of money in `text`.
 pub fn money(text: &str) -> Option<&'static str> {
     bare(text).money
 }
 
-/// The digits and marks of `text`.
+/// Returns the digits and marks of `text`.
 pub fn significant(text: &str) -> &str {
     bare(text).rest
 }
@@ -92,7 +93,7 @@ fn is_digits(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// The number that `text` is by this decimal mark, infinite where it is beyond all numbers; `None` where it is none. A percent
+/// Reads `text` as a number with this decimal mark: infinite if it overflows, and `None` if it is no number. A percent
 /// sign does not divide it.
 pub fn number(text: &str, mark: Mark) -> Option<f64> {
     let Bare { is_negative, rest, .. } = bare(text);
@@ -124,12 +125,12 @@ pub fn number(text: &str, mark: Mark) -> Option<f64> {
     is_whole.then(plain)?.parse().ok()
 }
 
-/// Whether `text` is a number by one mark or the other.
+/// Returns true if `text` is a number with either decimal mark.
 pub fn is_number(text: &str) -> bool {
     number(text, Mark::Point).or_else(|| number(text, Mark::Comma)).is_some()
 }
 
-/// Whether `text` is meant as a number, well formed or not: digits and marks alone.
+/// Returns true if `text` is meant as a number, well formed or not: it holds digits and marks alone.
 pub fn looks_numeric(text: &str) -> bool {
     let rest = significant(text);
     let (digits, exponent) = rest.split_once(['e', 'E']).unwrap_or((rest, "0"));
@@ -139,8 +140,8 @@ pub fn looks_numeric(text: &str) -> bool {
         && is_digits(exponent.strip_prefix(['+', '-']).unwrap_or(exponent))
 }
 
-/// Splits a number with a part after its point off a mark of one to three letters or symbols before or after it, as amounts of a
-/// currency have one and labels do not: the mark, and the number.
+/// Splits a number off a mark of one to three letters or symbols before or after it: returns the mark and the number.
+/// The number must have a decimal or thousands mark, because amounts of a currency have one and labels do not.
 pub fn marked(text: &str) -> Option<(&str, &str)> {
     let start = text.find(|letter: char| letter.is_ascii_digit() || matches!(letter, '-' | '+' | '.'))?;
     let end = text.rfind(|letter: char| letter.is_ascii_digit())? + 1;

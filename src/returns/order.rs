@@ -10,11 +10,11 @@ use super::record::Order;
 use super::sheet::Column;
 use crate::control::request::frequency::Frequency;
 
-/// Rows that go down in time are turned round; rows that go neither way, a date given twice and a date of another form are
-/// refused; and where periods are missing between them it is asked whether that is right.
+/// Orders the rows from oldest to newest; `times` are the hours of the rows, if a column has them. Rows that fall in
+/// time are reversed. If periods are missing between rows, the caller is asked whether that is right.
 ///
 /// # Errors
-/// What is asked or refused; `times` are the hours of the rows, if a column has them.
+/// A question, or a refusal of rows that are in no order, a date given twice, or a date in another form.
 pub fn ordered(column: Option<&Column>, times: Option<&Column>, rows: &[usize], said: &Choices) -> Result<Order, Stop> {
     let undated = Order { dates: None, is_turned: said.newest_first == Some(true), frequency: None, remark: None };
     let Some(column) = column else { return Ok(undated) };
@@ -49,7 +49,7 @@ pub fn ordered(column: Option<&Column>, times: Option<&Column>, rows: &[usize], 
     Ok(Order { remark: numbered(form, &written), dates: Some(dates), is_turned, frequency })
 }
 
-/// Whether the newest row comes first, as far as dates or what is said tell.
+/// Returns true if the newest row comes first, as far as the dates or the choices tell.
 pub fn is_newest_first(column: Option<&Column>, said: &Choices) -> bool {
     let Some(column) = column else { return said.newest_first == Some(true) };
     let given = given(column);
@@ -81,7 +81,7 @@ fn ask_the_end(given: &[&str]) -> Stop {
 }
 
 /// # Errors
-/// Rows of one day that differ by the hour.
+/// Two rows are of one day and differ by the hour.
 fn check_days(column: &Column, cells: &[&Cell], dates: &[Date], times: &[&Cell]) -> Result<(), Stop> {
     let is_time = |cell: &Cell| cell.text.contains(':') || cell.text.bytes().all(|byte| byte.is_ascii_digit());
     let is_finer = |index: &usize| {
@@ -97,7 +97,7 @@ fn check_days(column: &Column, cells: &[&Cell], dates: &[Date], times: &[&Cell])
 }
 
 /// # Errors
-/// A row that is not in the order of the others, or is of the same day.
+/// A row is not in the order of the others, or has the same date as the row before.
 fn check_order(column: &Column, cells: &[&Cell], dates: &[Date], is_turned: bool) -> Result<(), Stop> {
     let broken = |pair: &[Date]| if is_turned { pair[1] >= pair[0] } else { pair[1] <= pair[0] };
     let Some(at) = dates.windows(2).position(broken) else { return Ok(()) };

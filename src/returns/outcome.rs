@@ -1,45 +1,45 @@
-//! The two ways in which a reading stops short: a question, and a refusal.
+//! The two ways in which a reading stops early: a question and a refusal.
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::choices::Choices;
 
-/// What cannot be told from the text.
+/// A question about something that the text leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Question {
-    /// The choice that is asked for, as `choices` names it.
+    /// The choice that the question asks for, by its name in `choices`.
     pub asks: &'static str,
-    /// In words.
+    /// The question in words.
     pub question: String,
-    /// Each of them settles it.
+    /// The possible answers; each of them settles the question.
     pub options: Vec<Answer>,
 }
 
 /// One answer to a question.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Answer {
-    /// In words.
+    /// The answer in words.
     pub label: String,
-    /// What to add to `choices`.
+    /// The choices to add to `choices`.
     pub choices: Choices,
-    /// What would be read, where that is one thing.
+    /// The record that this answer would give, in a sentence, if it gives one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sentence: Option<String>,
 }
 
-/// Where in the text something is wrong.
+/// The place of an error in the text.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Place {
-    /// From 1.
+    /// Line, from 1.
     pub line: usize,
-    /// From 1: of the fields of the line.
+    /// Field of the line, from 1.
     pub column: usize,
-    /// What stands there, shortened where it is long.
+    /// The value at this place, shortened if it is long.
     pub value: String,
 }
 
-/// Why there is no reading.
+/// The reason why there is no reading.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Stop {
     Asked(Vec<Question>),
@@ -51,7 +51,7 @@ impl Stop {
         Stop::Refused { sentence: sentence.into(), place: None }
     }
 
-    /// Names the column in what does not name its cell.
+    /// Adds the name of the column to a sentence that does not name one already.
     pub fn about(self, column: &str) -> Self {
         match self {
             Stop::Refused { sentence, place: None } if !names_a_column(&sentence) => {
@@ -78,7 +78,7 @@ fn names_a_column(sentence: &str) -> bool {
     sentence.starts_with("Column ") || sentence.starts_with("line ")
 }
 
-/// Both results, and the questions of both where both ask; a refusal counts before a question.
+/// Returns both results. If both are questions, returns the questions of both; a refusal goes before a question.
 pub(super) fn both<A, B>(one: Result<A, Stop>, other: Result<B, Stop>) -> Result<(A, B), Stop> {
     match (one, other) {
         (Ok(one), Ok(other)) => Ok((one, other)),

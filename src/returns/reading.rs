@@ -1,4 +1,4 @@
-//! A text in, one reading out: what was read, what must be asked, or what is refused.
+//! Turns a text into one reading: a record, questions, or a refusal.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -16,37 +16,37 @@ use super::record::{Found, Order, Record};
 use super::sheet::{Column, ColumnFound, Holds, Sheet};
 use crate::control::request::frequency::Frequency;
 
-/// What a service takes.
+/// The fewest returns that the service accepts.
 const FEWEST: usize = 2;
-/// Of a text and all that is tried on it to tell what an option would mean, in bytes.
+/// The most bytes of text that are read again to describe what each option of a question would give.
 const TRIED: usize = 8_000_000;
-/// Questions that may follow from an answer.
+/// The most rounds of questions that may follow from an answer.
 const ROUNDS: usize = 6;
 
-/// What is made of a text.
+/// The outcome of reading a text.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "outcome", rename_all = "snake_case")]
 pub enum Reading {
-    /// It is this record.
+    /// The text is this record.
     Read(Record),
-    /// It may be several.
+    /// The text may be several records.
     Asked {
-        /// What would settle it.
+        /// The questions whose answers decide which record it is.
         questions: Vec<Question>,
-        /// The columns, where they are known.
+        /// The columns, if they are known.
         columns: Vec<ColumnFound>,
     },
-    /// It is none.
+    /// The text is no record.
     Refused {
-        /// What is wrong, and where.
+        /// A sentence that says what is wrong, and where.
         sentence: String,
-        /// Where it is wrong, if at one place.
+        /// The place of the error, if it is at one place.
         #[serde(skip_serializing_if = "Option::is_none")]
         place: Option<Place>,
     },
 }
 
-/// Reads `text`, with what was `said` of it. At most 8 MB of text are looked at, in time that grows as they do.
+/// Reads `text`, given the choices in `said`. Reads at most 8 MB of text, in time proportional to its length.
 pub fn read(text: &str, said: &Choices) -> Reading {
     let (outcome, columns) = outcome(text, said);
     match outcome {
@@ -63,7 +63,7 @@ pub fn read(text: &str, said: &Choices) -> Reading {
     }
 }
 
-/// What would be read after an answer, with the first answer to whatever else is asked.
+/// Returns the sentence of the record that an answer leads to, taking the first option of every further question.
 fn meaning(text: &str, said: &Choices, option: &Answer) -> Option<String> {
     let mut said = said.with(&option.choices);
     for _ in 0..ROUNDS {
@@ -96,7 +96,7 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
     if kept.rows.len() < FEWEST {
         return Err(Stop::refused("One number is no record of returns: at least two are needed."));
     }
-    // Whether holes may be is asked before whether periods that are missing with them may be.
+    // The question about holes comes before the one about the periods that are missing because of them.
     let lenient = Choices { gaps: Some(true), ..said.clone() };
     let order = ordered(dates, sheet.times(), &kept.rows, if kept.holes.is_empty() { said } else { &lenient });
     let is_turned = order.as_ref().is_ok_and(|order| order.is_turned);
@@ -152,7 +152,7 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
     Ok(found.record(sheet.found()))
 }
 
-/// Columns that are read together are of one kind and in one unit.
+/// Requires columns that are read together to be of one kind and in one unit.
 fn alike(chosen: &[&Column], returns: &[Returns], said: &Choices) -> Result<(), Stop> {
     let first = &returns[0];
     let other = |differs: &dyn Fn(&Returns) -> bool| returns.iter().position(differs);

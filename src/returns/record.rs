@@ -1,4 +1,4 @@
-//! What was read, and the sentence by which a person checks it.
+//! The record that was read, and the sentence by which a person checks it.
 
 use jiff::civil::Date;
 use serde::{Serialize, Serializer};
@@ -16,67 +16,67 @@ use crate::control::request::frequency::Frequency;
 /// Returns of one asset or several, oldest first.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Record {
-    /// What was read, for a person to check.
+    /// A sentence about the record, for a person to check.
     pub sentence: String,
-    /// All that the text has.
+    /// All columns of the text.
     pub columns: Vec<ColumnFound>,
-    /// Those that were read, all of one length.
+    /// The columns that were read, all of one length.
     pub series: Vec<Series>,
-    /// Returns there are, of which `latest` may have taken fewer.
+    /// The number of returns in the text; the series hold fewer if `latest` limits them.
     pub count: usize,
-    /// When each period ended, in ISO 8601, as fine as the frequency; absent where no dates were understood.
+    /// The end of each period in ISO 8601, to the precision of the frequency; absent if no dates were understood.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dates: Option<Vec<String>>,
-    /// `daily`, `weekly`, `monthly`, `quarterly` or `yearly`, where the dates say so.
+    /// `daily`, `weekly`, `monthly`, `quarterly` or `yearly`, if the dates show it.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "in_a_word")]
     #[schema(value_type = Option<String>)]
     pub frequency: Option<Frequency>,
-    /// How many periods make a year, where the dates say so.
+    /// Periods in a year, if the dates show it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<usize>,
-    /// Whether the first row was the newest, so that the rows are turned round: as their dates tell, or as it was said where
-    /// there are none.
+    /// True if the first row was the newest, so that the rows were reversed. The dates decide this, or the choice
+    /// `newest_first` if there are no dates.
     pub newest_first: bool,
-    /// What the bank paid, where a column says so.
+    /// The rates that the bank paid, if a column holds them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<BankRate>,
-    /// What was changed or passed over, in sentences; the last of `sentence`.
+    /// Sentences about anything that was changed or left out; `sentence` ends with them.
     pub remarks: Vec<String>,
 }
 
 /// Returns of one asset.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Series {
-    /// The name of its column; empty where the text is one run of numbers.
+    /// The name of its column; empty if the text is one run of numbers.
     pub column: String,
-    /// What the column holds.
+    /// The kind of the numbers in the column.
     pub kind: Kind,
-    /// What it is counted in; absent of prices.
+    /// The unit of the numbers; absent for prices.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
-    /// Returns as the service takes them.
+    /// Log-returns, as the service accepts them.
     pub log_returns: Vec<f64>,
-    /// The same as simple returns, as fractions.
+    /// Simple returns of the same periods, as fractions.
     #[serde(skip)]
     pub simple_returns: Vec<f64>,
     /// Mean of the simple returns of a period.
     pub mean: f64,
-    /// Their standard deviation.
+    /// Standard deviation of the simple returns of a period.
     pub deviation: f64,
-    /// Mean of a year, compounded: `(1 + mean)^p - 1` of p periods.
+    /// Mean per year, compounded: `(1 + mean)^p - 1` with p periods a year.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_per_year: Option<f64>,
-    /// Deviation times the square root of the periods of a year.
+    /// Deviation times the square root of the periods in a year.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation_per_year: Option<f64>,
 }
 
-/// What the bank paid in each period, as fractions.
+/// The rate that the bank paid in each period, as a fraction.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct BankRate {
     /// The name of the column.
     pub column: String,
-    /// In the order of the returns.
+    /// Rates in the order of the returns.
     pub rates: Vec<f64>,
 }
 
@@ -84,39 +84,39 @@ fn in_a_word<S: Serializer>(frequency: &Option<Frequency>, serializer: S) -> Res
     frequency.map(Frequency::adjective).serialize(serializer)
 }
 
-/// How the rows are ordered, and how that was known.
+/// The order of the rows, and how it was found.
 pub struct Order {
-    /// Oldest first.
+    /// Dates, oldest first.
     pub dates: Option<Vec<Date>>,
-    /// Whether the newest row came first.
+    /// True if the newest row came first.
     pub is_turned: bool,
     pub frequency: Option<Frequency>,
-    /// What numbers that stand for dates are taken for.
+    /// A sentence that says how numbers were read as dates.
     pub remark: Option<String>,
 }
 
 impl Order {
-    /// Where the dates say so.
+    /// Returns the periods in a year, if the dates show it.
     pub fn periods_per_year(&self) -> Option<usize> {
         self.frequency.zip(self.dates.as_ref()).map(|(frequency, dates)| frequency.periods_per_year(dates))
     }
 }
 
-/// What was found in the columns that are read.
+/// The contents of the columns that are read.
 pub struct Found {
     pub names: Vec<String>,
     pub order: Order,
-    /// Of each column, all of one length.
+    /// Returns by column, all of one length.
     pub returns: Vec<Returns>,
     pub rate: Option<BankRate>,
-    /// The last returns that count.
+    /// The number of latest returns to use.
     pub used: usize,
-    /// What was passed over, in sentences.
+    /// Sentences about what was left out.
     pub remarks: Vec<String>,
 }
 
 impl Found {
-    /// The last periods, and the sentence that tells what they are.
+    /// Returns the record of the latest periods, with the sentence that describes it.
     pub fn record(self, columns: Vec<ColumnFound>) -> Record {
         let Found { names, order, returns, rate, used, remarks } = self;
         let (count, periods_per_year) = (returns[0].simple.len(), order.periods_per_year());
@@ -144,7 +144,7 @@ impl Found {
 }
 
 impl Series {
-    /// What its column holds, in words.
+    /// Returns the kind and unit of its column, in words.
     pub fn what(&self) -> &'static str {
         called(self.kind, self.unit)
     }
@@ -161,7 +161,7 @@ impl Series {
 }
 
 impl Record {
-    /// "240 monthly simple returns in percent, January 1999 to December 2018, as in column market."
+    /// Returns for example "240 monthly simple returns in percent, January 1999 to December 2018, as in column market."
     fn what(&self, span: Option<(Date, Date)>) -> String {
         let used = self.series[0].log_returns.len();
         let latest = if used < self.count { format!("The latest {used} of {}", self.count) } else { used.to_string() };
@@ -186,7 +186,7 @@ impl Record {
         format!("{latest}{adjective} {what}{span}{place}{turned}.")
     }
 
-    /// "Mean 0.51 % and deviation 4.30 % a month, 6.29 % and 14.90 % a year."
+    /// Returns for example "Mean 0.51 % and deviation 4.30 % a month, 6.29 % and 14.90 % a year."
     fn figures(&self) -> Vec<String> {
         let noun = self.frequency.map_or("period", Frequency::noun);
         let of = |series: &Series| {

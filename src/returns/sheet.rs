@@ -1,6 +1,7 @@
-//! What the columns of a text are: dates, returns or prices, what the bank pays, or neither.
+//! The contents of the columns of a text: dates, returns or prices, the bank's rates, or none of these.
 //!
-//! A heading counts by its letters and digits alone, in any case: `Adj Close`, `adj_close` and `ADJ CLOSE` are one.
+//! Headings are compared by their letters and digits alone, in any case: `Adj Close`, `adj_close` and `ADJ CLOSE` are
+//! equal.
 
 use std::collections::HashSet;
 
@@ -17,32 +18,32 @@ use super::outcome::Stop;
 use super::table::Table;
 use super::words::counted;
 
-/// Headings of the bank.
+/// Headings of the bank's rates.
 const BANKS: [&str; 6] = ["riskfreereturn", "riskfreerate", "riskfree", "bankreturn", "rf", "rate"];
-/// Columns that a question shows.
+/// The most columns that a question lists.
 const OFFERED: usize = 50;
 const MOST_COLUMNS: usize = 1000;
 
-/// What a column holds.
+/// The contents of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Holds {
-    /// When the periods ended.
+    /// The ends of the periods.
     Dates,
     /// Returns or prices.
     Values,
-    /// What the bank pays.
+    /// The bank's rates.
     Rate,
-    /// Words, the numbers of the rows, or dates beside the dates.
+    /// Words, row numbers, or further dates.
     Other,
 }
 
 /// A column that was found.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ColumnFound {
-    /// Its heading, or its number; empty where the text is one run of numbers.
+    /// The heading of the column, or its number; empty if the text is one run of numbers.
     pub name: String,
-    /// What it holds.
+    /// The contents of the column.
     pub holds: Holds,
 }
 
@@ -58,7 +59,7 @@ impl Column<'_> {
         self.cells.iter().map(|cell| cell.text.as_ref()).collect()
     }
 
-    /// The cells of some rows.
+    /// Returns the cells of these rows.
     pub fn at(&self, rows: &[usize]) -> Vec<&Cell<'_>> {
         rows.iter().map(|row| &self.cells[*row]).collect()
     }
@@ -67,14 +68,14 @@ impl Column<'_> {
         self.cells.iter().filter(|cell| !cell.is_missing()).map(|cell| cell.text.as_ref()).collect()
     }
 
-    /// Whether most cells are meant as numbers, those of a currency that is not known among them.
+    /// Returns true if most cells are meant as numbers, including amounts in a currency that is not known.
     fn is_mostly_numbers(&self) -> bool {
         let given = self.given();
         let is_meant = |text: &&&str| looks_numeric(text) || is_number(text) || marked(text).is_some();
         2 * given.iter().filter(is_meant).count() > given.len()
     }
 
-    /// The first cell that is no number, refused.
+    /// Returns the refusal of the first cell that is no number.
     fn unread(&self) -> Stop {
         let is_odd = |cell: &&Cell| !cell.is_missing() && !is_number(&cell.text);
         match self.cells.iter().find(is_odd) {
@@ -83,24 +84,24 @@ impl Column<'_> {
         }
     }
 
-    /// Words with digits, another in every row: dates in a form that is not known here, most likely.
+    /// Returns true if every cell has a digit and no two are equal: most likely dates in an unknown form.
     fn is_labels(&self) -> bool {
         let texts = self.texts();
         let distinct: HashSet<&str> = texts.iter().copied().collect();
         distinct.len() == texts.len() && texts.iter().all(|text| text.contains(|letter: char| letter.is_ascii_digit()))
     }
 
-    /// Whether the column only counts: 0, 1, 2 and so on, as spreadsheets and programs number their rows.
+    /// Returns true if the column only counts from 0 or 1, as spreadsheets and programs number their rows.
     fn counts(&self) -> bool {
         let from = self.cells.first().and_then(|cell| cell.text.parse::<usize>().ok()).filter(|from| *from <= 1);
         from.is_some_and(|from| self.cells.iter().zip(from..).all(|(cell, row)| cell.text == row.to_string()))
     }
 }
 
-/// A text as columns of one length.
+/// A text split into columns of one length.
 pub struct Sheet<'a> {
     pub columns: Vec<Column<'a>>,
-    /// What was passed over, in sentences.
+    /// Sentences about what was left out.
     pub remarks: Vec<String>,
 }
 
@@ -110,7 +111,7 @@ pub fn plain(name: &str) -> String {
 
 impl<'a> Sheet<'a> {
     /// # Errors
-    /// Lines of different lengths, no numbers, or it is not clear whether they are columns.
+    /// Lines have different lengths, there are no numbers, or it is unclear whether the numbers form columns.
     pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
         let Rows { rows, remarks: lines } = Rows::of(text, said)?;
         let Table { heading, rows, mut remarks } = Table::of(rows)?;
@@ -140,7 +141,7 @@ impl<'a> Sheet<'a> {
         self.columns.iter().find(|column| column.holds == holds)
     }
 
-    /// The column that says the hour of each row, as in 09:30.
+    /// Returns the column that holds the time of day of each row, as in 09:30.
     pub fn times(&self) -> Option<&Column<'a>> {
         let is_time = |text: &&str| text.len() <= 8 && text.find(':').is_some_and(|at| (1..=2).contains(&at));
         let holds_times = |column: &&Column| {
@@ -150,7 +151,7 @@ impl<'a> Sheet<'a> {
         self.columns.iter().find(holds_times)
     }
 
-    /// The columns that are read: those said, the one whose heading is the best, or the only one there is.
+    /// Returns the columns to read: the chosen ones, the one with the best heading, or the only one.
     pub fn chosen(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
         let chosen = self.meant(said)?;
         match chosen.iter().find_map(|column| Some((column, aside(&column.name)?))) {
@@ -172,7 +173,7 @@ impl<'a> Sheet<'a> {
                 None => Ok(named),
             };
         }
-        // No other column stands in for one whose heading is known.
+        // If a heading is known, no other column replaces its column.
         if let Some(best) = self.best() {
             return if best.holds == Holds::Values { Ok(vec![best]) } else { Err(best.unread()) };
         }
@@ -184,7 +185,7 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// The column of the best known heading; a blank one only where there is no other.
+    /// Returns the column with the best known heading; a blank column only if there is no other.
     fn best(&self) -> Option<&Column<'a>> {
         let may_be = |column: &&Column| column.holds == Holds::Values || column.holds == Holds::Other;
         let of = |is_blank: bool| {
@@ -220,7 +221,7 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// Numbers one after the other, line by line.
+/// Reads numbers one after the other, line by line.
 fn run<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<Column<'a>, Stop> {
     let name = heading.and_then(|heading| heading.first().map(|cell| cell.text.to_string())).unwrap_or_default();
     let cells: Vec<Cell> = rows.into_iter().flatten().filter(|cell| !cell.text.is_empty()).collect();
@@ -268,7 +269,7 @@ fn columns<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<V
     Ok(columns)
 }
 
-/// Says of each column what it holds.
+/// Decides the contents of each column.
 fn judge(columns: &mut [Column]) {
     let is_date = |column: &Column| {
         let given = column.given();
@@ -276,7 +277,7 @@ fn judge(columns: &mut [Column]) {
         !given.is_empty() && headings().all(|heading| heading != core) && are_dates(&given, false)
     };
     let is_dates: Vec<bool> = columns.iter().map(is_date).collect();
-    // What looks like dates in no known form is set aside where nothing else is dates.
+    // A column that looks like dates in no known form is set aside only if no other column holds dates.
     let named = |column: &Column| heads_dates(&column.name) || (!column.is_mostly_numbers() && column.is_labels());
     let dates = is_dates.iter().position(|is| *is).or_else(|| columns.iter().position(&named));
     let is_numbers = |(column, is_dates): (&Column, &bool)| {

@@ -1,7 +1,7 @@
-//! The one table of a text: its headings and rows, and what stands above, between and below them.
+//! The one table of a text: its headings and rows, and the lines above, between and below them.
 //!
-//! Rows of a table begin with dates in one form, line after line. What is above the headings and below the last row is
-//! left out and named; a row that only looks odd stays, so that it is refused and not passed over.
+//! Rows of a table begin with dates in one form, line after line. Lines above the headings and below the last row are
+//! left out and named. A row that only looks odd stays, so that it is refused and not skipped.
 
 use jiff::civil::Date;
 
@@ -14,10 +14,10 @@ use super::words::counted;
 
 type Row<'a> = Vec<Cell<'a>>;
 
-/// Columns in which dates are looked for, and rows by which a form is known to occur in one.
+/// The number of columns that are searched for dates, and of rows in which a form must occur at least once.
 const COLUMNS: usize = 8;
 const FIRST: usize = 200;
-/// First words of rows that sum up others.
+/// First words of rows that summarise others.
 const TOTALS: [&str; 30] = [
     "total",
     "sum",
@@ -50,17 +50,17 @@ const TOTALS: [&str; 30] = [
     "suma",
     "copyright",
 ];
-/// What a row of dates has in the place of a price, after a number.
+/// Words that a dated row has instead of a price, after a number.
 const EVENTS: [&str; 2] = ["dividend", "split"];
 
-/// A table, and sentences about what is left out around it.
+/// A table, and sentences about the lines around it that are left out.
 pub struct Table<'a> {
     pub heading: Option<Row<'a>>,
     pub rows: Vec<Row<'a>>,
     pub remarks: Vec<String>,
 }
 
-/// Rows one after the other that have a date of one form in one column.
+/// Consecutive rows that have a date in one form in one column.
 struct Block {
     column: usize,
     form: Form,
@@ -73,7 +73,7 @@ struct Block {
 
 impl<'a> Table<'a> {
     /// # Errors
-    /// There are no numbers, or lines that are no rows part the table.
+    /// There are no numbers, or lines that are no rows split the table.
     pub fn of(rows: Vec<Row<'a>>) -> Result<Self, Stop> {
         if !rows.iter().flatten().any(|cell| has_digit(&cell.text)) {
             let word = rows.iter().flatten().find(|cell| !cell.text.is_empty()).map_or(String::new(), Cell::shown);
@@ -88,7 +88,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// What parts the rows of `block` from the lines around them.
+/// Splits the rows of `block` from the lines around them.
 fn dated<'a>(mut rows: Vec<Row<'a>>, block: &Block) -> Result<Table<'a>, Stop> {
     let mut remarks = Vec::new();
     let after = rows.split_off(block.end);
@@ -116,7 +116,7 @@ fn dated<'a>(mut rows: Vec<Row<'a>>, block: &Block) -> Result<Table<'a>, Stop> {
     Ok(Table { heading: joined(levels, block.column), rows: body, remarks })
 }
 
-/// Without dates the last of the lines that hold words alone is the heading.
+/// Builds a table without dates: the last of the first lines that hold words alone is the heading.
 fn undated(mut rows: Vec<Row>) -> Table {
     let words = rows.iter().take_while(|row| row.iter().all(is_word)).count();
     let mut remarks = Vec::new();
@@ -130,7 +130,7 @@ fn undated(mut rows: Vec<Row>) -> Table {
     Table { heading, rows, remarks }
 }
 
-/// The first row names the columns if it holds words alone, or nothing above a column of dates.
+/// Returns true if the first row names the columns: it holds words alone, or has a blank cell above a column of dates.
 fn is_heading(rows: &[Row]) -> bool {
     let [first, rest @ ..] = rows else { return false };
     let below =
@@ -139,7 +139,7 @@ fn is_heading(rows: &[Row]) -> bool {
     !rest.is_empty() && (first.iter().all(is_word) || first.iter().enumerate().any(is_above_dates))
 }
 
-/// Whether a cell can be a part of a heading.
+/// Returns true if a cell can be part of a heading.
 fn is_word(cell: &Cell) -> bool {
     let has_letters = cell.text.is_empty() || cell.text.contains(char::is_alphabetic);
     has_letters
@@ -160,7 +160,7 @@ fn filled(row: &Row) -> usize {
     row.iter().filter(|cell| !cell.text.is_empty()).count()
 }
 
-/// The cell of a row that tells of a dividend or a split instead of a price.
+/// Returns the cell of a row that records a dividend or a split instead of a price.
 fn event<'r, 'a>(row: &'r Row<'a>) -> Option<&'r Cell<'a>> {
     row.iter().find(|cell| {
         let text = cell.text.to_ascii_lowercase();
@@ -173,7 +173,7 @@ fn is_total(text: &str) -> bool {
     TOTALS.contains(&word.as_str())
 }
 
-/// "Lines 1 to 3 before the table are left out, from "Fund: Northern Lights" on."
+/// Returns for example "Lines 1 to 3 before the table are left out, from "Fund: Northern Lights" on."
 fn left_out(rows: &[Row], place: &str) -> String {
     let line = |row: Option<&Row>| row.and_then(|row| row.first()).map_or(0, Cell::line);
     let (first, last) = (line(rows.first()), line(rows.last()));
@@ -184,7 +184,8 @@ fn left_out(rows: &[Row], place: &str) -> String {
     format!("Lines {first} to {last} {place} are left out, from {words:?} on.")
 }
 
-/// A second table has rows of its own: a number or a date, and a number beside it.
+/// Describes the lines after the table. They are a second table if two rows have a number or a date, and a number next
+/// to it.
 fn told_after(after: &[Row]) -> String {
     let is_row = |row: &&Row| {
         let starts = row.first().is_some_and(|cell| has_digit(&cell.text) && !is_total(&cell.text));
@@ -198,7 +199,7 @@ fn told_after(after: &[Row]) -> String {
 }
 
 impl Block {
-    /// The longest of all in the text; of equal ones the first form and the first column.
+    /// Finds the longest block in the text; of equal ones, the first form and the first column win.
     fn longest(rows: &[Row]) -> Option<Self> {
         let width = rows.iter().map(Vec::len).max().filter(|width| *width > 1)?;
         let numbers: Vec<usize> = rows.iter().map(numbers).collect();
@@ -210,8 +211,8 @@ impl Block {
                 if !rows.iter().take(FIRST).any(occurs) {
                     continue;
                 }
-                // Years are numbers as others are, unless most rows have one.
-                // Numbers are dates only if nearly all rows have one, and years only if those are most of the text.
+                // Numbers are dates only if nearly all rows of the block have one, and years only if they are most of
+                // the text.
                 let is_most = |found: &Block| {
                     let share = found.count as f64 / (found.end - found.start) as f64;
                     (!form.is_digits() || share >= IN_DIGITS) && (form != YEAR || 2 * found.count >= numeric)
@@ -241,7 +242,8 @@ impl Block {
         longer(best, current)
     }
 
-    /// Whether a row of so many numbers has one beside what stands in the place of the date, which may be one in another form.
+    /// Returns true if a row with `numbers` numbers has one besides its cell in the date column, which may be a date in
+    /// another form.
     fn is_misdated(&self, row: &Row, numbers: usize) -> bool {
         let is_one = |cell: &Cell| has_digit(&cell.text) && !is_total(&cell.text);
         let date = row.get(self.column).filter(|cell| is_one(cell));
@@ -249,7 +251,7 @@ impl Block {
     }
 
     /// # Errors
-    /// Rows go on below the first line that is none.
+    /// Rows of the table continue below the first line that is not a row.
     fn check_end(&self, first: &Row, after: &[Row]) -> Result<(), Stop> {
         let date = |row: &Row| Some((self.form.date(&row.get(self.column)?.text)?, row[self.column].line()));
         let Some((next, line)) = after.iter().filter(|row| row.len() > 1).find_map(date) else { return Ok(()) };
@@ -261,11 +263,12 @@ impl Block {
         Err(cell.refused("", &rule))
     }
 
-    /// How many of the last rows before the table are its headings, one above the other.
+    /// Counts the last rows before the table that are its headings, one above the other.
     fn levels(&self, before: &[Row], width: usize) -> usize {
         let is_words = |row: &Row| row.iter().all(is_word) && (filled(row) > 1 || width < 2);
         let Some(last) = before.last() else { return 0 };
-        // The name of the dates alone, or above them that or nothing: what the other columns are called may be a number.
+        // A row is also a heading if only the dates have a name, or if its cell above the dates has their name or is
+        // blank. The names of other columns may then be numbers.
         let is_index = row_is_index(last, self.column) && last.len() == width;
         let heads = |cell: &Cell| cell.text.is_empty() || heads_dates(&cell.text);
         let is_headed = last.len() == width && filled(last) > 0 && last.get(self.column).is_some_and(heads);
@@ -285,7 +288,7 @@ impl Block {
     }
 }
 
-/// Whether only the column of dates is named.
+/// Returns true if only the column of dates is named.
 fn row_is_index(row: &Row, column: usize) -> bool {
     filled(row) == 1 && row.get(column).is_some_and(|cell| !cell.text.is_empty() && is_word(cell))
 }
@@ -297,7 +300,7 @@ fn longer(one: Option<Block>, other: Option<Block>) -> Option<Block> {
     }
 }
 
-/// One heading of several: of each column what differs from the others, and units.
+/// Joins several headings into one: for each column, the names that differ between columns, and units.
 fn joined(mut levels: Vec<Row>, dates: usize) -> Option<Row> {
     let mut heading = levels.pop()?;
     if levels.is_empty() {

@@ -1,4 +1,4 @@
-//! What returns are counted in: percent or fractions.
+//! The unit of returns: percent or fractions.
 
 use super::cells::Cell;
 use super::choices::{Choices, Unit};
@@ -8,25 +8,28 @@ use super::number::significant;
 use super::outcome::Stop;
 use super::words::{percent, percent_a_year};
 
-/// Numbers whose standard deviation, as written, is below the first are fractions, above the second percent.
+/// Numbers with a standard deviation, as written, below the first bound are fractions, and above the second are
+/// percent.
 const SURELY_FRACTIONS: f64 = 0.1;
 const SURELY_PERCENT: f64 = 1.0;
-/// Nor do numbers that vary so little average more than this as fractions.
+/// The largest mean that such calm numbers can have as fractions.
 const LARGEST_MEAN: f64 = 0.2;
-/// A deviation a year that no asset has, and one that few have, taken as fractions; and one that hardly any has as percent.
+/// Standard deviations a year, read as fractions: one that no asset has and one that few have. The third is one so low,
+/// read as percent, that hardly any asset has it.
 const NO_DEVIATION: f64 = 3.0;
 const LARGE_DEVIATION: f64 = 0.75;
 const SMALL_DEVIATION: f64 = 0.001;
-/// A mean a year that few assets have, taken as fractions.
+/// A mean a year that few assets have, read as fractions.
 const LARGE_YEARLY_MEAN: f64 = 0.35;
-/// So few numbers may all have two decimals by chance.
+/// Fewer numbers than this may all have two decimals by chance.
 const FEW: usize = 6;
-/// No gains since the start are in the middle of a record so large as fractions.
+/// If gains since the start, read as fractions, had a median above this, they are in percent.
 const SURELY_CUMULATED_PERCENT: f64 = 5.0;
-/// No fractions average as much a period.
+/// Fractions never average more than this a period.
 const SURELY_NO_MEAN: f64 = 1.0;
 
-/// Whether all of enough numbers are written with two decimals at most: fractions would tell whole percents alone.
+/// Returns true if there are enough numbers and all are written with at most two decimals. As fractions they would be
+/// whole percents.
 pub fn is_coarse(cells: &[&Cell]) -> bool {
     let decimals = |cell: &&Cell| {
         let text = significant(&cell.text);
@@ -35,13 +38,13 @@ pub fn is_coarse(cells: &[&Cell]) -> bool {
     cells.len() >= FEW && cells.iter().all(decimals)
 }
 
-/// Whether a heading says that what it heads is in percent.
+/// Returns true if a heading says that its numbers are in percent.
 pub fn names_percent(name: &str) -> bool {
     ["%", "pct", "percent"].iter().any(|word| name.to_lowercase().contains(word))
 }
 
 impl Numbers<'_> {
-    /// Gains since a start in percent reach more than fractions do.
+    /// Decides the unit of gains since a start: in percent they reach larger numbers than fractions do.
     pub fn cumulated_unit(&self, signs: bool, said: &Choices) -> Result<Unit, Stop> {
         if signs || names_percent(self.name) {
             return Ok(said.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
@@ -53,8 +56,8 @@ impl Numbers<'_> {
         }
     }
 
-    /// Decides as said or written, or by how much the numbers vary and average in a year: fractions where their bulk is, and percent only
-    /// where all of them are as well, so that no odd number makes it so.
+    /// Decides the unit as chosen or as written, or else by how much the numbers vary and average in a year. The bulk
+    /// of the numbers decides for fractions; percent must also hold for all of them, so that no odd number decides it.
     pub fn unit(&self, signs: bool, said: &Choices, beside: &Beside) -> Result<Unit, Stop> {
         if signs || names_percent(self.name) {
             return Ok(said.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
@@ -71,7 +74,8 @@ impl Numbers<'_> {
         doubt.map_or(Ok(Unit::Fraction), |doubt| Err(self.ask_unit(&doubt)))
     }
 
-    /// Tells whether `values` are no fractions; losses of all and more tell it where they are too many to be odd.
+    /// Returns true if `values` cannot be fractions. Losses of everything or more also show this if they are too many
+    /// to be odd.
     fn is_percent(&self, values: &[f64], beside: &Beside) -> bool {
         let (mean, deviation) = moments(values);
         let beyond_all = self.values.iter().filter(|value| **value <= -1.0).count();
@@ -92,9 +96,9 @@ impl Numbers<'_> {
         Stop::asked("unit", format!("Are the returns fractions or percent? What is {text}?{doubt}"), options)
     }
 
-    /// Why numbers that vary little may be a calm record in percent, as a sentence: what they would come to as fractions is
-    /// more than assets and banks do, or they are written as percents are. `None` where they are what fractions look like.
-    /// The `bulk` of them decides.
+    /// Returns a sentence why numbers that vary little may be a calm record in percent, or `None` if they look like
+    /// fractions. The reason is that as fractions they exceed what assets and banks do, or that they are written as
+    /// percents are. The `bulk` of the numbers decides.
     fn calm(&self, bulk: &[f64], beside: &Beside) -> Option<String> {
         let Beside { periods, is_dated, bank } = *beside;
         let deviation_per_year = moments(bulk).1 * periods.sqrt();
@@ -119,9 +123,10 @@ impl Numbers<'_> {
             None => None,
         }
     }
-    /// Tells whether numbers as fractions average more a year than few assets do, and that beyond chance, or beyond chance more than
-    /// they deviate in a year, which only what hardly earns does. A handful of returns averages more by chance alone; an odd one
-    /// among them hides nothing, since the first is told of the bulk.
+    /// Returns true if the numbers, read as fractions, average more a year than few assets do, and this is beyond
+    /// chance. The mean beyond chance must exceed that bound for the bulk, or the deviation a year for all numbers, as
+    /// with assets that earn hardly anything. A handful of returns may average more by chance alone. The first test
+    /// uses the bulk, so an odd return cannot hide the mean.
     fn earns_too_much(&self, bulk: &[f64], periods: f64) -> bool {
         let beyond_chance = |values: &[f64]| sure_mean(values) * periods;
         let deviation_per_year = moments(&self.values).1 * periods.sqrt();

@@ -1,6 +1,6 @@
-//! Bytes as spreadsheets in Western Europe save text.
+//! Windows-1252, the encoding in which spreadsheets in Western Europe save text.
 
-/// What the bytes from 0x80 to 0x9f are; five of them are nothing.
+/// The characters of the bytes from 0x80 to 0x9f; five of them have none.
 const HIGH: [Option<char>; 32] = [
     Some('\u{20ac}'),
     None,
@@ -36,7 +36,7 @@ const HIGH: [Option<char>; 32] = [
     Some('\u{178}'),
 ];
 
-/// The text that `bytes` are; `None` if they are no text.
+/// Decodes `bytes`; `None` if they are no text.
 pub fn decoded(bytes: &[u8]) -> Option<String> {
     let letter = |byte: &u8| match byte {
         0 => None,
