@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use csv::{ByteRecord, Writer, WriterBuilder};
 
-/// A file in the making; numbers are written in the shortest form that reads back as the same.
+/// A CSV file that is being written. Numbers are written in the shortest form that reads back as the same number.
 #[derive(Debug)]
 pub struct Csv(Writer<Vec<u8>>);
 

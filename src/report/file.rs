@@ -1,8 +1,8 @@
 //! A report as one HTML file: the modules that draw it, its data as JSON, its styles and its typeface.
 //!
-//! The modules stand in an import map as `data:` addresses, each under its name, so that they are the dashboard's own to the
-//! letter but for the `./` before the names they import. A browser may run these and load nothing else: the policy names the
-//! two scripts of the page by their hashes.
+//! Modules are embedded in an import map as `data:` addresses, each under its name. They are the dashboard's own
+//! modules, except for the `./` before the names that they import. The policy names the two scripts of the page by
+//! their hashes, so a browser may run these and load nothing else.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,11 +11,11 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// What shows the page, whatever draws it.
+/// The module that shows the page, whichever module draws it.
 const SHOWS: &str = "report_file.js";
 const SHEETS: [&str; 2] = ["style.css", "print.css"];
 const TYPEFACE: &str = "inter.woff2";
-/// Before the name of a module where a module imports it.
+/// The text before a module's name in an import.
 const BESIDE: &str = " from \"./";
 
 /// A report that cannot be written.
@@ -27,13 +27,13 @@ pub enum FileError {
     Json(#[from] serde_json::Error),
 }
 
-/// The embedded files by their names.
+/// A function that returns an embedded file by its name.
 pub type Files = fn(&str) -> Option<&'static [u8]>;
 
-/// The file. `module` draws `data` below `title`; `sentences` are what a reader without scripts sees.
+/// Returns the file. `module` draws `data` below `title`; readers without scripts see `sentences`.
 ///
 /// # Errors
-/// A module that is not among `files`, or data that are no JSON.
+/// A module is not among `files`, or the data cannot be written as JSON.
 pub fn html(
     files: Files,
     module: &str,
@@ -88,7 +88,7 @@ pub fn html(
     ))
 }
 
-/// A module and all that it imports, as addresses.
+/// Adds a module and all that it imports to `imports`, as addresses.
 fn collect(files: Files, name: &str, imports: &mut BTreeMap<String, String>) -> Result<(), FileError> {
     let key = format!("ballast/{name}");
     if imports.contains_key(&key) {
@@ -113,12 +113,12 @@ fn address(media: &str, bytes: &[u8]) -> String {
     format!("data:{media};base64,{}", STANDARD.encode(bytes))
 }
 
-/// How a policy names an inline script or style.
+/// Returns the name of an inline script or style in the policy.
 fn hash(text: &str) -> String {
     format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text)))
 }
 
-/// JSON within a `<script>`, which nothing in it ends.
+/// Returns JSON that can stand within a `<script>`, because nothing in it ends the script.
 fn json(value: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
 }

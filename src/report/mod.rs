@@ -1,7 +1,7 @@
-//! A leaf beside the floors: reports to read, from data. It names no floor, and none below `service` names it.
+//! Reports to read, from data. This module names none of the floors, and none below `service` names it.
 //!
-//! A page is one HTML file that loads nothing: the modules that draw it are those of the dashboard, so that a chart, a
-//! colour and a word are the same in both. Tables of data are written as CSV.
+//! A page is one HTML file that loads nothing. The dashboard's modules draw it, so that charts, colours and words are
+//! the same in both. Tables of data are written as CSV.
 
 mod csv;
 mod file;
