@@ -3,8 +3,8 @@
 use rand::Rng;
 use rand::RngExt;
 
-/// Indices of one resample of `0..length`: blocks of `block` neighbours from random starts, the end joined to the
-/// beginning, cut to `length`. Dependence within a block survives; every index is drawn equally often on average.
+/// Returns the indices of one resample of `0..length`: blocks of `block` consecutive indices from random starts on a
+/// circle, cut to `length`. Dependence within a block survives, and every index is drawn equally often on average.
 /// Source: Politis and Romano, *A circular block-resampling procedure for stationary data* (1992).
 pub fn circular_blocks(length: usize, block: usize, generator: &mut impl Rng) -> Vec<usize> {
     let mut indices = Vec::with_capacity(length + block);
@@ -32,7 +32,8 @@ mod tests {
             }
             indices.into_iter().for_each(|index| counts[index] += 1);
         }
-        // 20,000 expected each; blocks of four make the standard deviation at most 4 sqrt(20,000 * 3 / 10) = 310.
+        // 20,000 are expected for each; blocks of four make the standard deviation at most 4 sqrt(20,000 * 3 / 10) =
+        // 310.
         assert!(counts.iter().all(|&count| count.abs_diff(20_000) < 1300), "{counts:?}");
     }
 }

@@ -1,13 +1,14 @@
-//! The bridge statistic H: its law is the limit of sqrt(n) times the Wasserstein distance between the empirical law of n
-//! values and the true law.
+//! The bridge statistic H: its law is the limit of sqrt(n) times the Wasserstein distance between the empirical law of
+//! n values and the true law.
 //!
 //!   H = sum_{i=1}^{n-1} |B(W_i)| (z_(i+1) - z_(i)),   B a standard Brownian bridge, z_(1) <= ... <= z_(n) the values
 //!
-//! with W_i the mass of the first i of them, i/n where all weigh the same; sqrt(n) is then the root of the effective size.
-//! Where a W_i is no time of the bridges, |B| is interpolated between the two around it and scaled to its exact mean.
+//! with W_i the mass of the first i values, i/n if all weights are equal; sqrt(n) is then the root of the effective
+//! size. If a W_i is not a time of the bridges, |B| is interpolated between the two times around it and scaled to its
+//! exact mean.
 //!
-//! H is simulated over the directions of bridges, and the quantile integrates their lengths out: H is the length, whose
-//! law is chi, times the statistic over the direction, and the two are independent. Source: paper, section 2.1, (2.4).
+//! H is simulated over the directions of bridges, and the quantile integrates their lengths out. H is the length, which
+//! has a chi law, times the statistic over the direction; the two are independent. Source: paper, section 2.1, (2.4).
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -21,24 +22,26 @@ use super::scale_mixture::LastQuantile;
 /// A simulated quantile and the standard error of its simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantile {
-    /// In the unit of the law's values.
+    /// The quantile, in the unit of the law's values.
     pub value: f64,
-    /// Of the simulation alone, in the same unit.
+    /// Standard error of the simulation alone, in the same unit.
     pub standard_error: f64,
 }
 
 impl AbsoluteBridges {
-    /// The statistic over the direction of every path: H divided by the length of the path. Cost O(min(n, 540) paths).
+    /// Returns the statistic over the direction of every path: H divided by the length of the path. Cost O(min(n, 540)
+    /// paths).
     pub(super) fn directional_statistic(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<f64> {
         self.directional_statistics(&[law], which).swap_remove(0)
     }
 
-    /// The same for many laws of one size, to the same bits. Cost as one by one, with the bridges read from memory once.
+    /// Returns the statistics of many laws of one size, identical to single ones bit for bit. The cost is that of
+    /// single ones, but the bridges are read from memory once.
     ///
     /// Checked by: `many_laws_at_a_time_are_one_by_one_to_the_last_bit`.
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {
         let weights = self.waiting(laws, which);
-        // Whole blocks of paths, of which the last may be longer than what there is of them.
+        // Whole blocks of paths; the last block may be longer than the paths that remain.
         let mut statistics: Vec<_> = laws.iter().map(|_| vec![0.0; self.paths.next_multiple_of(PATHS)]).collect();
         for (index, block) in self.blocks().enumerate() {
             for (waiting, statistic) in weights.iter().zip(&mut statistics) {
@@ -49,7 +52,7 @@ impl AbsoluteBridges {
         statistics
     }
 
-    /// What |B| counts at each time in the statistic of a law.
+    /// Returns the weight of |B| at each time in the statistic of a law.
     pub(super) fn nodes(&self, law: &EmpiricalDistribution) -> Vec<f64> {
         let mut weights = Weights::new(self);
         for (pair, shares) in law.atoms().windows(2).zip(self.shares_of(law, Statistic::Now)) {
@@ -58,7 +61,8 @@ impl AbsoluteBridges {
         weights.weights.iter().zip(&self.units).map(|(weight, unit)| weight / unit).collect()
     }
 
-    /// Every gap of each law. Where all values weigh the same, gaps of all laws of a size count at the same times.
+    /// Returns the weights of every gap of each law. With equal weights, the gaps of all laws of one size count at the
+    /// same times.
     fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Waiting> {
         let mut weights = Weights::new(self);
         let of_these = OnceLock::new();
@@ -77,7 +81,7 @@ impl AbsoluteBridges {
         laws.iter().map(of_law).collect()
     }
 
-    /// Where each gap of a law counts.
+    /// Returns the times and weights of each gap of a law.
     fn shares_of(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<[Share; 4]> {
         let (mut places, mut below) = (Places::of_laws_like(self, law, which), 0.0);
         let gap = |weight: &f64| {
@@ -87,8 +91,8 @@ impl AbsoluteBridges {
         law.weights().iter().take(law.sample_size() - 1).map(gap).collect()
     }
 
-    /// The (1 - alpha)-quantiles of a statistic of each of `laws`, which are of one size, at each of `alphas`, to 5e-6 of
-    /// themselves. `base` holds the values, ascending, that the laws share where they do.
+    /// Returns the (1 - alpha)-quantiles of a statistic for each of `laws`, which are of one size, at each of `alphas`,
+    /// to 5e-6 of themselves. `base` holds the values that the laws share, ascending, if there are any.
     pub fn bridge_quantiles(
         &self,
         laws: &[&EmpiricalDistribution],
@@ -106,20 +110,20 @@ impl AbsoluteBridges {
         statistics.into_iter().map(at_levels).collect()
     }
 
-    /// The (1 - alpha)-quantile of a statistic of `law`; `alpha` in [0.001, 0.999], here and below.
+    /// Returns the (1 - alpha)-quantile of a statistic of `law`; `alpha` must be in [0.001, 0.999], here and below.
     pub fn bridge_quantile(&self, law: &EmpiricalDistribution, which: Statistic, alpha: f64) -> f64 {
         self.lengths.quantile(1.0 - alpha, &self.directional_statistic(law, which))
     }
 
-    /// That of the law itself, with the standard error of its simulation.
+    /// Returns the (1 - alpha)-quantile for the law itself, with the standard error of its simulation.
     pub fn bridge_quantile_with_error(&self, law: &EmpiricalDistribution, alpha: f64) -> Quantile {
         let statistic = self.directional_statistic(law, Statistic::Now);
         let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &statistic);
         Quantile { value, standard_error }
     }
 
-    /// Quantiles of a statistic of `law` (of m values) with one more value learned, for every value in ascending `values`.
-    /// Cost O((min(m, 540) + values) paths): between two values only the gaps that they enclose move.
+    /// Returns the quantiles of a statistic of `law` (of m values) with one more value, for every value in ascending
+    /// `values`. Cost O((min(m, 540) + values) paths): between two values only the gaps between them change.
     pub fn bridge_quantiles_with(
         &self,
         law: &EmpiricalDistribution,
@@ -131,7 +135,8 @@ impl AbsoluteBridges {
         let total = law.total_weight() * retention + 1.0;
         let (mut places, mut weights) = (Places::new(self, count + 1, total, retention, which), Weights::new(self));
         let mut place = |weights: &mut Weights, below: f64, length: f64| weights.place(&places.of(below), length);
-        // Gap j lies between atoms j - 1 and j: below the value after the first j of them, above it after the value as well.
+        // Gap j is between atoms j - 1 and j. If it is below the new value, the first j atoms lie below it; if it is
+        // above, so does the value.
         let gap = |j: usize| atoms[j] - atoms[j - 1];
         let mut sum = 0.0;
         let sums = law.weights().iter().map(|weight| {
@@ -144,7 +149,7 @@ impl AbsoluteBridges {
         let enter = |&value: &f64| {
             while below < count && atoms[below] <= value {
                 below += 1;
-                // The gap under the atom passed is below the value now; the one above it is to be cut in two.
+                // The gap under the atom just passed is now below the value; the gap above the atom will be cut in two.
                 if below >= 2 {
                     place(&mut weights, first[below - 1], gap(below - 1));
                 }
@@ -175,8 +180,8 @@ impl AbsoluteBridges {
         quantiles
     }
 
-    /// Sums to which more and more is added: what is carried on from each entry to the next, and what it has for itself. Entry by
-    /// entry; block by block of paths, so that what entries have in common is read from memory once.
+    /// Returns the sums of each entry: sums carried from entry to entry, plus the entry's own. Results are ordered by
+    /// entry, but computed by block of paths, so that data that entries share is read from memory once.
     fn carry_on(&self, carried: &mut [f64], entered: &[[Waiting; 2]]) -> Vec<f64> {
         let mut all = vec![0.0; entered.len() * self.paths];
         for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
@@ -195,18 +200,18 @@ impl AbsoluteBridges {
     }
 }
 
-/// Puts the sums of a block in their place in a statistic of all paths, from `first` on.
+/// Copies the sums of a block into a statistic of all paths, from `first` on.
 fn keep(sums: &[f64; PATHS], first: usize, statistic: &mut [f64]) {
     statistic[first..].iter_mut().zip(sums).for_each(|(place, sum)| *place = *sum);
 }
 
-/// Bytes of the statistics that are found together, at most, unless one alone takes more.
+/// The most bytes of statistics that are computed together, unless one alone takes more.
 const BYTES_TOGETHER: usize = 1 << 20;
 
-/// What is yet to be added to a statistic of a law: a weight for each time of the bridges.
+/// Weights to be added to a law's statistic: one for each time of the bridges.
 struct Weights {
     weights: Vec<f64>,
-    /// Times outside have weight zero.
+    /// Range of the times with nonzero weight.
     touched: Range<usize>,
 }
 
@@ -215,7 +220,7 @@ impl Weights {
         Weights { weights: vec![0.0; bridges.units.len()], touched: 0..0 }
     }
 
-    /// A gap `length` wide.
+    /// Adds a gap of width `length`.
     fn place(&mut self, shares: &[Share; 4], length: f64) {
         for &(time, part) in shares {
             if part > 0.0 {
@@ -226,7 +231,7 @@ impl Weights {
         }
     }
 
-    /// What is waiting; nothing is any more.
+    /// Returns the collected weights and resets them.
     fn take(&mut self) -> Waiting {
         let touched = std::mem::take(&mut self.touched);
         let weights = &mut self.weights[touched.clone()];
@@ -243,21 +248,21 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// Adds it to the statistics of a block of paths.
+    /// Adds the weighted values to the statistics of a block of paths.
     fn pour(&self, block: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
         dispatched!(add_nodes(&self.weights, &block[self.first..], sums));
     }
 }
 
-/// Nodes added in one pass over the sums. Theirs is taken in single precision: twice as many fit a vector, and only their sum is
-/// widened. It is off by some 1e-7 of itself, another way in every path.
+/// The number of nodes added in one pass over the sums. Each pass sums in single precision, because twice as many
+/// numbers fit a vector, and only its sum is widened. It is off by about 1e-7 of itself, differently in every path.
 const NODES: usize = 16;
 
-/// Paths whose sums stay in registers.
+/// The number of paths whose sums stay in registers.
 const LANES: usize = 64;
 
-/// Adds `gaps[i]` times node i of a block of paths to `sums`, [`NODES`] at a time. What is fused is written so, and the order is
-/// that of the nodes: the bits do not depend on the processor.
+/// Adds `gaps[i]` times node i of a block of paths to `sums`, [`NODES`] at a time. Fused operations are written as such
+/// and the order is that of the nodes, so the bits do not depend on the processor.
 #[inline(always)]
 fn add_nodes(gaps: &[f32], nodes: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
     for (gaps, nodes) in gaps.chunks(NODES).zip(nodes.chunks(NODES)) {
@@ -281,7 +286,7 @@ mod tests {
 
     #[test]
     fn many_laws_at_a_time_are_one_by_one_to_the_last_bit() {
-        // Blocks and nodes that come out even, and that do not.
+        // Sizes for which blocks and nodes are full, and sizes for which they are not.
         for (size, paths) in [(2, 40), (5, 256), (9, 300), (12, 700), (17, 256), (40, 300)] {
             let bridges = AbsoluteBridges::simulate(size, paths, 4);
             let law = |shift: usize| {
@@ -320,7 +325,7 @@ mod tests {
                         let mut larger = law.clone();
                         larger.push(*value);
                         let expected = bridges.bridge_quantile(&larger, which, 0.1);
-                        // Ten times the tolerance of one of many quantiles, for values as far apart as these.
+                        // Ten times the tolerance of one of many quantiles, because these values are far apart.
                         assert!((quantile / expected - 1.0).abs() < 5e-5, "{retention} {value}: {quantile} {expected}");
                     }
                 }
@@ -336,7 +341,8 @@ mod tests {
         for (size, which) in [(7, Statistic::Now), (8, Statistic::OneLater)] {
             let bridges = AbsoluteBridges::simulate(size, 500, 3);
             let [one, other] = [&equal, &decaying].map(|law| bridges.bridge_quantile(law, which, 0.1));
-            // Times move by some 1e-15, and between two nodes |B| grows by about its size: the tolerance of a quantile is 1e-7.
+            // Times move by about 1e-15, and between two nodes |B| grows by about its size; the tolerance of a quantile
+            // is 1e-7.
             assert!((one / other - 1.0).abs() < 1e-7, "{one} and {other}");
         }
     }
@@ -352,7 +358,7 @@ mod tests {
             }
             let law = EmpiricalDistribution::new(&atoms);
             for (found, plain) in bridges.directional_statistic(&law, Statistic::Now).iter().zip(plain) {
-                // 16 fused sums of numbers above 0, each rounded by 2^-24 of itself at most, and 16 weights.
+                // 16 fused sums of positive numbers, each rounded by at most 2^-24 of itself, and 16 weights.
                 assert!((found / plain - 1.0).abs() < 32.0 * 2.0_f64.powi(-24), "{size}: {found} against {plain}");
             }
         }
@@ -364,19 +370,19 @@ mod tests {
         let quantile = |sample: &[f64]| bridges.bridge_quantile_with_error(&EmpiricalDistribution::new(sample), 0.1);
         let before = quantile(&[0.02, -0.05, 0.11, 0.04, 0.07]);
         let after = quantile(&[0.02, -0.05, 0.11 + 1e-9, 0.04, 0.07]);
-        // One gap grows by 1e-9 and |B| stays below 3 on 2000 paths.
+        // One gap grows by 1e-9, and |B| stays below 3 on 2000 paths.
         assert!((before.value - after.value).abs() < 3e-9);
         assert!(before.standard_error > 0.0);
     }
 
-    /// The plain estimate: the order statistic of H over whole paths, of which `alpha` lie above.
+    /// Returns the plain estimate: the order statistic of H over whole paths, with the share `alpha` above it.
     fn order_statistic(whole: &AbsoluteBridges, law: &EmpiricalDistribution, alpha: f64) -> f64 {
         let mut statistic = whole.directional_statistic(law, Statistic::Now);
         statistic.sort_by(f64::total_cmp);
         statistic[((1.0 - alpha) * statistic.len() as f64) as usize]
     }
 
-    /// Mean and deviation, over many simulations, of an estimate.
+    /// Returns the mean and the deviation of an estimate over many simulations.
     fn mean_and_deviation(estimates: &[f64]) -> (f64, f64) {
         let count = estimates.len() as f64;
         let mean = estimates.iter().sum::<f64>() / count;
@@ -392,7 +398,8 @@ mod tests {
         let (plain_mean, plain_deviation) = mean_and_deviation(&plain.collect::<Vec<f64>>());
         let (mean, deviation) = mean_and_deviation(&values);
         assert!(deviation < 0.85 * plain_deviation, "{deviation} against {plain_deviation}");
-        // An order statistic is off by about a half of one in 200, less than one standard error of the mean of 200.
+        // An order statistic is off by about half of one in 200, which is less than one standard error of the mean of
+        // 200.
         assert!((mean - plain_mean).abs() < 5.0 * plain_deviation / 200_f64.sqrt(), "{mean} against {plain_mean}");
         // A deviation over 200 simulations has a standard error of 5 %.
         assert!((errors.iter().sum::<f64>() / 200.0 / deviation - 1.0).abs() < 0.2, "{errors:?}");
@@ -420,18 +427,19 @@ mod tests {
 
     #[test]
     fn graded_times_serve_large_samples() {
-        // A Student-like sample: its widest gaps lie where the grid is finest.
+        // A Student-like sample: its widest gaps are where the grid is finest.
         let sample: Vec<f64> = (0..1500).map(|k| (f64::from(k) - 749.5) / (f64::from(k.min(1499 - k)) + 0.5)).collect();
         let law = EmpiricalDistribution::new(&sample);
         let expected = AbsoluteBridges::simulate(1500, 2000, 4).bridge_quantile_with_error(&law, 0.1);
         let found = AbsoluteBridges::graded(2000, 4).bridge_quantile_with_error(&law, 0.1);
-        // Paths inside a cell are other draws: four standard deviations of the difference, were all of it so.
+        // Paths inside a cell are different draws: four standard deviations of the difference, as if all draws were
+        // different.
         let allowed = 4.0 * expected.standard_error.hypot(found.standard_error);
         assert!((found.value - expected.value).abs() < allowed, "{found:?} against {expected:?}");
         let mean_of = |whole: AbsoluteBridges| whole.directional_statistic(&law, Statistic::Now).iter().sum::<f64>();
         let [exact, graded] =
             [AbsoluteBridges::whole(1500, 2000, 4), AbsoluteBridges::whole_graded(2000, 4)].map(mean_of);
-        // The statistic's deviation is about half its mean: four standard errors of the mean of 2000 are 5 %.
+        // The statistic's deviation is about half its mean, so four standard errors of the mean of 2000 are 5 %.
         assert!((graded / exact - 1.0).abs() < 0.05, "{graded} against {exact}");
     }
 }

@@ -1,58 +1,62 @@
-//! The law of the bridge statistic to five digits, without a path.
+//! The law of the bridge statistic to five digits, without simulation.
 //!
 //!   H = sum_i c_i |B(t_i)|
 //!
-//! `X_i = B(t_i) / sqrt(t_i (1 - t_i))` is a stationary Gaussian chain: neighbours correlate by
-//! `r = sqrt(t_i (1 - t_(i+1)) / (t_(i+1) (1 - t_i)))`. Its transform `E e^(i w H)` is therefore a product of integrals over
-//! one variable each, which is even, from the last time to the first:
+//! `X_i = B(t_i) / sqrt(t_i (1 - t_i))` is a stationary Gaussian chain; successive values correlate by
+//! `r = sqrt(t_i (1 - t_(i+1)) / (t_(i+1) (1 - t_i)))`. Its transform `E e^(i w H)` is therefore a product of integrals
+//! over one variable each, from the last time to the first, and each function is even:
 //!
-//!   u_i(x) = E[ e^(i w a_(i+1) |X|) u_(i+1)(X) | X_i = x ],   a_i = c_i sqrt(t_i (1 - t_i)),   X given x normal (r x, 1 - r^2)
+//!   u_i(x) = E[ e^(i w a_(i+1) |X|) u_(i+1)(X) | X_i = x ],   a_i = c_i sqrt(t_i (1 - t_i))
 //!
-//! They are taken on even points of half the line, whose distance is at most the deviation of a step, by the trapezoidal rule
-//! with its first correction for the kink of |x| at 0: between points so close a normal density is summed to 1e-8. The
-//! distribution function is the cosine series of Fang and Oosterlee (2008), A novel pricing method for European options based on
-//! Fourier-cosine series expansions, SIAM Journal on Scientific Computing 31(2), over [0, mean + 6 deviations], which leaves out
-//! less than 2e-8 (Borell's inequality, as no choice of signs makes `sum +- c_i B(t_i)` vary more than all plus).
+//! with X, given x, normal (r x, 1 - r^2).
+//!
+//! The integrals use evenly spaced points of half the line, at most the deviation of a step apart. They use the
+//! trapezoidal rule with its first correction for the kink of |x| at 0, which sums a normal density to 1e-8 at this
+//! spacing. The distribution function is the cosine series of Fang and Oosterlee (2008), A novel pricing method for
+//! European options based on Fourier-cosine series expansions, SIAM Journal on Scientific Computing 31(2), over [0,
+//! mean + 6 deviations]. This leaves out less than 2e-8 (Borell's inequality, because no choice of signs gives
+//! `sum +- c_i B(t_i)` more variance than all plus).
 
 use super::bridge_paths::{AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 
-/// Terms of the series. Twice as many move a quantile at 0.9 by less than 1e-4 of itself, for laws of three values, and by 1e-5 for
-/// laws of many.
+/// Number of terms of the series. Twice as many change a quantile at 0.9 by less than 1e-4 of itself for laws of three
+/// values, and by 1e-5 for laws of many.
 const TERMS: usize = 64;
-/// Deviations of X that the points reach.
+/// The range of the points, in deviations of X.
 const REACH: f64 = 6.5;
-/// The distance of points is at most this, and at most the deviation of the shortest step.
+/// The largest distance between points; it is also at most the deviation of the shortest step.
 const WIDEST: f64 = 0.1;
-/// Deviations beyond which a step is taken to lead nowhere: 2e-11 of its mass.
+/// The range of a step in deviations; 2e-11 of its mass beyond it is ignored.
 const FARTHEST: f64 = 6.7;
-/// Deviations of H beyond its mean where the series ends.
+/// End of the series, in deviations of H beyond its mean.
 const TAIL: f64 = 6.0;
-/// Halvings of the interval of a quantile.
+/// Number of halvings of a quantile's interval.
 const HALVINGS: usize = 50;
 
-/// Complex numbers, one of each term.
+/// Complex numbers, one for each term.
 #[derive(Clone)]
 struct Terms {
     real: [f64; TERMS],
     imaginary: [f64; TERMS],
 }
 
-/// The law of a statistic.
+/// The law of a bridge statistic.
 pub struct BridgeLaw {
-    /// Where the series ends.
+    /// End of the interval of the series.
     end: f64,
     /// The real part of the transform at `k pi / end`.
     transform: [f64; TERMS],
 }
 
 impl AbsoluteBridges {
-    /// The law of the statistic of `law`, at the times of these bridges. Cost O(times^1.5): 25 ms at 240 values, 55 ms
-    /// from 1,025 on.
+    /// Returns the law of the statistic of `law`, at the times of these bridges. Cost O(times^1.5): 25 ms at 240
+    /// values, 55 ms from 1,025 on.
     ///
-    /// Checked by: `the_law_has_the_quantiles_that_are_known`, `quantiles_of_laws_drawn_at_random_are_those_of_many_paths`, and
-    /// against a million paths `tests/solver/control.rs`.
+    /// Checked by: `the_law_has_the_quantiles_that_are_known`,
+    /// `quantiles_of_laws_drawn_at_random_are_those_of_many_paths`, and against a million paths
+    /// `tests/solver/control.rs`.
     pub fn exact(&self, law: &EmpiricalDistribution) -> BridgeLaw {
         let time = |index: usize| match &self.times {
             Times::Sample(size) => (index + 1) as f64 / *size as f64,
@@ -64,7 +68,7 @@ impl AbsoluteBridges {
 }
 
 impl BridgeLaw {
-    /// Of `sum c_i |B(t_i)|` over pairs of t, ascending between 0 and 1, and c > 0.
+    /// Computes the law of `sum c_i |B(t_i)|` for pairs of t, ascending between 0 and 1, and c > 0.
     fn of(nodes: &[(f64, f64)]) -> Self {
         let scaled: Vec<f64> = nodes.iter().map(|(time, weight)| weight * (time * (1.0 - time)).sqrt()).collect();
         let mean = (2.0 / std::f64::consts::PI).sqrt() * scaled.iter().sum::<f64>();
@@ -93,7 +97,7 @@ impl BridgeLaw {
         BridgeLaw { end, transform }
     }
 
-    /// The `share`-quantile, `share` in [0.001, 0.999]; 0 of a law of one value.
+    /// Returns the `share`-quantile, `share` in [0.001, 0.999]; 0 for a law of one value.
     pub fn quantile(&self, share: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.end);
         for _ in 0..HALVINGS {
@@ -114,12 +118,12 @@ fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
 }
 
-/// Of a bridge over its deviation, at two times.
+/// Returns the correlation of a bridge divided by its deviation, at two times.
 fn correlation(first: f64, second: f64) -> f64 {
     (first * (1.0 - second) / (second * (1.0 - first))).sqrt()
 }
 
-/// Of `sum c_i B(t_i)`: the covariance of B at s < t is s (1 - t).
+/// Returns the variance of `sum c_i B(t_i)`: the covariance of B at s < t is s (1 - t).
 fn variance_of_sum(nodes: &[(f64, f64)]) -> f64 {
     let (mut before, mut variance) = (0.0, 0.0);
     for (time, weight) in nodes {
@@ -129,7 +133,7 @@ fn variance_of_sum(nodes: &[(f64, f64)]) -> f64 {
     variance
 }
 
-/// Multiplies the values at each point j by `e^(i k rate j distance)` and by its part of the trapezoidal rule.
+/// Multiplies the values at each point j by `e^(i k rate j distance)` and by the weight of the trapezoidal rule.
 fn turn(values: &mut [Terms], rate: f64, distance: f64) {
     let once: [(f64, f64); TERMS] = std::array::from_fn(|term| (term as f64 * rate * distance).sin_cos());
     let (mut cosines, mut sines) = ([distance; TERMS], [0.0; TERMS]);
@@ -152,7 +156,7 @@ fn turn(values: &mut [Terms], rate: f64, distance: f64) {
     }
 }
 
-/// The mean of `values`, which are even, one step before.
+/// Computes the mean of `values`, which are even, one step before.
 #[inline(always)]
 fn step(values: &[Terms], before: &mut [Terms], correlation: f64, distance: f64) {
     let spread = (1.0 - correlation * correlation).sqrt();
@@ -185,13 +189,14 @@ mod tests {
 
     #[test]
     fn the_law_has_the_quantiles_that_are_known() {
-        // Two values: |B(1/2)| of standard deviation 1/2. The series of a law of one time is the least smooth there is.
+        // Two values give |B(1/2)| with standard deviation 1/2. The law of one time has the least smooth series.
         let law = AbsoluteBridges::simulate(2, 1, 1).exact(&EmpiricalDistribution::new(&[0.0, 2.0]));
         for (share, normal) in [(0.1, 0.125_661), (0.5, 0.674_490), (0.9, 1.644_854), (0.99, 2.575_829)] {
             assert!((law.quantile(share) - normal).abs() < 3e-5, "{share}: {}", law.quantile(share));
         }
-        // The integral of |B| over [0, 1]: Johnson and Killeen (1983), An explicit formula for the c.d.f. of the L1 norm of the
-        // Brownian bridge, Annals of Probability 11(3), table 1, as 1/n goes to 0, at which sums over i/n err by some 1/(6 n^1.5).
+        // The integral of |B| over [0, 1]: Johnson and Killeen (1983), An explicit formula for the c.d.f. of the L1
+        // norm of the Brownian bridge, Annals of Probability 11(3), table 1, as 1/n goes to 0. Sums over i/n err by
+        // about 1/(6 n^1.5).
         let even: Vec<f64> = (0..1024).map(|k| f64::from(k) / 1023.0).collect();
         let law = AbsoluteBridges::simulate(1024, 1, 1).exact(&EmpiricalDistribution::new(&even));
         for (share, known) in [(0.9, 0.4993), (0.95, 0.5821), (0.99, 0.7518)] {
@@ -200,7 +205,7 @@ mod tests {
         assert_eq!(AbsoluteBridges::simulate(3, 1, 1).exact(&EmpiricalDistribution::new(&[0.1; 3])).quantile(0.9), 0.0);
     }
 
-    /// A record of `count` values of a scale and a shape that are drawn.
+    /// Returns a record of `count` values with a random scale and shape.
     fn record(count: usize, generator: &mut impl Rng) -> Vec<f64> {
         let scale = 10.0_f64.powf(generator.random_range(-4.0..0.0));
         let (power, skew) = (generator.random_range(0.5..3.0), generator.random_range(0.1..1.0));

@@ -1,8 +1,8 @@
-//! Paths of Brownian bridges, in absolute value, at the times that laws of one size or of all large sizes ask for.
+//! Paths of Brownian bridges, in absolute value, at the times that laws of one size, or of all large sizes, need.
 //!
 //! A bridge at m times is a direction times a length: `sum (dB)^2 / dt` over the m + 1 intervals is chi-square with m
-//! degrees of freedom and independent of the direction. A statistic that grows with the path as |B| does can therefore
-//! be simulated over directions alone, and its length be integrated out.
+//! degrees of freedom and independent of the direction. A statistic that scales with the path as |B| does can therefore
+//! be simulated over directions alone, and its length integrated out.
 
 use std::sync::OnceLock;
 
@@ -12,22 +12,23 @@ use rand_distr::StandardNormal;
 use super::scale_mixture::ScaleMixture;
 use super::streams::stream;
 
-/// Simulated `|B(t)|` over the length of the path, at ascending times: common random numbers for laws.
+/// Simulated `|B(t)|` divided by the length of the path, at ascending times: common random numbers for laws.
 ///
-/// Whole numbers of 16 bits: a statistic reads them as fast as memory gives them, and is off by some 1e-6 of itself, another way in
-/// every path, which is far below what 2000 paths tell.
+/// Values are 16-bit integers, which a statistic reads at the speed of memory. It is off by about 1e-6 of itself,
+/// differently in every path, which is far below the error of 2000 paths.
 #[derive(Debug, Clone)]
 pub struct AbsoluteBridges {
     pub(super) times: Times,
     pub(super) paths: usize,
-    /// In the unit of their time: block after block of paths, of which each is stored time by time, because a statistic adds time
-    /// after time. Paths that the last block lacks are 0.
+    /// Values in the unit of their time: block after block of paths, each stored time by time, because a statistic adds
+    /// time after time. Unused paths of the last block are 0.
     pub(super) values: Vec<[u16; PATHS]>,
-    /// Of each time.
+    /// The unit of each time.
     pub(super) units: Vec<f64>,
-    /// The law of the lengths that the paths are divided by.
+    /// The law of the lengths by which the paths are divided.
     pub(super) lengths: ScaleMixture,
-    /// Of laws of one size: where the gaps of one whose values weigh the same count in each statistic, once that was asked.
+    /// For laws of one size with equal weights: the weight of each gap at the times, for each statistic, computed at
+    /// first use.
     pub(super) shares: [OnceLock<Vec<[Share; 4]>>; 2],
 }
 
@@ -36,41 +37,41 @@ pub struct AbsoluteBridges {
 pub(super) enum Times {
     /// i/n, i = 1 to n - 1: for laws of one sample size n.
     Sample(usize),
-    /// For laws of any size: these, between which `|B|` is interpolated.
+    /// Fixed times for laws of any size; `|B|` is interpolated between them.
     Graded {
-        /// With 0 before the first and 1 after the last.
+        /// The times, with 0 before the first and 1 after the last.
         times: Vec<f64>,
-        /// Of a bridge there.
+        /// The standard deviation of a bridge at each time.
         deviations: Vec<f64>,
     },
 }
 
-/// A time of the bridges, and what of the length of a gap counts there, in the unit of the values at that time.
+/// A time of the bridges, and the weight of a gap's length there, in the unit of the values at that time.
 pub(super) type Share = (usize, f64);
 
-/// The standard deviation of a bridge at a time.
+/// Returns the standard deviation of a bridge at a time.
 pub(super) fn deviation(time: f64) -> f64 {
     (time * (1.0 - time)).sqrt()
 }
 
-/// From this sample size on laws share the graded times: their nodes would lie closer than those.
+/// The sample size from which laws share the graded times: from here their nodes would be closer than the graded times.
 pub const GRADED_FROM: usize = 1025;
-/// Equal cells of the graded times.
+/// Number of equal cells of the graded times.
 const GRADED_CELLS: usize = 512;
-/// Halvings of the first and of the last cell: the tails of a large sample lie there.
+/// Halvings of the first and the last cell, where the tails of a large sample lie.
 const HALVINGS: u32 = 14;
 
-/// Paths that are added up together: their sums stay in the first-level cache.
+/// The number of paths that are summed together, so that their sums stay in the first-level cache.
 pub(super) const PATHS: usize = 256;
 
-/// Deviations of `|B|` that 16 bits tell apart from none; one value in 500 million is larger, and counts as that.
+/// The largest `|B|` that 16 bits represent, in deviations; one value in 500 million is larger, and is clamped.
 const LARGEST: f64 = 6.0;
 
-/// Cells of the dyadic grid that carries the paths, at least.
+/// The least number of cells of the dyadic grid of the paths.
 const LEAST_CELLS: usize = 1024;
 
-/// Fills `bridge`, of 2^m + 1 values, by midpoint displacement (Levy's construction), coarse levels first: a finer
-/// grid refines the same path.
+/// Fills `bridge`, of 2^m + 1 values, by midpoint displacement (Levy's construction). Coarse levels come first, so a
+/// finer grid refines the same path.
 fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
     let cells = bridge.len() - 1;
     (bridge[0], bridge[cells]) = (0.0, 0.0);
@@ -85,8 +86,8 @@ fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
     }
 }
 
-/// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights. What they leave of
-/// the variance is that of a normal of this deviation, 0 at a grid point.
+/// Position of a node in the dyadic grid: between `left` and the next grid point, with these weights. The remaining
+/// variance is that of a normal with this deviation, which is 0 at a grid point.
 struct Place {
     left: usize,
     weights: [f64; 2],
@@ -94,7 +95,8 @@ struct Place {
 }
 
 impl Place {
-    /// Node i/n among `cells`: given the grid's path, B is normal about the line between its neighbours.
+    /// Returns the place of node i/n among `cells`. Given the grid's path, B is normal about the line between the
+    /// adjacent grid points.
     fn of(node: usize, sample_size: usize, cells: usize) -> Self {
         let position = node as f64 / sample_size as f64 * cells as f64;
         let left = (position as usize).min(cells - 1);
@@ -110,18 +112,18 @@ impl Place {
 }
 
 impl AbsoluteBridges {
-    /// The directions of `paths` standard Brownian bridges at the times i/n.
+    /// Simulates the directions of `paths` standard Brownian bridges at the times i/n.
     ///
-    /// Path p is the same path at every sample size, so that the quantile moves from one sample size to the next more as
-    /// the law does than as two simulations differ: the stream (seed, "bridge", 0, p) refines it by midpoints on 2^m
-    /// cells, m the least with at least 1024 and 4n of them. B(i/n) is drawn given their ends from the stream (seed,
-    /// "bridge in cells", n, p), and the length, of which neighbouring sizes share most but not all, is theirs.
-    /// Cost O(n paths) and a few thousand normals a path.
+    /// Path p is the same path at every sample size, so that the quantile changes between sample sizes mainly because
+    /// the law does, not because two simulations differ. The stream (seed, "bridge", 0, p) refines it by midpoints on
+    /// 2^m cells, where m is the least with at least 1024 and 4n of them. B(i/n) is drawn given the ends of its cell
+    /// from the stream (seed, "bridge in cells", n, p). The length is that of these values, so similar sizes share most
+    /// of it but not all. Cost O(n paths) and a few thousand normals a path.
     pub fn simulate(sample_size: usize, paths: usize, seed: u64) -> Self {
         AbsoluteBridges::simulated(sample_size, paths, seed, Divisor::Length)
     }
 
-    /// [`Self::simulate`], with every path over its divisor.
+    /// Does the work of [`Self::simulate`], with every path divided by its divisor.
     fn simulated(sample_size: usize, paths: usize, seed: u64, divisor: Divisor) -> Self {
         let nodes = sample_size.saturating_sub(1);
         let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
@@ -136,14 +138,14 @@ impl AbsoluteBridges {
         AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, divisor, path)
     }
 
-    /// The same paths at times that serve every sample size from about [`GRADED_FROM`] on: 512 equal cells, of which the
-    /// first and the last are halved 14 times towards the ends. Between two times `|B|` is interpolated and scaled to its
-    /// exact mean; the product of two values within a cell is off by less than the cell.
+    /// Simulates the same paths at times that serve every sample size from about [`GRADED_FROM`] on: 512 equal cells,
+    /// of which the first and the last are halved 14 times towards the ends. Between two times `|B|` is interpolated
+    /// and scaled to its exact mean. The product of two values within a cell is off by less than the cell.
     pub fn graded(paths: usize, seed: u64) -> Self {
         AbsoluteBridges::simulated_graded(paths, seed, Divisor::Length)
     }
 
-    /// [`Self::graded`], with every path over its divisor.
+    /// Does the work of [`Self::graded`], with every path divided by its divisor.
     fn simulated_graded(paths: usize, seed: u64, divisor: Divisor) -> Self {
         let cell = 1.0 / GRADED_CELLS as f64;
         let halved = |power: u32| cell * 0.5_f64.powi(power as i32);
@@ -171,19 +173,19 @@ impl AbsoluteBridges {
         AbsoluteBridges::gather(&times, Times::Graded { times: with_ends, deviations }, paths, divisor, path)
     }
 
-    /// Bytes that the bridges of laws of `sample_size` values take.
+    /// Returns the bytes of the bridges for laws of `sample_size` values.
     pub fn bytes_of(sample_size: usize, paths: usize) -> usize {
         let times = if sample_size < GRADED_FROM { sample_size } else { GRADED_CELLS + 2 * HALVINGS as usize };
         let of_a_time = size_of::<u16>().saturating_mul(paths.saturating_add(PATHS - 1) / PATHS * PATHS);
         of_a_time.saturating_add(2 * size_of::<[Share; 4]>()).saturating_mul(times)
     }
 
-    /// The values of each block of paths, time by time.
+    /// Returns the values of each block of paths, time by time.
     pub(super) fn blocks(&self) -> impl Iterator<Item = &[[u16; PATHS]]> {
         self.values.chunks(self.units.len().max(1))
     }
 
-    /// All paths, each written by `draw` given its index, over their divisors.
+    /// Collects all paths divided by their divisors; `draw` writes each path, given its index.
     fn gather(
         at: &[f64],
         times: Times,
@@ -193,7 +195,7 @@ impl AbsoluteBridges {
     ) -> Self {
         let largest = match divisor {
             Divisor::One => LARGEST,
-            // A value is no larger than its deviation times the length.
+            // A value is at most its deviation times the length.
             Divisor::Length => (LARGEST / (at.len() as f64).sqrt()).min(1.0),
         };
         let unit = |time: &f64| largest * deviation(*time) / f64::from(u16::MAX);
@@ -216,17 +218,17 @@ impl AbsoluteBridges {
     }
 }
 
-/// What a path is divided by.
+/// The divisor of a path.
 #[derive(Clone, Copy)]
 enum Divisor {
-    /// Its length, which leaves the direction.
+    /// The length of the path, which leaves the direction.
     Length,
-    /// Nothing: the statistic of whole paths is H itself, the plain form that directions are checked against.
+    /// 1, so the statistic of whole paths is H itself: the plain form against which directions are checked.
     #[cfg_attr(not(test), expect(dead_code))]
     One,
 }
 
-/// `sqrt(sum (dB)^2 / dt)` over the intervals between 0, `times` and 1, of a path that is 0 at both ends.
+/// Returns `sqrt(sum (dB)^2 / dt)` over the intervals between 0, `times` and 1, for a path that is 0 at both ends.
 fn length(times: &[f64], path: &[f64]) -> f64 {
     let (mut time, mut value, mut sum) = (0.0, 0.0, 0.0);
     for (&next_time, &next_value) in times.iter().chain(&[1.0]).zip(path.iter().chain(&[0.0])) {
@@ -246,7 +248,7 @@ impl AbsoluteBridges {
         AbsoluteBridges::simulated_graded(paths, seed, Divisor::One)
     }
 
-    /// `|B|` at a time, path by path.
+    /// Returns `|B|` at a time, path by path.
     pub(super) fn at(&self, time: usize) -> impl Iterator<Item = f64> {
         let of_block = move |block: &[[u16; PATHS]]| block[time].map(|value| f64::from(value) * self.units[time]);
         self.blocks().flat_map(of_block).take(self.paths)
@@ -285,14 +287,15 @@ mod tests {
 
     #[test]
     fn the_length_of_a_path_is_chi() {
-        // The mean of m squares of a standard normal, and four standard errors of it over 2000 paths.
+        // The mean of m squares of a standard normal, with four standard errors over 2000 paths.
         let chi_square = |squares: &[f64], freedom: f64| {
             let mean = squares.iter().sum::<f64>() / squares.len() as f64;
             let allowed = 4.0 * (2.0 * freedom / squares.len() as f64).sqrt();
             assert!((mean - freedom).abs() < allowed, "{freedom}: {mean}");
         };
         let middle = |whole: &AbsoluteBridges, unit: &AbsoluteBridges, node: usize| -> Vec<f64> {
-            // Where the direction is small its last bit counts; the length is independent of it.
+            // If the direction is small its last bit matters, so such paths are left out; the length is independent of
+            // it.
             let told = |(_, direction): &(f64, f64)| *direction > 1000.0 * unit.units[node];
             let ratios = whole.at(node).zip(unit.at(node)).filter(told);
             ratios.map(|(value, direction)| (value / direction).powi(2)).collect()

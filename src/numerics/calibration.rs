@@ -1,13 +1,15 @@
-//! By how much the bridge's radius must grow for its balls to hold the law as often as they say, judged on records drawn from a
-//! smoothed law of the record at hand.
+//! The factor by which the bridge's radius must grow so that its balls hold the law as often as stated, estimated on
+//! records drawn from a smoothed law of the given record.
 //!
-//! A record of a few returns shows less spread than its law has. The radius follows that spread, so the balls of more than a share
-//! alpha of records are too small to hold the law. Each record drawn tells the factor that its own ball needs,
+//! A record of a few returns shows less spread than its law has. The radius follows that spread, so for more than a
+//! share alpha of records the balls are too small to hold the law. Each drawn record gives the factor that its own ball
+//! needs,
 //!
-//!   W1(F*, S) sqrt(n) / Q(F*),   S the smoothed law, F* the empirical law of n draws of it, Q the quantile of the bridge,
+//!   W1(F*, S) sqrt(n) / Q(F*),   S the smoothed law, F* the empirical law of n draws of it, Q the bridge's quantile,
 //!
-//! and the (1 - alpha)-quantile of these is the factor of all. Source: Efron and Tibshirani (1993), An introduction to the
-//! bootstrap, section 18 (calibration of a level by the bootstrap), with the smoothed law of Silverman (1986), section 6.4.1.
+//! and the (1 - alpha)-quantile of these factors is the common factor. Source: Efron and Tibshirani (1993), An
+//! introduction to the bootstrap, section 18 (calibration of a level by the bootstrap), with the smoothed law of
+//! Silverman (1986), section 6.4.1.
 
 use rand::{Rng, RngExt};
 
@@ -19,30 +21,30 @@ use super::law_distance::distance_of_masses;
 use super::streams::stream;
 use super::summary::interpolated_quantile;
 
-/// Atoms that each value of the record is spread over.
+/// Number of atoms over which each value of the record is spread.
 const SPREAD: usize = 16;
-/// Records drawn: at alpha = 0.1 the factor then has a standard error of some 2 %, more at smaller ones.
+/// Number of records drawn: at alpha = 0.1 the factor has a standard error of about 2 %, and more at smaller alpha.
 const RECORDS: usize = 1000;
-/// A record of one value over and over is drawn again, so often at most.
+/// A record of one repeated value is drawn again, at most this many times.
 const DRAWS: usize = 100;
 
-/// A record's law, each value spread by a normal kernel, in atoms of which `SPREAD` stand for one value. Its mean and variance
-/// are the record's own.
+/// A record's law with each value spread by a normal kernel into `SPREAD` atoms. Its mean and variance are the record's
+/// own.
 struct SmoothedLaw {
-    /// Ascending.
+    /// Atoms, ascending.
     atoms: Vec<f64>,
-    /// Of the atoms, in their order; they sum to 1.
+    /// Masses of the atoms, in their order; they sum to 1.
     masses: Vec<f64>,
-    /// The place of atom k of value i among all, at `SPREAD i + k`.
+    /// The index of atom k of value i among all atoms, at `SPREAD i + k`.
     places: Vec<usize>,
-    /// Of the values, oldest first; of as many draws as well.
+    /// Shares of the values, oldest first; a drawn record of as many values has the same shares.
     shares: Vec<f64>,
-    /// The same summed up.
+    /// Cumulative sums of the shares.
     cumulative: Vec<f64>,
 }
 
 impl SmoothedLaw {
-    /// Of a record, oldest first, whose values weigh less the older they are.
+    /// Smooths a record, oldest first, in which older values weigh less.
     fn of(record: &[f64], retention: f64) -> Self {
         let weights = weights(record.len(), retention);
         let total: f64 = weights.iter().sum();
@@ -70,7 +72,7 @@ impl SmoothedLaw {
         SmoothedLaw { atoms, masses, places, shares, cumulative }
     }
 
-    /// The places of as many draws as the record has values, oldest first.
+    /// Draws as many atoms as the record has values, and returns their indices, oldest first.
     fn draw(&self, generator: &mut impl Rng) -> Vec<usize> {
         let count = self.cumulative.len();
         let one = |_| {
@@ -81,7 +83,7 @@ impl SmoothedLaw {
         (0..count).map(one).collect()
     }
 
-    /// The Wasserstein-1 distance to the law of draws in these places, oldest first. Cost O(atoms).
+    /// Returns the Wasserstein-1 distance to the law of draws with these indices, oldest first. Cost O(atoms).
     fn distance(&self, places: &[usize]) -> f64 {
         let mut apart = self.masses.iter().map(|mass| -mass).collect::<Vec<f64>>();
         places.iter().zip(&self.shares).for_each(|(&place, share)| apart[place] += share);
@@ -89,7 +91,7 @@ impl SmoothedLaw {
     }
 }
 
-/// The middles of as many equally likely parts of a standard normal law, brought to variance 1.
+/// Returns the medians of `SPREAD` equally likely parts of a standard normal law, scaled to variance 1.
 fn normal_nodes() -> [f64; SPREAD] {
     let normal = ContinuousLaw::mixture(vec![(1.0, 0.0, 1.0)]);
     let nodes: [f64; SPREAD] = std::array::from_fn(|part| normal.quantile((part as f64 + 0.5) / SPREAD as f64));
@@ -97,18 +99,19 @@ fn normal_nodes() -> [f64; SPREAD] {
     nodes.map(|node| node / variance.sqrt())
 }
 
-/// The factor for the radius by `bridges`, of the sample size of `record` (oldest first, at least two values that differ), at a
-/// miscoverage. Streams: (seed, "calibration", 0, index). Cost O(1000 (n paths + n ln n)).
+/// Returns the factor for the radius at a miscoverage. `bridges` must have the sample size of `record`, which is oldest
+/// first and has at least two different values. Streams: (seed, "calibration", 0, index). Cost O(1000 (n paths + n ln
+/// n)).
 ///
-/// Checked by: `balls_of_fresh_records_hold_the_smoothed_law_as_often_as_they_say`, and on laws that are no record's by
-/// `ballast coverage`.
+/// Checked by: `balls_of_fresh_records_hold_the_smoothed_law_as_often_as_they_say`, and by `ballast coverage` on laws
+/// that are not those of a record.
 pub fn calibration_factor(bridges: &AbsoluteBridges, record: &[f64], retention: f64, alpha: f64, seed: u64) -> f64 {
     let mut needed = needed(bridges, record, retention, alpha, |index| stream(seed, "calibration", 0, index));
     needed.sort_by(f64::total_cmp);
     interpolated_quantile(&needed, 1.0 - alpha)
 }
 
-/// The factor that the ball of each of many records drawn needs to hold the smoothed law of `record`.
+/// Returns, for each of many drawn records, the factor that its ball needs to hold the smoothed law of `record`.
 fn needed<R: Rng>(
     bridges: &AbsoluteBridges,
     record: &[f64],
@@ -153,7 +156,7 @@ mod tests {
             let factor = calibration_factor(&bridges, &record, retention, alpha, 1);
             let fresh = needed(&bridges, &record, retention, alpha, |index| stream(2, "fresh", 0, index));
             let held = fresh.iter().filter(|needed| **needed <= factor).count() as f64 / RECORDS as f64;
-            // Four standard errors of the difference of two shares of 1000 records.
+            // Four standard errors of the difference between two shares of 1000 records.
             let tolerance = 4.0 * (2.0 * alpha * (1.0 - alpha) / RECORDS as f64).sqrt();
             assert!((held - (1.0 - alpha)).abs() < tolerance, "{count} {held} {factor}");
             let without = fresh.iter().filter(|needed| **needed <= 1.0).count() as f64 / RECORDS as f64;
@@ -172,14 +175,15 @@ mod tests {
         for moment in [|z: f64| z, |z: f64| z * z] {
             assert!((mean(&moment) - seen(&moment)).abs() < 1e-15);
         }
-        // A record of its draws is as far from the atoms as from the mixture they stand for: another algorithm.
+        // A record of draws is as far from the atoms as from the mixture they represent; the latter uses another
+        // algorithm.
         let mixture = LawDistance::new(ContinuousLaw::smoothed_bootstrap(&record, &weights), 1.0, [50]);
         for index in 0..5 {
             let places = law.draw(&mut stream(5, "draws", 0, index));
             let mut sample = Vec::new();
             places.iter().for_each(|&place| mixture.learn(&mut sample, [mixture.place(law.atoms[place], 1.0)]));
             let (found, expected) = (law.distance(&places), mixture.distance(&sample));
-            // Sixteen atoms in the place of a normal law of half a deviation.
+            // Sixteen atoms represent a normal law of half a deviation.
             assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
         }
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// Barycentric interpolation in Chebyshev points of the first kind, moved to `[0, 1]`.
+/// Barycentric interpolation in Chebyshev points of the first kind, mapped to `[0, 1]`.
 ///
 /// Source: Berrut and Trefethen (2004), Barycentric Lagrange interpolation, SIAM Review 46.
 #[derive(Debug, Clone)]
@@ -12,7 +12,7 @@ pub struct Chebyshev {
 }
 
 impl Chebyshev {
-    /// `count` nodes, at least one.
+    /// Creates `count` nodes, at least one.
     pub fn new(count: usize) -> Self {
         let angle = |index: usize| (2 * index + 1) as f64 * PI / (2 * count) as f64;
         let nodes = (0..count).map(|index| 0.5 - 0.5 * angle(index).cos()).collect();
@@ -21,12 +21,12 @@ impl Chebyshev {
         Chebyshev { nodes, weights }
     }
 
-    /// Where values are wanted, ascending, in [0, 1].
+    /// Returns the points at which values are needed, ascending, in [0, 1].
     pub fn nodes(&self) -> &[f64] {
         &self.nodes
     }
 
-    /// The weight of each node's value in the polynomial through them, evaluated at `position`. Cost O(count).
+    /// Returns the weight of each node's value in the interpolating polynomial at `position`. Cost O(count).
     pub fn basis(&self, position: f64) -> Vec<f64> {
         if let Some(hit) = self.nodes.iter().position(|&node| node == position) {
             return (0..self.nodes.len()).map(|node| if node == hit { 1.0 } else { 0.0 }).collect();
@@ -39,9 +39,10 @@ impl Chebyshev {
     }
 }
 
-/// Weights of the cubic through the four nodes around `position` (fewer on a shorter grid): first index, weights.
+/// Returns the first index and the weights of the cubic through the four nodes around `position`, or fewer on a shorter
+/// grid.
 ///
-/// `nodes` ascending and distinct, at least one. Error O(h^4) times the fourth derivative.
+/// `nodes` must be ascending and distinct, at least one. Error O(h^4) times the fourth derivative.
 pub fn local_cubic(nodes: &[f64], position: f64) -> (usize, [f64; 4]) {
     let count = nodes.len().min(4);
     let above = nodes.partition_point(|&node| node < position);

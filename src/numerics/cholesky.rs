@@ -1,4 +1,4 @@
-//! Symmetric positive definite systems: the one place that knows which library factors them.
+//! Symmetric positive definite systems. Only this module knows which libraries factor them.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -11,14 +11,14 @@ use super::matern::dot_inline;
 
 /// From this many rows on, faer's blocked factorisation beats nalgebra's.
 const BLOCKED_FROM_ROWS: usize = 64;
-/// Amounts tried on the diagonal, relative to its mean. The last is far above rounding, far below any noise.
+/// Amounts tried on the diagonal, relative to its mean. The last is far above rounding and far below any noise.
 const RELATIVE_JITTERS: [f64; 5] = [0.0, 1e-12, 1e-10, 1e-8, 1e-6];
-/// A squared pivot under this share of its diagonal entry is rounding, not information: the row depends on others.
+/// A squared pivot below this share of its diagonal entry is only rounding: the row depends on others.
 const LEAST_PIVOT_SHARE: f64 = 1e-14;
-/// Columns eliminated together in a triangular solve: one pass over the unknowns for each four columns.
+/// Columns that a triangular solve eliminates together: one pass over the unknowns for each four columns.
 const COLUMNS: usize = 4;
 
-/// The matrix stayed indefinite, to working precision, with the largest amount tried on its diagonal.
+/// The error that a matrix is indefinite, to working precision, even with the largest amount tried on its diagonal.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("the matrix is not positive definite, even with {jitter:e} added to its diagonal")]
 pub struct Singular {
@@ -29,12 +29,12 @@ pub struct Singular {
 /// The factor L of A = L L^T, lower triangular with a positive diagonal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cholesky {
-    /// Above the diagonal stands whatever stood there in the matrix factored.
+    /// The factor; entries above the diagonal are those of the matrix factored.
     lower: DMatrix<f64>,
 }
 
 impl Cholesky {
-    /// Factors a symmetric matrix in its own memory, reading the lower triangle alone; `None` unless it is positive
+    /// Factors a symmetric matrix in its own memory, and reads only the lower triangle. `None` unless it is positive
     /// definite to working precision.
     ///
     /// Cost n^3 / 3.
@@ -55,12 +55,12 @@ impl Cholesky {
         positive.then_some(Cholesky { lower })
     }
 
-    /// The memory of the factor, for another matrix.
+    /// Returns the memory of the factor, for another matrix.
     pub fn into_memory(self) -> DMatrix<f64> {
         self.lower
     }
 
-    /// x with A x = `right`. Cost 2 n^2.
+    /// Returns x with A x = `right`. Cost 2 n^2.
     pub fn solve(&self, right: &[f64]) -> Vec<f64> {
         let mut x = self.solve_lower(right);
         let (l, n) = (self.lower.as_slice(), self.lower.nrows());
@@ -73,7 +73,7 @@ impl Cholesky {
         x
     }
 
-    /// v with L v = `right`. Cost n^2, memory read once in order.
+    /// Returns v with L v = `right`. Cost n^2; memory is read once in order.
     pub fn solve_lower(&self, right: &[f64]) -> Vec<f64> {
         let (l, n) = (self.lower.as_slice(), self.lower.nrows());
         assert_eq!(right.len(), n);
@@ -94,7 +94,8 @@ impl Cholesky {
         x
     }
 
-    /// Overwrites each column of `right` with v, L v = column. Cost n^2 a column, memory read once for many.
+    /// Overwrites each column of `right` with v, where L v = column. Cost n^2 for each column; memory is read once for
+    /// many.
     pub fn solve_lower_columns(&self, right: &mut DMatrix<f64>) {
         let (n, columns) = right.shape();
         assert_eq!(n, self.lower.nrows());
@@ -118,13 +119,13 @@ impl Cholesky {
         );
     }
 
-    /// ln det A = 2 sum_i ln L_ii. Cost O(n).
+    /// Returns ln det A = 2 sum_i ln L_ii. Cost O(n).
     pub fn log_determinant(&self) -> f64 {
         2.0 * self.lower.diagonal().iter().map(|pivot| pivot.ln()).sum::<f64>()
     }
 }
 
-/// Overwrites the lower triangle of a column-major matrix with its factor; `None` at a pivot that is not positive.
+/// Overwrites the lower triangle of a column-major matrix with its factor; `None` if a pivot is not positive.
 fn factor_blocked(values: &mut [f64], n: usize) -> Option<()> {
     let mut memory = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
     llt::factor::cholesky_in_place(
@@ -138,7 +139,7 @@ fn factor_blocked(values: &mut [f64], n: usize) -> Option<()> {
     .map(|_| ())
 }
 
-/// Solves for the unknowns j to j + 3 and takes their columns out of the rest.
+/// Solves for the unknowns j to j + 3 and eliminates their columns from the rest.
 #[inline(always)]
 fn eliminate_block(l: &[f64], n: usize, j: usize, x: &mut [f64]) {
     let mut pivots = [0.0; COLUMNS];
@@ -160,8 +161,8 @@ fn eliminate_block(l: &[f64], n: usize, j: usize, x: &mut [f64]) {
 
 /// Factors A + jitter I for the smallest jitter of 0, 1e-12, 1e-10, 1e-8 and 1e-6 mean diagonals that succeeds.
 ///
-/// `matrix` makes A, anew for each try, so that one matrix takes memory at a time. Returns the factor and the amount added
-/// to the diagonal, in the units of A. Cost that of a factorisation for each try.
+/// `matrix` creates A anew for each try, so that only one matrix is in memory at a time. Returns the factor and the
+/// amount added to the diagonal, in the units of A. Cost: one factorisation for each try.
 pub fn factor_with_jitter(matrix: impl Fn() -> DMatrix<f64>) -> Result<(Cholesky, f64), Singular> {
     let mut jitter = 0.0;
     for relative in RELATIVE_JITTERS {
@@ -180,7 +181,8 @@ pub fn factor_with_jitter(matrix: impl Fn() -> DMatrix<f64>) -> Result<(Cholesky
 mod tests {
     use super::*;
 
-    /// Diagonally dominant, so positive definite; the entries follow no pattern that a bug could hide in.
+    /// Returns a diagonally dominant, and so positive definite, matrix; its entries follow no pattern that a bug could
+    /// hide in.
     fn dominant(n: usize) -> DMatrix<f64> {
         DMatrix::from_fn(n, n, |i, j| {
             let (a, b) = (i.max(j), i.min(j));

@@ -2,69 +2,70 @@
 //!
 //!   C = { (mu, s2) : n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa, s2 >= 0 },  kappa = -2 ln(alpha)
 //!
-//! m and v are the maximum-likelihood estimates from n values, n diag(1/v, 1/(2 v^2)) the information at them, and kappa
-//! the (1 - alpha)-quantile of chi-square with two degrees of freedom: C holds the truth with probability 1 - alpha as n
-//! grows. Source: Bielecki, Chen, Cialenco, Cousin and Jeanblanc (2019), SIAM J. Control Optim. 57, with the estimates in
-//! the denominators as there; cut at zero variance, which the ellipse passes where n < 2 kappa.
+//! m and v are the maximum-likelihood estimates from n values, and n diag(1/v, 1/(2 v^2)) is the information at them.
+//! kappa is the (1 - alpha)-quantile of chi-square with two degrees of freedom, so C contains the truth with
+//! probability 1 - alpha as n grows. Source: Bielecki, Chen, Cialenco, Cousin and Jeanblanc (2019), SIAM J. Control
+//! Optim. 57, with the estimates in the denominators as there. The region is cut at zero variance, which the ellipse
+//! crosses if n < 2 kappa.
 //!
-//! The expectation of a fixed payoff under N(mu, s2), as a function of mu and s2, solves the heat equation with s2 in the
-//! place of time. By its maximum principle the least value over C lies on the boundary, so one angle is all there is to search.
+//! The expectation of a fixed payoff under N(mu, s2), as a function of mu and s2, solves the heat equation with s2 as
+//! time. By its maximum principle the least value over C lies on the boundary, so only one angle has to be searched.
 
 use std::f64::consts::TAU;
 
 use super::minimise::maximise_concave_scalar;
 
-/// Angles tried before the search between the neighbours of the least.
+/// Number of angles that are tried before the search around each local minimum.
 const ANGLES: usize = 48;
 const ANGLE_TOLERANCE: f64 = 1e-6;
-/// Expectations that differ by less than this share of their size are equal.
+/// Expectations that differ by less than this share of their size count as equal.
 const ROUNDING: f64 = 1e-14;
 /// Half-width of the quadrature in standard deviations: 1e-15 of the mass lies outside.
 const REACH: f64 = 8.0;
-/// Nodes on either side of the mean: the trapezoidal rule of step 1/4 is exact to rounding for a payoff that is smooth on
-/// the scale of the standard deviation, and third order in the step where the payoff's curvature jumps.
+/// Nodes on either side of the mean. The trapezoidal rule with step 1/4 is exact to rounding for a payoff that is
+/// smooth on the scale of the standard deviation. It is third order in the step where the payoff's curvature jumps.
 const NODES: i32 = 32;
-/// Share of the radius by which a multiplier's difference quotient moves it.
+/// Share of the radius by which the difference quotient of a multiplier changes it.
 const RADIUS_STEP: f64 = 1e-3;
 
-/// A normal law, or the point mass at the mean where the variance is 0.
+/// A normal law, or the point mass at the mean if the variance is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormalLaw {
-    /// mu.
+    /// The mean, mu.
     pub mean: f64,
-    /// s2, at least 0.
+    /// The variance s2, at least 0.
     pub variance: f64,
 }
 
-/// The law of a region under which a payoff is expected to be least.
+/// The law of a region with the least expected payoff.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorstNormal {
-    /// The law itself.
+    /// The law.
     pub law: NormalLaw,
-    /// Of the payoff under it.
+    /// Expected payoff under the law.
     pub expectation: f64,
-    /// Where on the boundary: an angle of [`ConfidenceRegion::at`].
+    /// Position on the boundary: an angle of [`ConfidenceRegion::at`].
     pub angle: f64,
 }
 
 /// The region around an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfidenceRegion {
-    /// The maximum-likelihood estimate, (m, v), v positive.
+    /// The maximum-likelihood estimate (m, v), with v positive.
     pub estimate: NormalLaw,
     /// `sqrt(kappa / n)`: half the width in the mean, in standard deviations.
     pub radius: f64,
 }
 
 impl NormalLaw {
-    /// Nodes of the quadrature, ascending. Their masses come from `Quadrature::masses`.
+    /// Returns the nodes of the quadrature, ascending. Their masses are those of [`Quadrature`].
     pub fn nodes(self) -> impl Iterator<Item = f64> {
         let step = REACH / f64::from(NODES) * self.variance.sqrt();
         (-NODES..=NODES).map(move |index| self.mean + f64::from(index) * step)
     }
 }
 
-/// The masses of a normal law's nodes, the same for every law.
+/// The masses of a normal law's nodes, which are the same for every law.
 pub struct Quadrature {
     masses: Vec<f64>,
 }
@@ -81,39 +82,41 @@ impl Default for Quadrature {
 }
 
 impl Quadrature {
-    /// Nodes of a law.
+    /// Returns the number of nodes of a law.
     pub fn count(&self) -> usize {
         self.masses.len()
     }
 
-    /// Expectation of a payoff given at the nodes of one law.
+    /// Returns the expectation of a payoff that is given at the nodes of a law.
     pub fn expectation(&self, payoff: &[f64]) -> f64 {
         self.masses.iter().zip(payoff).map(|(mass, value)| mass * value).sum()
     }
 }
 
-/// `sqrt(kappa / n)` at miscoverage `alpha` in (0, 1] and sample size n, of a weighted sample its effective size.
+/// Returns `sqrt(kappa / n)` at miscoverage `alpha` in (0, 1] and sample size n; for a weighted sample n is its
+/// effective size.
 pub fn radius(alpha: f64, sample_size: f64) -> f64 {
     (-2.0 * alpha.ln() / sample_size).max(0.0).sqrt()
 }
 
 impl ConfidenceRegion {
-    /// The angles at which [`Self::worst`] wants the expectation first: one where the region is a point.
+    /// Returns the angles at which [`Self::worst`] needs the expectation first; only one if the region is a point.
     pub fn angles(&self) -> impl Iterator<Item = f64> {
         let count = if self.radius > 0.0 { ANGLES } else { 1 };
         (0..count).map(|index| TAU * index as f64 / ANGLES as f64)
     }
 
-    /// The law on the boundary at `angle`: to the right of the estimate at 0, above it (larger variance) at a quarter turn.
+    /// Returns the law on the boundary at `angle`: right of the estimate at 0, and above it (larger variance) at a
+    /// quarter turn.
     ///
     ///   mu = m + radius sqrt(v) cos(angle),  s2 = max(v + radius sqrt(2) v sin(angle), 0)
     ///
-    /// Below zero the ellipse runs under the segment that cuts it, whose points are its points moved up.
+    /// If the ellipse runs below zero variance, its points are moved up to the segment that cuts it.
     pub fn at(&self, angle: f64) -> NormalLaw {
         self.scaled(1.0, angle)
     }
 
-    /// The same on the ellipse of `share` times the radius.
+    /// Returns the law on the ellipse of `share` times the radius.
     fn scaled(&self, share: f64, angle: f64) -> NormalLaw {
         let NormalLaw { mean, variance } = self.estimate;
         let reach = share * self.radius;
@@ -123,21 +126,22 @@ impl ConfidenceRegion {
         }
     }
 
-    /// The largest variance in the region.
+    /// Returns the largest variance in the region.
     pub fn largest_variance(&self) -> f64 {
         self.estimate.variance * (1.0 + self.radius * 2.0_f64.sqrt())
     }
 
-    /// An interval that holds the nodes of every law in the region.
+    /// Returns an interval that contains the nodes of every law in the region.
     pub fn window(&self) -> (f64, f64) {
         let NormalLaw { mean, variance } = self.estimate;
         let reach = self.radius * variance.sqrt() + REACH * self.largest_variance().sqrt();
         (mean - reach, mean + reach)
     }
 
-    /// The worst law, by a search around every local minimum of `tried`, the expectations at [`Self::angles`].
+    /// Finds the worst law by a search around every local minimum of `tried`, the expectations at [`Self::angles`].
     ///
-    /// The angle is good to 1e-6 and the expectation to its square times the curvature. Cost: about ten expectations.
+    /// The angle is accurate to 1e-6, and the expectation to its square times the curvature. Cost: about ten
+    /// expectations.
     pub fn worst(&self, tried: &[f64], expectation: impl Fn(NormalLaw) -> f64) -> WorstNormal {
         let spacing = TAU / ANGLES as f64;
         let start = WorstNormal { law: self.at(0.0), expectation: tried[0], angle: 0.0 };
@@ -162,8 +166,8 @@ impl ConfidenceRegion {
         worst
     }
 
-    /// Expectation lost per unit of radius. At the worst angle the derivative along it is the derivative of the minimum, so
-    /// a central difference there does, to 1e-6 relative.
+    /// Returns the expectation lost per unit of radius. The derivative at the worst angle is the derivative of the
+    /// minimum, so a central difference at this angle suffices, to 1e-6 relative.
     pub fn multiplier(&self, worst: &WorstNormal, expectation: impl Fn(NormalLaw) -> f64) -> f64 {
         if self.radius <= 0.0 {
             return 0.0;
@@ -180,7 +184,7 @@ mod tests {
     type Function = fn(f64) -> f64;
     type Expectation = fn(f64, f64) -> f64;
 
-    /// Payoffs with their expectations under N(mu, s2) in closed form.
+    /// Payoffs and their expectations under N(mu, s2) in closed form.
     const PAYOFFS: [(Function, Expectation); 4] = [
         (|z| z.exp(), |mu, s2| (mu + 0.5 * s2).exp()),
         (|z| -(-3.0 * z).exp(), |mu, s2| -(-3.0 * mu + 4.5 * s2).exp()),
@@ -199,7 +203,7 @@ mod tests {
 
     #[test]
     fn the_worst_of_the_boundary_is_the_worst_of_the_whole_region() {
-        // From 9 returns down the ellipse passes zero variance.
+        // With nine returns or fewer the ellipse crosses zero variance.
         for size in [3, 8, 10, 20, 500] {
             let region = region(f64::from(size));
             for (payoff, exact) in PAYOFFS {

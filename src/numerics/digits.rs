@@ -1,18 +1,19 @@
 //! Numbers in text.
 
-/// Writes a number to so many decimals, a zero without a sign.
+/// Writes a number to `decimals` decimals; a zero has no sign.
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     if is_zero(&text) { text.trim_start_matches('-').to_owned() } else { text }
 }
 
-/// Writes a number to so many decimals with its sign, a zero without one.
+/// Writes a number to `decimals` decimals with its sign; a zero has no sign.
 pub fn signed(value: f64, decimals: usize) -> String {
     let text = format!("{value:+.decimals$}");
     if is_zero(&text) { text.trim_start_matches(['-', '+']).to_owned() } else { text }
 }
 
-/// Decimals in which two numbers differ by five units of the last or more: at least `least`, and 6 at most.
+/// Returns the number of decimals at which two numbers differ by at least five units of the last: at least `least`, and
+/// at most 6.
 pub fn deciding(one: f64, other: f64, least: usize) -> usize {
     let wanted = (5.0 / (one - other).abs()).log10().ceil();
     if wanted.is_finite() { (wanted.max(0.0) as usize).clamp(least, 6.max(least)) } else { least }

@@ -1,13 +1,13 @@
-//! Loops compiled once for each instruction set, of which the processor's best is taken at run time.
+//! Loops that are compiled once for each instruction set; the best one for the processor is chosen at run time.
 
-/// Moved into a dispatched closure, see [`dispatched`].
+/// A value that is moved into a dispatched closure, see [`dispatched`].
 pub(crate) struct Once;
 
 /// Runs an expression compiled for the instruction set at hand, through `pulp`.
 ///
-/// A closure that borrows alone would be called through a shim that the compiler is free not to inline, and then its body
-/// falls back to the baseline instruction set: a twelfth of the speed, where it fuses. A closure that consumes something
-/// has no shim.
+/// A closure that only borrows would be called through a shim, which the compiler may choose not to inline. Its body
+/// then falls back to the baseline instruction set, at a twelfth of the speed if it uses fused operations. A closure
+/// that consumes a value has no shim.
 macro_rules! dispatched {
     ($body:expr) => {{
         let once = $crate::numerics::dispatch::Once;

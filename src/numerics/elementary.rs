@@ -1,10 +1,10 @@
 //! Exponential and logarithm that LLVM can turn into vector code.
 //!
-//! Multiplications and additions are fused where the formula says so and nowhere else, so that the bits of a result do
-//! not depend on the processor: one without the instruction computes the same fused result, slowly. Called inside loops
-//! that `pulp` compiles once for each instruction set.
+//! Multiplications and additions are fused only where the formula says so, so that the bits of a result do not depend
+//! on the processor. A processor without the instruction computes the same fused result, slowly. The functions are
+//! called inside loops that `pulp` compiles once for each instruction set.
 
-/// Outside this range the exponential has no normal value; it is held at its ends, about 3e-308 and 8e307.
+/// The range in which the exponential has normal values; outside it is clamped to the ends, about 3e-308 and 8e307.
 const EXPONENT_RANGE: (f64, f64) = (-708.0, 709.0);
 /// Adding 1.5 * 2^52 rounds to an integer and leaves it in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
@@ -12,10 +12,10 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN2_LOW: f64 = f64::from_bits(0x3dea_39ef_3579_3c76);
 const EXPONENT_BIAS: u64 = 1024;
-/// Bits of sqrt(1/2), from which mantissas are counted: they lie in [sqrt(1/2), sqrt 2).
+/// Bits of sqrt(1/2), the start of the range of mantissas: they lie in [sqrt(1/2), sqrt 2).
 const SQRT_HALF_BITS: u64 = 0x3fe6_a09e_667f_3bcd;
 
-/// exp(x), with relative error below 1e-14 on [-708, 709] and held at its ends outside. A NaN stays a NaN.
+/// Returns exp(x), with relative error below 1e-14 on [-708, 709] and clamped outside. A NaN stays a NaN.
 ///
 ///   exp(x) = 2^k exp(x - k ln 2),  k = round(x / ln 2)
 ///
@@ -26,14 +26,14 @@ pub fn exp(x: f64) -> f64 {
     power * (polynomial + 1.0)
 }
 
-/// exp(x) - 1, with relative error below 1e-14 on [-708, 709] and held at its ends outside. A NaN stays a NaN.
+/// Returns exp(x) - 1, with relative error below 1e-14 on [-708, 709] and clamped outside. A NaN stays a NaN.
 #[inline(always)]
 pub fn exp_m1(x: f64) -> f64 {
     let (polynomial, power) = reduced(x);
     power * polynomial + (power - 1.0)
 }
 
-/// exp(t) - 1 and 2^k of the argument x = k ln 2 + t.
+/// Returns exp(t) - 1 and 2^k for the argument x = k ln 2 + t.
 #[inline(always)]
 fn reduced(x: f64) -> (f64, f64) {
     let x = if x < EXPONENT_RANGE.0 { EXPONENT_RANGE.0 } else { x };
@@ -56,7 +56,7 @@ fn reduced(x: f64) -> (f64, f64) {
     (sum * t, f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52))
 }
 
-/// ln(x) for positive normal x, with absolute error below 1e-15 plus rounding of the result.
+/// Returns ln(x) for positive normal x, with absolute error below 1e-15 plus rounding of the result.
 ///
 ///   ln(x) = k ln 2 + ln(m),  m in [sqrt(1/2), sqrt 2),  ln(m) = 2 s (1 + s^2/3 + s^4/5 + ..),  s = (m - 1)/(m + 1)
 ///
@@ -64,7 +64,8 @@ fn reduced(x: f64) -> (f64, f64) {
 #[inline(always)]
 pub fn ln(x: f64) -> f64 {
     let shifted = x.to_bits().wrapping_sub(SQRT_HALF_BITS);
-    // Biased to be positive and placed in the low bits of a number whose unit is 1: no instruction converts integers.
+    // Biased to be positive, and put into the low bits of a number whose unit is 1, because no instruction converts
+    // integers.
     let biased = shifted.wrapping_add(EXPONENT_BIAS << 52) >> 52;
     let k = f64::from_bits(ROUNDER.to_bits() + biased) - (ROUNDER + EXPONENT_BIAS as f64);
     let mantissa = f64::from_bits((shifted & 0x000f_ffff_ffff_ffff).wrapping_add(SQRT_HALF_BITS));

@@ -1,19 +1,20 @@
 //! Empirical distributions and their moments.
 
-/// The law of n observed values, of which the one seen k values ago weighs `d^k`, d the *retention* in (0, 1]: mass
+/// The law of n observed values, in which the value seen k values ago has weight `d^k`, d the *retention* in (0, 1]:
+/// mass
 ///
 ///   w_k = d^k / (1 + d + ... + d^(n-1)).
 ///
-/// At d = 1 every value has mass 1/n. One more value z makes it `(1 - w) F + w delta_z` with `w = 1 / (1 + d + ... + d^n)`,
-/// which tends to 1/(n + 1) as d tends to 1, and to 1 - d as n grows.
+/// At d = 1 every value has mass 1/n. One more value z turns F into `(1 - w) F + w delta_z` with
+/// `w = 1 / (1 + d + ... + d^n)`, which tends to 1/(n + 1) as d tends to 1, and to 1 - d as n grows.
 ///
-/// Values are kept in ascending order, and every statistic is computed from that order. Pushing values one by one equals
-/// starting from the whole sample, bit for bit; at d = 1 the order of arrival cannot be felt.
+/// Values are kept in ascending order, and every statistic is computed in that order. Pushing values one by one equals
+/// starting from the whole sample, bit for bit. At d = 1 the order of arrival has no effect.
 /// Checked by: `weights_are_the_powers_of_the_retention`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EmpiricalDistribution {
     sorted: Vec<f64>,
-    /// `d^k` of each value, in the order of the values.
+    /// Weight `d^k` of each value, in the order of the values.
     weights: Vec<f64>,
     retention: f64,
     /// Sums of the weights and of their squares, in the order of arrival.
@@ -22,12 +23,12 @@ pub struct EmpiricalDistribution {
 }
 
 impl EmpiricalDistribution {
-    /// The law of `sample`, which must be finite, with equal weights. Cost O(n ln n).
+    /// Creates the law of `sample`, which must be finite, with equal weights. Cost O(n ln n).
     pub fn new(sample: &[f64]) -> Self {
         EmpiricalDistribution::decaying(sample, 1.0)
     }
 
-    /// The law of `sample`, finite and oldest first, at a retention in (0, 1]. Cost O(n ln n).
+    /// Creates the law of `sample`, finite and oldest first, at a retention in (0, 1]. Cost O(n ln n).
     pub fn decaying(sample: &[f64], retention: f64) -> Self {
         let (mut total, mut squares) = (0.0, 0.0);
         let mut weighted: Vec<(f64, f64)> = sample.iter().copied().zip(weights(sample.len(), retention)).collect();
@@ -39,7 +40,7 @@ impl EmpiricalDistribution {
         EmpiricalDistribution { sorted, weights, retention, total, squares }
     }
 
-    /// Learns one observation. Cost O(n).
+    /// Adds one observation. Cost O(n).
     pub fn push(&mut self, value: f64) {
         let position = self.sorted.partition_point(|&atom| atom.total_cmp(&value).is_le());
         self.weights.iter_mut().for_each(|weight| *weight *= self.retention);
@@ -48,7 +49,8 @@ impl EmpiricalDistribution {
         (self.total, self.squares) = one_more(self.total, self.squares, self.retention);
     }
 
-    /// Learns many, oldest first. Cost O(n) and a sort of the new; at a retention below 1, a pass over all for each of them.
+    /// Adds many observations, oldest first. Cost O(n) and a sort of the new; at a retention below 1, also a pass over
+    /// all for each.
     pub fn extend(&mut self, values: &[f64]) {
         for _ in values {
             if self.retention < 1.0 {
@@ -74,41 +76,42 @@ impl EmpiricalDistribution {
         self.weights.extend_from_slice(&known.1[passed..]);
     }
 
-    /// The atoms in ascending order, repeated where observed repeatedly.
+    /// Returns the atoms in ascending order, repeated if observed repeatedly.
     pub fn atoms(&self) -> &[f64] {
         &self.sorted
     }
 
-    /// Those of the atoms, in their order; the newest value weighs 1.
+    /// Returns the weights of the atoms, in their order; the newest value has weight 1.
     pub fn weights(&self) -> &[f64] {
         &self.weights
     }
 
-    /// The sum of the weights: n where they are equal.
+    /// Returns the sum of the weights: n if they are equal.
     pub fn total_weight(&self) -> f64 {
         self.total
     }
 
-    /// d, what of a value's weight is left once another was learned.
+    /// Returns d, the factor by which a value's weight shrinks when another value is added.
     pub fn retention(&self) -> f64 {
         self.retention
     }
 
-    /// Number of observations, n.
+    /// Returns the number of observations, n.
     pub fn sample_size(&self) -> usize {
         self.sorted.len()
     }
 
-    /// How many equally weighted values tell as much of a mean: `1 / sum of the squared masses`, which is n at d = 1, and
+    /// Returns the effective sample size, `1 / sum of the squared masses`: the number of equally weighted values that
+    /// determine a mean as well. It is n at d = 1, and
     ///
     ///   (1 + d) (1 - d^n) / ((1 - d) (1 + d^n))
     ///
-    /// below. Checked by: `src/control/request/learning.rs::the_effective_size_has_its_closed_form`.
+    /// for d < 1. Checked by: `src/control/request/learning.rs::the_effective_size_has_its_closed_form`.
     pub fn effective_size(&self) -> f64 {
         self.total * self.total / self.squares
     }
 
-    /// The same after one more observation, and after two.
+    /// Returns the effective sample size after one more observation, and after two.
     pub fn effective_sizes_ahead(&self) -> [f64; 2] {
         let mut sums = (self.total, self.squares);
         [(); 2].map(|()| {
@@ -117,7 +120,7 @@ impl EmpiricalDistribution {
         })
     }
 
-    /// Raw moments `m_k = sum_j w_j z_j^k`, w the masses, for k = 1 to `count`. Cost O(n count).
+    /// Returns the raw moments `m_k = sum_j w_j z_j^k`, w the masses, for k = 1 to `count`. Cost O(n count).
     pub fn raw_moments(&self, count: usize) -> Vec<f64> {
         let mut sums = vec![0.0; count];
         for (&atom, &weight) in self.sorted.iter().zip(&self.weights) {
@@ -131,7 +134,7 @@ impl EmpiricalDistribution {
     }
 }
 
-/// `d^k` of `count` values, oldest first: the newest weighs 1.
+/// Returns the weights `d^k` of `count` values, oldest first: the newest has weight 1.
 pub fn weights(count: usize, retention: f64) -> Vec<f64> {
     let mut weights = vec![1.0; count];
     for age in 1..count {
@@ -140,7 +143,7 @@ pub fn weights(count: usize, retention: f64) -> Vec<f64> {
     weights
 }
 
-/// The sums of the weights and of their squares after one more value.
+/// Returns the sums of the weights and of their squares after one more value.
 fn one_more(total: f64, squares: f64, retention: f64) -> (f64, f64) {
     (total * retention + 1.0, squares * (retention * retention) + 1.0)
 }
@@ -157,7 +160,8 @@ mod tests {
             let law = EmpiricalDistribution::decaying(&SAMPLE, retention);
             let mut pushed = EmpiricalDistribution::decaying(&SAMPLE[..2], retention);
             for (age, &value) in SAMPLE.iter().enumerate().skip(2) {
-                // F' = (1 - w) F + w delta_z, w = 1 / (1 + d + ... + d^n): of the mean, which is linear in the law.
+                // F' = (1 - w) F + w delta_z, w = 1 / (1 + d + ... + d^n), checked by the mean, which is linear in the
+                // law.
                 let before = pushed.raw_moments(1)[0];
                 let newest = 1.0 / (0..=age).map(|power| retention.powi(power as i32)).sum::<f64>();
                 pushed.push(value);

@@ -2,8 +2,8 @@
 //!
 //!   min { E_F[e^Z] : W1(F, F^) <= radius } = sum_j w_j e^min(z_j, c),   sum_j w_j (z_j - c)^+ = radius,   w the masses
 //!
-//! e^z is increasing and convex, so the cheapest loss per unit of distance lies at the top: the worst law cuts the
-//! largest values off at a cap c. A lower bound of the support bounds the cap.
+//! e^z is increasing and convex, so a loss is cheapest per unit of distance at the top: the worst law caps the largest
+//! values at c. A lower bound of the support bounds the cap.
 
 use super::empirical::EmpiricalDistribution;
 
@@ -17,14 +17,14 @@ pub struct ExponentialMean<'a> {
 /// Mean and variance of e^Z under the law with the worst mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorstExponential {
-    /// Of e^Z.
+    /// Mean of e^Z.
     pub mean: f64,
-    /// Of e^Z.
+    /// Variance of e^Z.
     pub variance: f64,
 }
 
 impl<'a> ExponentialMean<'a> {
-    /// Cost O(n).
+    /// Prepares a law. Cost O(n).
     pub fn of(law: &'a EmpiricalDistribution) -> Self {
         let mut sums = vec![[0.0; 2]];
         let mut total = [0.0; 2];
@@ -35,23 +35,23 @@ impl<'a> ExponentialMean<'a> {
         ExponentialMean { law, sums }
     }
 
-    /// Over the ball of the law itself. `lowest` bounds the support from below; minus infinity where nothing does. Cost O(values
-    /// above the cap).
+    /// Returns the worst mean over the ball of the law. `lowest` bounds the support from below; it is minus infinity if
+    /// nothing does. Cost O(values above the cap).
     pub fn worst(&self, radius: f64, lowest: f64) -> WorstExponential {
         self.capped(None, radius, lowest)
     }
 
-    /// Over the ball of the law with `value` added. Cost O(values above the cap).
+    /// Returns the worst mean over the ball of the law with `value` added. Cost O(values above the cap).
     pub fn worst_with(&self, value: f64, radius: f64, lowest: f64) -> WorstExponential {
         self.capped(Some(value), radius, lowest)
     }
 
     fn capped(&self, extra: Option<f64>, radius: f64, lowest: f64) -> WorstExponential {
         let (atoms, weights) = (self.law.atoms(), self.law.weights());
-        // Of a weight of the law, and of the extra value's.
+        // Factors for the weights of the law, and the weight of the extra value.
         let (kept, more) = if extra.is_some() { (self.law.retention(), 1.0) } else { (1.0, 0.0) };
         let size = self.law.total_weight() * kept + more;
-        // Atoms left below the cap, and whether the extra value is among them.
+        // Atoms that remain below the cap, and the extra value if it is among them.
         let (mut left, mut extra_left) = (atoms.len(), extra);
         let (mut above, mut cap, mut budget) = (0.0, f64::INFINITY, radius * size);
         loop {
@@ -82,7 +82,7 @@ impl<'a> ExponentialMean<'a> {
     }
 }
 
-/// The sums with so much more weight of one log-return.
+/// Returns the sums with `weight` more of one log-return.
 fn added([sum, squares]: [f64; 2], log_return: f64, weight: f64) -> [f64; 2] {
     [sum + weight * log_return.exp(), squares + weight * log_return.exp_m1().powi(2)]
 }
@@ -121,12 +121,12 @@ mod tests {
         let expected = ball.worst_expectation(&payoff).0;
         let lowest = f64::NEG_INFINITY;
         let found = extra.map_or_else(|| mean.worst(radius, lowest), |value| mean.worst_with(value, radius, lowest));
-        // The grid misses the cap by at most its spacing, of which the chord of e^z is second order.
+        // The grid misses the cap by at most its spacing; the chord of e^z is second order in it.
         assert!((found.mean - expected).abs() < 2e-9, "{radius} {extra:?}: {found:?} against {expected}");
         let moves = ball.worst_law(&payoff).moves;
         let square: f64 = moves.iter().map(|moved| moved.mass * payoff[moved.to].powi(2)).sum();
         let variance = square - expected * expected;
-        // Likewise, but the square may put the cap's mass on either neighbour.
+        // The same holds here, but the square may put the cap's mass on either adjacent point.
         assert!((found.variance - variance).abs() < 1e-6, "{radius} {extra:?}: {found:?} against {variance}");
     }
 

@@ -1,11 +1,12 @@
 //! Space-filling selection.
 
-/// Indices of `count` rows of `rows` that lie far apart, the first of them as `given`: each further one is the
-/// row farthest from all chosen before it (the first such row), in the metric `sum_i ((x_i - y_i) / scales_i)^2`, its
-/// distance counted as many times as its entry of `weights` says; rows without one are given, never chosen.
+/// Returns the indices of `count` rows of `rows` that are far apart, starting with those in `given`. Each further row
+/// is the farthest from all rows chosen before it (the first such row) in the metric
+/// `sum_i ((x_i - y_i) / scales_i)^2`. Its distance is multiplied by its entry of `weights`. A row without a weight may
+/// be given, but is never chosen.
 ///
-/// Under equal weights twice the least covering radius at worst. Cost O(rows count d). Source: Gonzalez (1985),
-/// Theoretical Computer Science 38; weights as in Dyer and Frieze (1985), Operations Research Letters 3.
+/// With equal weights the covering radius is at most twice the least one. Cost O(rows count d). Source: Gonzalez
+/// (1985), Theoretical Computer Science 38; weights as in Dyer and Frieze (1985), Operations Research Letters 3.
 pub fn farthest_points(
     rows: &[Vec<f64>],
     scales: &[f64],
@@ -36,7 +37,8 @@ pub fn farthest_points(
     chosen
 }
 
-/// Lowers each row's squared distance to the chosen rows by the one to `centre`; a chosen row is never chosen again.
+/// Lowers each row's squared distance to the chosen rows by the one to `centre`, and marks `centre` so that it is never
+/// chosen again.
 fn approach(nearest: &mut [f64], scaled: &[Vec<f64>], centre: usize) {
     for (nearest, row) in nearest.iter_mut().zip(scaled) {
         let distance: f64 = row.iter().zip(&scaled[centre]).map(|(x, y)| (x - y) * (x - y)).sum();

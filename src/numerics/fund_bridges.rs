@@ -1,20 +1,23 @@
-//! How much wider than one fund's own radius a ball must be for the laws of all funds of several assets to lie in theirs at once.
+//! The factor by which a ball must be wider than one fund's own radius so that the laws of all funds of several assets
+//! lie in their balls at once.
 //!
-//! A fund of the shares theta has the log-return `zeta = ln sum_i theta_i e^(z_i)`. Its bridge statistic
+//! A fund with shares theta has the log-return `zeta = ln sum_i theta_i e^(z_i)`. Its bridge statistic
 //!
 //!   H_theta = (1 / sqrt n) sum_k | sum_(i<=k) (g_(i) - mean g) | (zeta_(k+1) - zeta_(k)),
 //!
-//! with a normal g for each date and the dates sorted by zeta, has the law of `numerics/bridge.rs`, and all funds share the
-//! normals, so that they vary together as the funds do. With Q_theta the (1 - alpha)-quantile of H_theta, the joint factor is that
-//! of the largest H_theta / Q_theta: 1 for one asset, where there is one fund. That
-//! laws of all linear slices come near at the rate 1 / sqrt n in any dimension is shown by Xu and Huang (2022), Central limit
-//! theorem for the sliced 1-Wasserstein distance and the max-sliced 1-Wasserstein distance, arXiv:2205.14624; the statistic, and
-//! that funds behave alike, are the project's, and `docs/measurements.md` counts how often the balls hold.
+//! with a normal g for each date and the dates sorted by zeta, has the law of `numerics/bridge.rs`. All funds share the
+//! normals, so their statistics vary together as the funds do. Let Q_theta be the (1 - alpha)-quantile of H_theta. The
+//! joint factor is the (1 - alpha)-quantile of the largest H_theta / Q_theta: 1 for one asset, where there is one fund.
+//! Xu and Huang (2022), Central limit theorem for the sliced 1-Wasserstein distance and the max-sliced 1-Wasserstein
+//! distance, arXiv:2205.14624, show that the laws of all linear slices converge at the rate 1 / sqrt n in any
+//! dimension. The statistic, and the assumption that funds behave alike, are the project's; `docs/measurements.md`
+//! counts how often the balls hold.
 //!
-//! The largest over all funds is searched over the single assets, equal shares, inverse volatilities and twenty fixed draws, then
-//! between the fund that is largest most often where it matters and the single assets. A finite search errs low: by
-//! little where assets move together, and by more than a tenth for a dozen independent ones, where thousands of funds differ (see the
-//! test `the_joint_factor_of_independent_assets_errs_low` in `tests/solver/assets.rs`).
+//! The search for the largest ratio over all funds covers the single assets, equal shares, inverse volatilities and
+//! twenty fixed draws. It then tries points between the single assets and the fund that is largest most often in the
+//! tail. A finite search errs low: by little if assets move together, and by more than a tenth for a dozen independent
+//! assets, where thousands of funds differ (see the test `the_joint_factor_of_independent_assets_errs_low` in
+//! `tests/solver/assets.rs`).
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -24,28 +27,28 @@ use super::levelling::inverse_volatility;
 use super::scale_mixture::ScaleMixture;
 use super::streams::stream;
 
-/// Funds drawn evenly among all, the same for everybody.
+/// The number of funds drawn uniformly over all shares; the draws are fixed, so every call uses the same funds.
 const DRAWN_FUNDS: usize = 20;
-/// Parts of the way from the fund that is largest to each single asset that are tried, one after the other.
+/// The fractions of the way from the largest fund to each single asset that are tried in turn.
 const SEARCH_STEPS: [f64; 3] = [0.5, 0.25, 0.125];
 
-/// Log-returns of a fund that holds the shares `fund`, brought back to them every period: `ln sum_i theta_i e^(z_i)`.
+/// Returns the log-returns of a fund that is rebalanced to the shares `fund` every period: `ln sum_i theta_i e^(z_i)`.
 pub fn fund_returns(rows: &[Vec<f64>], fund: &[f64]) -> Vec<f64> {
     let of =
         |row: &Vec<f64>| row.iter().zip(fund).map(|(log_return, share)| share * log_return.exp()).sum::<f64>().ln();
     rows.iter().map(of).collect()
 }
 
-/// Bridges of all funds of the assets whose log-returns stand in `rows`, date by date, at least two.
+/// Bridges of all funds of the assets with log-returns `rows`, one row a date, at least two dates.
 pub struct FundBridges<'a> {
     rows: &'a [Vec<f64>],
-    /// Path after path: centred normals of the dates, of length 1.
+    /// The centred normals of the dates, scaled to length 1, path after path.
     directions: Vec<f64>,
     lengths: ScaleMixture,
 }
 
 impl<'a> FundBridges<'a> {
-    /// Path p is of the stream (seed, "fund bridge", 0, p). Cost O(n paths).
+    /// Simulates the bridges; path p uses the stream (seed, "fund bridge", 0, p). Cost O(n paths).
     pub fn simulate(rows: &'a [Vec<f64>], paths: usize, seed: u64) -> Self {
         let dates = rows.len();
         let mut directions = Vec::with_capacity(dates * paths);
@@ -59,7 +62,7 @@ impl<'a> FundBridges<'a> {
         FundBridges { rows, directions, lengths: ScaleMixture::chi(dates.saturating_sub(1).max(1)) }
     }
 
-    /// H of a fund over the length of each path. Cost O(n (paths + ln n)).
+    /// Returns H of a fund divided by the length, for each path. Cost O(n (paths + ln n)).
     fn statistic(&self, fund: &[f64]) -> Vec<f64> {
         let dates = self.rows.len();
         let zeta = fund_returns(self.rows, fund);
@@ -79,20 +82,21 @@ impl<'a> FundBridges<'a> {
         self.directions.chunks_exact(dates).map(of).collect()
     }
 
-    /// The (1 - alpha)-quantile of a fund's H, with the standard error of its simulation.
+    /// Returns the (1 - alpha)-quantile of a fund's H, with the standard error of its simulation.
     pub fn quantile(&self, fund: &[f64], alpha: f64) -> Quantile {
         let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &self.statistic(fund));
         Quantile { value, standard_error }
     }
 
-    /// The (1 - alpha)-quantile of the largest H / Q among `funds`, with the standard error of its simulation.
+    /// Returns the (1 - alpha)-quantile of the largest H / Q among `funds`, with the standard error of its simulation.
     pub fn factor_among(&self, funds: &[Vec<f64>], alpha: f64) -> Quantile {
         let mut largest = Largest::none(self);
         funds.iter().for_each(|fund| largest.admit(fund, alpha));
         largest.factor(alpha)
     }
 
-    /// The joint factor of all funds; exactly 1 for one asset. Cost O(funds n (paths + ln n)), some 20 and 4 d funds.
+    /// Returns the joint factor of all funds; exactly 1 for one asset. Cost O(funds n (paths + ln n)), with about 20 +
+    /// 4 d funds.
     pub fn joint_factor(&self, alpha: f64) -> Quantile {
         let assets = self.rows.first().map_or(0, Vec::len);
         if assets < 2 {
@@ -112,7 +116,8 @@ impl<'a> FundBridges<'a> {
     }
 }
 
-/// The single assets, equal shares, inverse volatilities and the fixed draws, evenly over all shares that sum to 1.
+/// Returns the single assets, equal shares, inverse volatilities and the fixed draws, uniform over all shares that sum
+/// to 1.
 fn funds(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let assets = rows.first().map_or(0, Vec::len);
     let single = |asset: usize| (0..assets).map(|index| if index == asset { 1.0 } else { 0.0 }).collect();
@@ -128,7 +133,7 @@ fn funds(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     funds
 }
 
-/// The largest H / Q among some funds, path by path, and the fund whose it is.
+/// The largest H / Q among some funds for each path, and the fund that attains it.
 struct Largest<'b, 'a> {
     bridges: &'b FundBridges<'a>,
     ratios: Vec<f64>,
@@ -142,7 +147,7 @@ impl<'b, 'a> Largest<'b, 'a> {
         Largest { bridges, ratios: vec![0.0; paths], funds: Vec::new(), whose: vec![0; paths] }
     }
 
-    /// A fund whose return does not vary is never the largest.
+    /// Adds a fund. A fund whose return does not vary is never the largest.
     fn admit(&mut self, fund: &[f64], alpha: f64) {
         let statistic = self.bridges.statistic(fund);
         let quantile = self.bridges.lengths.quantile(1.0 - alpha, &statistic);
@@ -159,7 +164,7 @@ impl<'b, 'a> Largest<'b, 'a> {
         Quantile { value, standard_error }
     }
 
-    /// The fund that is largest most often among the alpha of paths whose ratio is largest.
+    /// Returns the fund that is largest most often among the share alpha of paths with the largest ratios.
     fn most_often(&self, alpha: f64) -> Vec<f64> {
         let mut sorted = self.ratios.clone();
         sorted.sort_by(f64::total_cmp);
@@ -199,7 +204,7 @@ mod tests {
         let fund = funds.quantile(&[1.0], 0.1);
         let allowed = 4.0 * one.standard_error.hypot(fund.standard_error);
         assert!((fund.value - one.value).abs() < allowed, "{fund:?} {one:?}");
-        // Among one fund the largest is that fund: the quantile over itself.
+        // With one fund the largest ratio is that fund's: the quantile over itself.
         assert!((funds.factor_among(&[vec![1.0]], 0.1).value - 1.0).abs() < 1e-8);
     }
 
@@ -209,7 +214,7 @@ mod tests {
         let bridges = FundBridges::simulate(&rows, 2000, 3);
         let all = funds(&rows);
         let factors: Vec<f64> = (1..=all.len()).map(|count| bridges.factor_among(&all[..count], 0.1).value).collect();
-        // Two quantiles to 1e-9 of themselves each.
+        // Each of the two quantiles is accurate to 1e-9 of itself.
         assert!(factors.windows(2).all(|pair| pair[1] > pair[0] - 1e-8), "{factors:?}");
         assert!(bridges.joint_factor(0.1).value > factors[factors.len() - 1] - 1e-8);
         let alike: Vec<Vec<f64>> = rows.iter().map(|row| vec![row[0]; 3]).collect();

@@ -1,38 +1,38 @@
-//! Where the gaps of a law count in a statistic over bridges: at which of their times, and how much.
+//! The weights of a law's gaps in a statistic over bridges: the times at which they count, and how much.
 
 use super::bridge_paths::{AbsoluteBridges, Share, Times, deviation};
 use super::empirical::EmpiricalDistribution;
 
-/// A statistic of a law of n values; of weights that decay, n stands for their sum.
+/// A statistic of a law of n values; if weights decay, n stands for their sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Statistic {
-    /// Of the law itself, over bridges of sample size n.
+    /// The statistic of the law itself, over bridges of sample size n.
     Now,
-    /// The mean over the laws that learn one of its values again, each with the mass of that value, over bridges of sample size
-    /// n + 1: what the statistic becomes, on average, when the next value comes from the law itself. With equal weights a value
-    /// doubled at rank j moves the gaps above it one node up, so that gap i lies at node i in n - i of the laws and at node i + 1
-    /// in the other i.
+    /// The mean over the laws that add one of its values again, each with the mass of that value, over bridges of
+    /// sample size n + 1. This is the expected statistic if the next value is drawn from the law itself. With equal
+    /// weights, a value doubled at rank j moves the gaps above it one node up. Gap i is therefore at node i in n - i of
+    /// the laws, and at node i + 1 in the other i.
     OneLater,
 }
 
-/// Mass below or above a gap that counts as none: the bridge is within 1e-7 of 0.
+/// Mass below or above a gap that counts as zero: the bridge is within 1e-7 of 0.
 const NO_MASS: f64 = 1e-14;
 
 const NONE: Share = (0, 0.0);
 
-/// Where gaps of laws of one size and retention count.
+/// The weights of gaps, for laws of one size and retention.
 pub(super) struct Places<'a> {
     bridges: &'a AbsoluteBridges,
-    /// Of all values of a law.
+    /// Total weight of all values of a law.
     total: f64,
     retention: f64,
     which: Statistic,
-    /// The graded time at or after the last one asked for: that of the next is often the same, or one on.
+    /// The graded time at or after the latest one requested; the next is often the same, or one further.
     near: usize,
 }
 
 impl<'a> Places<'a> {
-    /// Of laws of `size` values whose weights sum to `total`.
+    /// Prepares for laws of `size` values whose weights sum to `total`.
     pub fn new(bridges: &'a AbsoluteBridges, size: usize, total: f64, retention: f64, which: Statistic) -> Self {
         if let Times::Sample(own) = bridges.times {
             assert_eq!(own, size + usize::from(which == Statistic::OneLater), "bridges of the sample size of the law");
@@ -44,7 +44,7 @@ impl<'a> Places<'a> {
         Places::new(bridges, law.sample_size(), law.total_weight(), law.retention(), which)
     }
 
-    /// Of a gap with values below it that weigh `below`.
+    /// Returns the times and weights of a gap with values of total weight `below` under it.
     pub fn of(&mut self, below: f64) -> [Share; 4] {
         match self.which {
             Statistic::Now => {
@@ -61,7 +61,7 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// At the time below/total.
+    /// Returns the times and weights for the time below/total.
     fn at(&mut self, below: f64, total: f64) -> [Share; 2] {
         let time = below / total;
         if time.min(1.0 - time) <= NO_MASS {
@@ -70,7 +70,7 @@ impl<'a> Places<'a> {
         match &self.bridges.times {
             Times::Sample(own) => {
                 let size = *own as f64;
-                // With equal weights the ratio is 1, and the position a node, to the last bit.
+                // With equal weights the ratio is 1, so the position is a node, to the last bit.
                 let position = below * (size / total);
                 let node = position.ceil();
                 if node == position {
@@ -90,14 +90,15 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// At a time between time `after` - 1 and time `after`, which are `low` and `high`, with the deviations of a bridge there.
+    /// Interpolates between time `after` - 1 and time `after`, which are `low` and `high`, with the deviations of a
+    /// bridge there.
     fn interpolated(&self, after: usize, [low, high]: [f64; 2], [at_low, at_high]: [f64; 2], time: f64) -> [Share; 2] {
         let share = (time - low) / (high - low);
         let scale = deviation(time) / ((1.0 - share) * at_low + share * at_high);
         [self.share(after - 1, (1.0 - share) * scale), self.share(after, share * scale)]
     }
 
-    /// At time `time` of the bridges, from 1; at 0, and at 1 after the last, a bridge is 0.
+    /// Returns the weight at time `time` of the bridges, from 1; at 0, and at 1 after the last time, a bridge is 0.
     fn share(&self, time: usize, part: f64) -> Share {
         let units = &self.bridges.units;
         time.checked_sub(1).and_then(|time| Some((time, part * units.get(time)?))).unwrap_or(NONE)

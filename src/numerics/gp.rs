@@ -12,19 +12,19 @@ use serde::{Deserialize, Serialize};
 use super::cholesky::{Cholesky, Singular, factor_with_jitter};
 use super::matern;
 
-/// The scales of a Gaussian process: l_i in the units of input i, s2 and noise in the units of the target squared.
+/// Hyperparameters of a Gaussian process: l_i in the units of input i, s2 and noise in the units of the target squared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hyperparameters {
-    /// One a dimension, in the inputs' units.
+    /// Length scales l_i, one for each dimension, in the inputs' units.
     pub lengthscales: Vec<f64>,
     /// s2, in squared units of the targets.
     pub signal_variance: f64,
-    /// Added to the diagonal, in squared units of the targets.
+    /// Noise variance that is added to the diagonal, in squared units of the targets.
     pub noise_variance: f64,
 }
 
 impl Hyperparameters {
-    /// Each column of `inputs` (n rows, d columns) divided by its length scale. Cost O(n d).
+    /// Divides each column of `inputs` (n rows, d columns) by its length scale. Cost O(n d).
     pub(super) fn scale(&self, inputs: &DMatrix<f64>) -> DMatrix<f64> {
         assert_eq!(inputs.ncols(), self.lengthscales.len(), "one length scale for each column");
         let mut scaled = inputs.clone();
@@ -35,7 +35,7 @@ impl Hyperparameters {
     }
 }
 
-/// Squared distances from row `row` of `scaled` to each later row, written to `out` of length n - row - 1.
+/// Writes the squared distances from row `row` of `scaled` to each later row to `out`, of length n - row - 1.
 pub(super) fn squared_distances_below(scaled: &DMatrix<f64>, row: usize, out: &mut [f64]) {
     let centre: Vec<f64> = scaled.row(row).iter().copied().collect();
     matern::squared_distances(scaled.as_slice(), scaled.nrows(), row + 1, &centre, out);
@@ -54,20 +54,22 @@ pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters, kerne
     }
 }
 
-/// The posterior mean alone: all that has to be kept of a process to evaluate it, or of several that share inputs and scales.
+/// The posterior mean of a process, or of several that share inputs and length scales. It keeps only what evaluation
+/// needs.
 ///
 ///   m(x) = s2 sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j),   r_j^2 = 5 sum_i ((x_i - x_ji) / l_i)^2
 #[derive(Debug, Clone, PartialEq)]
 pub struct GpMean {
-    /// n rows, d columns, already divided by the length scales.
+    /// Inputs in n rows and d columns, already divided by the length scales.
     inputs: DMatrix<f64>,
-    /// K^-1 y times the signal variance, function by function.
+    /// K^-1 y times the signal variance, one vector for each function.
     weights: Vec<Vec<f64>>,
     lengthscales: Vec<f64>,
 }
 
 impl GpMean {
-    /// From `inputs` (n rows, d columns, in their own units) and, one a function, `weights` K^-1 y of length n. Cost O(n d).
+    /// Creates the mean from `inputs` (n rows, d columns, in their own units) and `weights` K^-1 y of length n for each
+    /// function. Cost O(n d).
     pub fn new(inputs: &DMatrix<f64>, weights: &[Vec<f64>], hyper: &Hyperparameters) -> GpMean {
         assert!(weights.iter().all(|weights| inputs.nrows() == weights.len()), "one weight for each row");
         let scaled = |weights: &Vec<f64>| weights.iter().map(|weight| weight * hyper.signal_variance).collect();
@@ -78,19 +80,19 @@ impl GpMean {
         }
     }
 
-    /// m(query) of the only function, where `query` has d entries. Cost O(n d) and one allocation of n.
+    /// Returns m(query) of the only function, for a `query` of d entries. Cost O(n d) and one allocation of n.
     pub fn mean(&self, query: &[f64]) -> f64 {
         self.mean_with(query, &mut Vec::new())
     }
 
-    /// As [`GpMean::mean`], with the distances kept in `scratch`: no allocation once it has grown to n.
+    /// Does the same as [`GpMean::mean`], but keeps the distances in `scratch`: no allocation once it has grown to n.
     pub fn mean_with(&self, query: &[f64], scratch: &mut Vec<f64>) -> f64 {
         scratch.resize(self.input_count(), 0.0);
         self.squared_distances(query, 0..self.lengthscales.len(), scratch);
         matern::weighted_sum(scratch, &self.weights[0])
     }
 
-    /// m(query) of every function. Cost O(n (d + functions)).
+    /// Returns m(query) of every function. Cost O(n (d + functions)).
     pub fn means(&self, query: &[f64]) -> Vec<f64> {
         let mut squared = vec![0.0; self.input_count()];
         self.squared_distances(query, 0..self.lengthscales.len(), &mut squared);
@@ -99,8 +101,8 @@ impl GpMean {
 
     /// Overwrites `out[j]` with sum_i ((query_i - x_ji) / l_i)^2 over i in `dimensions`.
     ///
-    /// `query` has all d entries, of which those outside `dimensions` are not read; `out` has n. The sums over
-    /// disjoint ranges add up to the whole, so the part that does not change between queries can be reused.
+    /// `query` has all d entries; those outside `dimensions` are not read. `out` has n entries. The sums over disjoint
+    /// ranges add up to the whole, so the part that does not change between queries can be reused.
     /// Cost O(n |dimensions|).
     pub fn squared_distances(&self, query: &[f64], dimensions: Range<usize>, out: &mut [f64]) {
         assert_eq!(query.len(), self.lengthscales.len(), "one query entry for each column");
@@ -116,8 +118,8 @@ impl GpMean {
         );
     }
 
-    /// m of every function at the point whose squared scaled distances to the n inputs are given, and overwritten.
-    /// Cost O(n) a function.
+    /// Returns m of every function at a point, given its squared scaled distances to the n inputs, which are
+    /// overwritten. Cost O(n) for each function.
     pub fn means_from_squared(&self, squared_distances: &mut [f64]) -> Vec<f64> {
         if let [only] = self.weights.as_slice() {
             return vec![matern::weighted_sum(squared_distances, only)];
@@ -126,16 +128,16 @@ impl GpMean {
         self.weights.iter().map(|weights| matern::dot(squared_distances, weights)).collect()
     }
 
-    /// Number of inputs, n.
+    /// Returns the number of inputs, n.
     pub fn input_count(&self) -> usize {
         self.inputs.nrows()
     }
 }
 
-/// What each target would have been predicted to be without it.
+/// Predictions of each target from the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeaveOneOut {
-    /// Target by target, y_i minus its prediction from the target's other values.
+    /// y_i minus its prediction from the other values of the same target, one vector for each target.
     pub errors: Vec<Vec<f64>>,
     /// Standard deviation of the noise-free value at input i given the others.
     pub latent_sd: Vec<f64>,
@@ -156,7 +158,7 @@ impl GaussianProcess {
     ///
     ///   weights = (K + noise I)^-1 y
     ///
-    /// A kernel matrix that is singular to working precision gets the least jitter that factors, see
+    /// If the kernel matrix is singular to working precision, the least jitter that lets it factor is added; see
     /// [`GaussianProcess::jitter`]. Cost O(n^3 / 3). Source: Rasmussen and Williams 2006, algorithm 2.1.
     pub fn condition(
         inputs: &DMatrix<f64>,
@@ -175,18 +177,19 @@ impl GaussianProcess {
         Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })
     }
 
-    /// Bytes that a process over `points` rows of `inputs` columns holds: the square factor above all, and a quarter as
-    /// much for what making it leaves behind (`tests/estimates.rs` measures it).
+    /// Returns the bytes that a process over `points` rows of `inputs` columns holds: mostly the square factor, and a
+    /// quarter of it for memory that remains from making it (`tests/estimates.rs` measures it).
     pub fn bytes_of(points: usize, inputs: usize) -> usize {
         size_of::<f64>().saturating_mul(points).saturating_mul(points + points / 4 + inputs + 2)
     }
 
-    /// Posterior mean k^T (K + noise I)^-1 y at `query`. Cost O(n d).
+    /// Returns the posterior mean k^T (K + noise I)^-1 y at `query`. Cost O(n d).
     pub fn mean(&self, query: &[f64]) -> f64 {
         self.mean.mean(query)
     }
 
-    /// Posterior variance of the noise-free value, s2 - |L^-1 k|^2, at least 0. Cost O(n^2).
+    /// Returns the posterior variance of the noise-free value, s2 - |L^-1 k|^2, at least 0. Cost
+    /// O(n^2).
     pub fn latent_variance(&self, query: &[f64]) -> f64 {
         let mut covariances = vec![0.0; self.weights.len()];
         self.covariances(query, &mut covariances);
@@ -194,7 +197,8 @@ impl GaussianProcess {
         (self.hyper.signal_variance - matern::dot(&whitened, &whitened)).max(0.0)
     }
 
-    /// [`GaussianProcess::latent_variance`] at each query, to rounding. Cost O(n^2) a query, a fifth of that of one by one.
+    /// Returns [`GaussianProcess::latent_variance`] at each query, up to rounding. Cost O(n^2) a query, but a fifth of
+    /// the time of single calls.
     pub fn latent_variances(&self, queries: &[Vec<f64>]) -> Vec<f64> {
         let mut covariances = DMatrix::zeros(self.weights.len(), queries.len());
         for (column, query) in covariances.as_mut_slice().chunks_exact_mut(self.weights.len()).zip(queries) {
@@ -205,34 +209,35 @@ impl GaussianProcess {
         explained.map(|explained| (self.hyper.signal_variance - explained).max(0.0)).collect()
     }
 
-    /// Overwrites `out` with the covariances of the values at `query` and at the n inputs.
+    /// Overwrites `out` with the covariances between the value at `query` and those at the n inputs.
     fn covariances(&self, query: &[f64], out: &mut [f64]) {
         self.mean.squared_distances(query, 0..query.len(), out);
         matern::matern_from_squared(out);
         out.iter_mut().for_each(|value| *value *= self.hyper.signal_variance);
     }
 
-    /// (K + noise I)^-1 y, one for each input.
+    /// Returns (K + noise I)^-1 y, one entry for each input.
     pub fn weights(&self) -> &[f64] {
         &self.weights
     }
 
-    /// Amount added to the diagonal beyond the noise to make the matrix factor, in the units of the target squared.
+    /// Returns the amount added to the diagonal beyond the noise so that the matrix factors, in the units of the target
+    /// squared.
     pub fn jitter(&self) -> f64 {
         self.jitter
     }
 
-    /// The part that evaluates means, which is all that a stored process needs.
+    /// Returns the part that evaluates means, which is all that a stored process needs.
     pub fn posterior_mean(&self) -> &GpMean {
         &self.mean
     }
 
-    /// (K + noise I)^-1 y for other values y at the same inputs. Cost O(n^2).
+    /// Returns (K + noise I)^-1 y for other values y at the same inputs. Cost O(n^2).
     pub fn weights_of(&self, targets: &[f64]) -> Vec<f64> {
         self.cholesky.solve(targets)
     }
 
-    /// Errors and standard deviations of each value of some targets predicted from its others, without refitting.
+    /// Predicts each value of `targets` from the others, without refitting, and returns errors and standard deviations.
     ///
     ///   error_i = alpha_i / (A^-1)_ii,   latent variance_i = 1 / (A^-1)_ii - noise, at least 0,   A = K + noise I
     ///

@@ -1,4 +1,4 @@
-//! Maximum likelihood for the scales of a Gaussian process, with exact gradients.
+//! Maximum likelihood for the hyperparameters of a Gaussian process, with exact gradients.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,46 +11,46 @@ use super::minimise::{Minimum, SearchOutcome, minimise_bounded};
 use super::quasi_newton::{curvature_at, minimise_from};
 
 const ITERATION_LIMIT: usize = 100;
-/// Subsets searched first: their rows, and the number of rows above which they are. An evaluation on 300 rows costs 1/25
-/// of one on 1000, and both the optimum and the curvature of a subset are close to those of all rows.
+/// Subsets that are searched first: their rows, and the number of rows above which they are used. An evaluation on 300
+/// rows costs 1/25 of one on 1000. Both the optimum and the curvature of a subset are close to those of all rows.
 const SUBSETS: [(usize, usize); 2] = [(300, 400), (1000, 2500)];
-/// A search that starts from a known curvature ends where a step promises less than this of ln p, far below the 1/2 by
-/// which the scales are uncertain.
+/// A search from a known curvature ends if a step predicts an improvement of ln p below this, far below the 1/2 by
+/// which the hyperparameters are uncertain.
 const TOLERANCE: f64 = 1e-3;
-/// Or after this many steps. At 1,000 points of the paper's problem convergence takes 15 evaluations for the value and 26
-/// for the policy, on average; the errors of the surrogates are the same from 6 steps on.
+/// The most steps of such a search. At 1,000 points of the paper's problem convergence takes 15 evaluations for the
+/// value and 26 for the policy, on average. The errors of the surrogates are the same from 6 steps on.
 const STEP_LIMIT: usize = 6;
-/// Default start: the share of the targets' variance taken for noise.
+/// Default start: the share of the targets' variance that is noise.
 const START_NOISE_SHARE: f64 = 1e-2;
-/// A search starts from length scales no longer than this, in units of the inputs: beyond, the likelihood is flat to the
-/// optimiser, which would leave an input that matters where an earlier search on other rows had lost it.
+/// The longest length scale at which a search starts, in units of the inputs. Beyond it the likelihood is flat to the
+/// optimiser. If an earlier search on other rows had lost an input that matters, a later search could not recover it.
 const LONGEST_START: f64 = 30.0;
 
-/// Least and greatest value of each scale; both positive.
+/// Lower and upper bounds of the hyperparameters, all positive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
     /// Lower and upper bound of every length scale.
     pub lengthscale: [f64; 2],
-    /// Lower and upper bound.
+    /// Lower and upper bound of the signal variance.
     pub signal_variance: [f64; 2],
-    /// Lower and upper bound.
+    /// Lower and upper bound of the noise variance.
     pub noise_variance: [f64; 2],
 }
 
-/// The most likely scales found.
+/// The most likely hyperparameters found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// The best found.
+    /// The best hyperparameters found.
     pub hyperparameters: Hyperparameters,
     /// ln p(targets) over all rows.
     pub log_likelihood: f64,
     /// Factorisations on all rows and on subsets together.
     pub evaluations: usize,
-    /// How the search on all rows ended.
+    /// The reason why the search on all rows ended.
     pub outcome: SearchOutcome,
 }
 
-/// Why there are no scales.
+/// The reason why no hyperparameters were found.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// No jitter made the covariance matrix factor.
@@ -61,15 +61,16 @@ pub enum FitError {
     Stopped,
 }
 
-/// The scales in `bounds` under which `targets` at `inputs` (n rows, d columns) are most likely: one or more functions of
-/// the inputs, n values each, that are independent draws of one process.
+/// Finds the hyperparameters in `bounds` under which `targets` at `inputs` (n rows, d columns) are most likely. The
+/// targets are one or more functions of the inputs, n values each, and independent draws of one process.
 ///
-/// A search over natural logarithms in the box, the signal variance profiled out, from `start` (moved into the bounds)
-/// or from the spread of the data: L-BFGS-B on all of up to 400 rows. Of more rows 300, evenly strided, are searched
-/// so, and the curvature found there, which grows with the number of rows, leads quasi-Newton steps on all rows, or
-/// above 2500 on 1000 rows and then on all: six evaluations or so. A start whose kernel matrix is singular is retried
-/// with the greatest noise allowed; `Singular` when that fails too. `Stopped` within one evaluation of `stop` being set.
-/// Cost O(n^3) for each evaluation. Source: Rasmussen and Williams 2006, section 5.4.1.
+/// The search is over natural logarithms in the box, with the signal variance profiled out. It starts from `start`
+/// (clamped to the bounds) or from the spread of the data, and runs L-BFGS-B on all of up to 400 rows. With more rows
+/// it runs on 300 evenly spaced rows. The curvature found there, which grows with the number of rows, then guides
+/// quasi-Newton steps on all rows; above 2500 rows, first on 1000 and then on all. That takes about six evaluations. If
+/// the kernel matrix at the start is singular, the search is retried with the greatest noise allowed, and returns
+/// `Singular` if that also fails. It returns `Stopped` within one evaluation of `stop` being set. Cost O(n^3) for each
+/// evaluation. Source: Rasmussen and Williams 2006, section 5.4.1.
 pub fn fit(
     inputs: &DMatrix<f64>,
     targets: &[Vec<f64>],
@@ -109,12 +110,12 @@ pub fn fit(
     })
 }
 
-/// Brings the first `inputs` entries, logarithms of length scales, within [`LONGEST_START`].
+/// Limits the first `inputs` entries, logarithms of length scales, to [`LONGEST_START`].
 fn shorten(point: &mut [f64], inputs: usize) {
     point[..inputs].iter_mut().for_each(|log_scale| *log_scale = log_scale.min(LONGEST_START.ln()));
 }
 
-/// A search for the most likely scales of some rows.
+/// A search for the most likely hyperparameters of some rows.
 struct Search<'a> {
     inputs: &'a DMatrix<f64>,
     targets: &'a [Vec<f64>],
@@ -122,22 +123,22 @@ struct Search<'a> {
     stop: &'a AtomicBool,
 }
 
-/// Where a search ended.
+/// The result of a search.
 struct Optimum {
-    /// Of -ln p.
+    /// Minimum of -ln p.
     minimum: Minimum,
-    /// Profiled out there.
+    /// The signal variance, profiled out at the minimum.
     signal_variance: f64,
 }
 
 impl Search<'_> {
-    /// The best point found from `start`: by L-BFGS-B, or by quasi-Newton steps where the curvature is known.
+    /// Returns the best point found from `start`, by L-BFGS-B, or by quasi-Newton steps if the curvature is known.
     fn run(&self, start: &[f64], curvature_of_a_row: Option<&DMatrix<f64>>) -> Result<Optimum, FitError> {
         let (lower, upper) = self.limits();
         let mut matrices = Matrices::new(self.inputs.nrows());
         let mut best = (f64::INFINITY, f64::NAN);
         let stopped = || self.stop.load(Ordering::Relaxed);
-        // Once stopped every point is outside the domain, and the line search gives up.
+        // Once stopped, every point is outside the domain, so the line search gives up.
         let mut objective = |point: &[f64]| {
             let found = if stopped() { None } else { self.profiled(point, &mut matrices) };
             let Some(found) = found else { return (f64::INFINITY, vec![0.0; point.len()]) };
@@ -167,7 +168,8 @@ impl Search<'_> {
         }
     }
 
-    /// The second derivatives of -ln p at `point`, divided by the number of rows; `None` where they are not finite.
+    /// Returns the second derivatives of -ln p at `point`, divided by the number of rows; `None` if they are not
+    /// finite.
     fn curvature_of_a_row(&self, point: &[f64]) -> Option<DMatrix<f64>> {
         let mut matrices = Matrices::new(self.inputs.nrows());
         let rows = self.inputs.nrows() as f64;
@@ -179,7 +181,7 @@ impl Search<'_> {
         curvature_at(slopes, point, &lower, &upper)
     }
 
-    /// The box of the search: log length scales, then the log of the noise ratio.
+    /// Returns the box of the search: log length scales, then the log of the noise ratio.
     fn limits(&self) -> (Vec<f64>, Vec<f64>) {
         let Bounds { lengthscale, signal_variance, noise_variance } = self.bounds;
         let side = |side: usize| {
@@ -190,14 +192,14 @@ impl Search<'_> {
         (side(0), side(1))
     }
 
-    /// The likelihood with the signal variance profiled out, at `point`: log length scales, then the log of the ratio
-    /// nu = noise / signal variance.
+    /// Returns the likelihood with the signal variance profiled out at `point`, which holds log length scales, then the
+    /// log of the ratio nu = noise / signal variance.
     ///
-    ///   s2(l, nu) = sum y^T A^-1 y / (p n), moved into its bounds,   A = R(l) + nu I,   K = s2 A
+    ///   s2(l, nu) = sum y^T A^-1 y / (p n), clamped to its bounds,   A = R(l) + nu I,   K = s2 A
     ///
-    /// Where s2 is inside its bounds its own slope vanishes, so the gradient is the partial one; where a bound of the noise
-    /// holds it, s2 moves against nu. The ridge along which s2 and the length scales trade places is gone, and with it most
-    /// iterations of a search. `None` where A is singular. Cost as [`likelihood`].
+    /// If s2 is inside its bounds its own slope vanishes, so the gradient is the partial one. If a bound of the noise
+    /// holds s2, it moves against nu. Profiling removes the ridge along which s2 and the length scales compensate each
+    /// other, and with it most iterations of a search. `None` if A is singular. Cost as [`likelihood`].
     fn profiled(&self, point: &[f64], matrices: &mut Matrices) -> Option<Likelihood> {
         let Search { inputs, targets, bounds, .. } = *self;
         let unit = hyperparameters(point, 1.0);
@@ -214,7 +216,7 @@ impl Search<'_> {
     }
 }
 
-/// Length scales of sqrt(d) standard deviations, so that typical points lie about one length apart.
+/// Returns length scales of sqrt(d) standard deviations, so that typical points are about one length apart.
 fn start_from_spread(inputs: &DMatrix<f64>, targets: &[Vec<f64>]) -> Hyperparameters {
     let root_d = (inputs.ncols() as f64).sqrt();
     let values = inputs.nrows() * targets.len();
@@ -230,13 +232,13 @@ fn start_from_spread(inputs: &DMatrix<f64>, targets: &[Vec<f64>]) -> Hyperparame
     }
 }
 
-/// The point of the search that stands for these scales.
+/// Returns the search point for these hyperparameters.
 fn point_of(hyper: &Hyperparameters) -> Vec<f64> {
     let ratio = hyper.noise_variance / hyper.signal_variance;
     hyper.lengthscales.iter().chain([&ratio]).map(|scale| scale.ln()).collect()
 }
 
-/// The scales at a point of the search and a signal variance.
+/// Returns the hyperparameters for a search point and a signal variance.
 fn hyperparameters(point: &[f64], signal_variance: f64) -> Hyperparameters {
     let mut lengthscales: Vec<f64> = point.iter().map(|log| log.exp()).collect();
     let ratio = lengthscales.pop().unwrap_or(0.0);

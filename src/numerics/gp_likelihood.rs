@@ -1,4 +1,4 @@
-//! How likely the scales of a Gaussian process make what was seen, with exact gradients.
+//! The likelihood of the hyperparameters of a Gaussian process, with exact gradients.
 
 use std::f64::consts::TAU;
 
@@ -8,9 +8,11 @@ use super::cholesky::Cholesky;
 use super::gp::{Hyperparameters, kernel_lower, squared_distances_below};
 use super::matern;
 
-/// Log marginal likelihood and its gradient, in the order log length scales, log signal, log noise variance.
+/// Returns the log marginal likelihood and its gradient, in the order log length scales, log signal, log noise
+/// variance.
 ///
-/// What a fit climbs, at given scales. `None` when the matrix is singular to working precision.
+/// This is the function that a fit maximises, at given hyperparameters. `None` if the matrix is singular to working
+/// precision.
 pub fn log_likelihood_and_gradient(
     inputs: &DMatrix<f64>,
     targets: &[Vec<f64>],
@@ -22,14 +24,15 @@ pub fn log_likelihood_and_gradient(
     Some((at.log_likelihood, at.gradient))
 }
 
-/// The likelihood where the kernel has the signal variance s2 = `signal_variance(sum y^T A^-1 y)`, sums over the p targets y.
+/// Returns the likelihood for the signal variance s2 = `signal_variance(sum y^T A^-1 y)`, with sums over the p targets
+/// y.
 ///
 ///   ln p = -sum y^T A^-1 y / (2 s2) - p ln det A / 2 - p n ln(2 pi s2) / 2,     K = s2 A,  A = R(l) + nu I
 ///   d ln p / d theta = (1/2) sum_ij W_ij dA_ij / d theta,   W = sum alpha alpha^T - p A^-1,   alpha = A^-1 y / s
 ///   dk / d log l_i = (5/3) (1 + r) exp(-r) ((x_i - y_i) / l_i)^2,   r = sqrt(5) scaled distance
 ///
-/// `unit` holds the length scales l, the signal variance 1 and the noise ratio nu. `None` when A is singular to working
-/// precision. One factorisation and one inverse: cost O(n^3), and O(n^2 d) for the contraction.
+/// `unit` holds the length scales l, the signal variance 1 and the noise ratio nu. `None` if A is singular to working
+/// precision. Needs one factorisation and one inverse: cost O(n^3), and O(n^2 d) for the contraction.
 /// Source: Rasmussen and Williams 2006, eqs. (2.30) and (5.9).
 /// Checked by: tests/solver/gp.rs, gradients_equal_those_of_scikit_learn.
 pub(super) fn likelihood(
@@ -56,7 +59,7 @@ pub(super) fn likelihood(
     Some(Likelihood { log_likelihood, gradient, signal_variance })
 }
 
-/// The memory of an evaluation, kept for the next: fresh pages would cost a fifth of its time.
+/// Memory of an evaluation, kept for the next one: fresh pages would take a fifth of its time.
 pub(super) struct Matrices {
     /// K, then its factor.
     kernel: DMatrix<f64>,
@@ -68,7 +71,7 @@ impl Matrices {
         Matrices { kernel: DMatrix::zeros(n, n), inverse: DMatrix::zeros(n, n) }
     }
 
-    /// The factor of K + noise I over the rows of `scaled`, in the memory of `kernel`.
+    /// Returns the factor of K + noise I over the rows of `scaled`, in the memory of `kernel`.
     fn factor(&mut self, scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> Option<Cholesky> {
         let n = scaled.nrows();
         let mut kernel = std::mem::replace(&mut self.kernel, DMatrix::zeros(0, 0));
@@ -80,7 +83,7 @@ impl Matrices {
     }
 }
 
-/// The sums of W .* dK over one triangle, doubled; `inverse` is overwritten column by column.
+/// Returns the sums of W .* dK over one triangle, doubled; `inverse` is overwritten column by column.
 fn contract(
     scaled: &DMatrix<f64>,
     inverse: &mut DMatrix<f64>,
@@ -112,11 +115,11 @@ fn contract(
     gradient
 }
 
-/// The likelihood at some scales, with what a search needs there.
+/// The likelihood at some hyperparameters, with the values that a search needs.
 pub(super) struct Likelihood {
     pub log_likelihood: f64,
-    /// In the order log length scales, log signal variance, log noise variance; of a search, which profiles the signal
-    /// variance out, log length scales, log noise ratio.
+    /// Gradient in the order log length scales, log signal variance, log noise variance. A search profiles the signal
+    /// variance out, and has log length scales, log noise ratio.
     pub gradient: Vec<f64>,
     pub signal_variance: f64,
 }

@@ -1,50 +1,51 @@
-//! The bridge statistic of many laws that have learned a few values each beyond a base that they share.
+//! The bridge statistic of many laws that each add a few values to a common base.
 //!
 //!   H = sum_{k=1}^{n} z_(k) (|B(t_(k-1))| - |B(t_k)|),   |B(0)| = |B(1)| = 0,   t_k = k/n
 //!
-//! by summation by parts, all weights being equal. Where s of the values learned are smaller, value j of the base is value
-//! j + s of the law. A stretch of the base between two values learned therefore adds the difference of two entries of a
-//! table of sums along the base, of which there is one for each s: a law costs two reads a value learned, however many values
-//! the base has.
+//! by summation by parts, with equal weights. If s of the added values are smaller, value j of the base is value j + s
+//! of the law. A part of the base between two added values therefore contributes the difference of two entries in a
+//! table of sums along the base. There is one such table for each s. A law costs two reads for each added value,
+//! however many values the base has.
 
 use super::bridge_paths::{self, AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 use super::gap_places::Statistic;
 
-/// Paths whose tables stay in the second-level cache: with 12 tables of 240 values, 0.7 MB.
+/// The number of paths for which the tables stay in the second-level cache: 12 tables of 240 values take 0.7 MB.
 const PATHS: usize = 64;
-/// Larger ones do not.
+/// The most bytes of tables; larger ones do not stay in that cache.
 const MOST_BYTES: usize = 4 << 20;
-/// Tables pay where there are this many laws for each of them.
+/// The least number of laws for each table; with fewer, tables do not pay.
 const LAWS_A_TABLE: usize = 4;
 
-/// A number for each path of a block. Single precision: a sum along the base is off by some 1e-6 of itself, another way in every
-/// path.
+/// A number for each path of a block. In single precision a sum along the base is off by about 1e-6 of itself,
+/// differently in every path.
 type Block = [f32; PATHS];
 
-/// A value learned, and how many values of the base are at or below it.
+/// An added value, and the number of values of the base at or below it.
 type Learned = (f64, usize);
 
-/// What of a block of paths laws are put together from.
+/// Tables from which the statistics of laws are assembled, for a block of paths.
 struct Tables {
     /// `|B(t_(k-1))| - |B(t_k)|` for k from 1.
     falls: Vec<Block>,
-    /// For each number of smaller values learned, the sums of value times fall over the first so many values of the base.
+    /// For each number of smaller added values, the sums of value times fall over the first values of the base.
     sums: Vec<Block>,
-    /// Sums of a number: one more than the base has values.
+    /// Length of the sums for one number: one more than the base has values.
     stride: usize,
 }
 
-/// Bytes of the tables for laws that learned so many values beyond a base; 0 where they are not made.
+/// Returns the bytes of the tables for laws that add `learned` values to a base, or 0 if the tables are not made.
 pub fn table_bytes(base: usize, learned: usize) -> usize {
     let bytes = (learned + 1).saturating_mul(base + 1).saturating_mul(size_of::<Block>());
     if bytes <= MOST_BYTES { bytes } else { 0 }
 }
 
 impl AbsoluteBridges {
-    /// The statistic over the direction of every path, law by law, to single precision; `base` ascending. `None` where some law does
-    /// not have the values of the base, where weights decay, or where the laws are too few for tables to pay.
+    /// Returns the statistic over the direction of every path, law by law, to single precision; `base` is ascending.
+    /// `None` if some law does not contain the base, if weights decay, or if there are too few laws for tables to pay.
+    ///
     /// Cost O((learned + 1) (base + laws) paths).
     ///
     /// Checked by: `laws_that_grew_from_a_base_are_measured_as_any`.
@@ -79,7 +80,8 @@ impl AbsoluteBridges {
         Some(statistics)
     }
 
-    /// `|B|` at a time, from 1, over some paths from `first` on; at 0, and at 1 after the last, a bridge is 0.
+    /// Returns `|B|` at a time, from 1, over the paths from `first` on; at 0 and at 1, after the last time, a bridge is
+    /// 0.
     #[inline(always)]
     fn some(&self, time: usize, first: usize) -> Block {
         let mut block = [0.0; PATHS];
@@ -95,8 +97,8 @@ impl AbsoluteBridges {
 }
 
 impl Tables {
-    /// For the paths from `first` on. Of [`Statistic::OneLater`], `|B|` is the mean of what it is over the laws that learn one
-    /// of the values again.
+    /// Fills the tables for the paths from `first` on. For [`Statistic::OneLater`], `|B|` is its mean over the laws
+    /// that add one of the values again.
     #[inline(always)]
     fn fill(&mut self, bridges: &AbsoluteBridges, first: usize, which: Statistic, base: &[f64]) {
         let size = self.falls.len() as f32;
@@ -126,7 +128,7 @@ impl Tables {
         }
     }
 
-    /// The statistic of a law with these values learned.
+    /// Returns the statistic of a law with these added values.
     #[inline(always)]
     fn law(&self, learned: &[Learned]) -> Block {
         let (mut sum, mut from) = ([0.0; PATHS], 0);
@@ -148,7 +150,7 @@ impl Tables {
     }
 }
 
-/// What a law has learned beyond `base`, ascending; `None` where it has not all of the base, or its weights decay.
+/// Returns the values of a law beyond `base`, ascending; `None` if it lacks a value of the base or its weights decay.
 fn beyond(law: &EmpiricalDistribution, base: &[f64]) -> Option<Vec<Learned>> {
     let (mut below, mut learned) = (0, Vec::new());
     for &atom in law.atoms() {
@@ -181,7 +183,7 @@ mod tests {
                 let found = bridges.grown_statistics(&laws, &base, which).unwrap();
                 for (law, found) in laws.iter().zip(found) {
                     let alone = bridges.directional_statistic(law, which);
-                    // One by one they are summed in single precision.
+                    // One by one, the laws are summed in single precision.
                     let near = |(found, alone): (&f64, &f64)| (found / alone - 1.0).abs() < 24.0 * 2.0_f64.powi(-24);
                     assert!(found.iter().zip(&alone).all(near));
                 }

@@ -1,24 +1,25 @@
-//! Work that others may stop, or make wait.
+//! Work that can be stopped, or made to wait.
 //!
-//! Whoever starts a piece of work gives it a [`Watcher`]; the loops of the solvers pass [`checkpoint`]. A piece that is stopped
-//! unwinds with [`Stopped`], which [`watched`] catches: no solver returns half a result, and none has to hand a flag through. Salsa
-//! cancels its queries in this way. No checkpoint may lie where a lock is held, or where something shared is being made: a piece
-//! that waits there would keep others waiting for it. Checked by: the tests below and `tests/operation/interruption.rs`.
+//! A caller that starts work gives it a [`Watcher`], and the loops of the solvers call [`checkpoint`]. Work that is
+//! stopped unwinds with [`Stopped`], which [`watched`] catches. So no solver returns half a result, and none has to
+//! pass a flag down; Salsa cancels its queries in this way. No checkpoint may be reached while a lock is held or
+//! something shared is being made, because work that waits there would make others wait for it. Checked by: the tests
+//! below and `tests/operation/interruption.rs`.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
-/// Decides whether a piece of work goes on.
+/// Decides if a piece of work continues.
 pub trait Watcher: Send + Sync {
-    /// Whether nobody wants the result any more.
+    /// Returns true if nobody needs the result any more.
     fn is_stopped(&self) -> bool;
 
-    /// Returns once the piece may go on; called on the thread that the work was started on alone.
+    /// Returns once the work may continue; called only on the thread on which the work started.
     fn give_way(&self) {}
 }
 
-/// The work was stopped before its end.
+/// The error that work was stopped before its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopped;
 
@@ -30,11 +31,11 @@ thread_local! {
 #[derive(Clone)]
 struct Watched {
     watcher: Arc<dyn Watcher>,
-    /// Whether the work was started on this thread.
+    /// True if the work was started on this thread.
     gives_way: bool,
 }
 
-/// Restores the watcher before, a panic included.
+/// Restores the previous watcher when dropped, also after a panic.
 struct Restored(Option<Watched>);
 
 impl Drop for Restored {
@@ -48,21 +49,21 @@ fn under<T>(watched: Option<Watched>, work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Does the work under a watcher.
+/// Runs the work under a watcher.
 ///
 /// # Errors
-/// [`Stopped`] at a checkpoint.
+/// [`Stopped`] if the work was stopped at a checkpoint.
 ///
 /// # Panics
-/// With what `work` panics with.
+/// Panics with the panic of `work`.
 pub fn watched<T>(watcher: Arc<dyn Watcher>, work: impl FnOnce() -> T) -> Result<T, Stopped> {
     let watched = Watched { watcher, gives_way: true };
     catch_unwind(AssertUnwindSafe(|| under(Some(watched), work)))
         .map_err(|panic| if panic.is::<Stopped>() { Stopped } else { resume_unwind(panic) })
 }
 
-/// Ends the work under way on this thread if it is stopped, or waits while others come first. Cost: some 30 ns; nothing without a
-/// watcher.
+/// Ends the current work on this thread if it is stopped, or waits while other work goes first. Cost: about 30 ns, or
+/// nothing without a watcher.
 pub fn checkpoint() {
     let is_stopped = WATCHER.with_borrow(|watched| {
         let Some(Watched { watcher, gives_way }) = watched else { return false };
@@ -76,23 +77,23 @@ pub fn checkpoint() {
     }
 }
 
-/// The watcher of this thread, for parts of the work that other threads do.
+/// The watcher of this thread, for parts of the work that run on other threads.
 #[derive(Clone)]
 pub struct Carried(Option<Watched>);
 
-/// Takes the watcher of this thread along.
+/// Returns the watcher of this thread, to pass to other threads.
 pub fn carried() -> Carried {
     let watched = WATCHER.with_borrow(Clone::clone);
     Carried(watched.map(|watched| Watched { gives_way: false, ..watched }))
 }
 
 impl Carried {
-    /// Whether there is a watcher.
+    /// Returns true if there is a watcher.
     pub fn is_watched(&self) -> bool {
         self.0.is_some()
     }
 
-    /// Does a part of the work, which can be stopped and does not wait.
+    /// Runs a part of the work, which can be stopped but does not wait.
     pub fn within<T>(&self, part: impl FnOnce() -> T) -> T {
         match &self.0 {
             Some(watched) => under(Some(watched.clone()), part),
@@ -107,7 +108,7 @@ mod tests {
 
     use super::*;
 
-    /// Stops after so many checkpoints at which it was asked to give way.
+    /// Stops after this many calls of `give_way`.
     struct After(usize, AtomicUsize);
 
     impl Watcher for After {

@@ -1,4 +1,4 @@
-//! Laws that can be drawn from and integrated against.
+//! Laws that can be sampled and integrated against.
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal, StudentT};
@@ -12,30 +12,30 @@ pub enum ContinuousLaw {
     GaussianMixture {
         /// (weight, mean, standard deviation); weights sum to 1.
         components: Vec<(f64, f64, f64)>,
-        /// The weight of each component and of all before it.
+        /// The cumulative weight up to and including each component.
         reached: Vec<f64>,
     },
     /// Location, scale, degrees of freedom.
     StudentT {
         /// The mean.
         location: f64,
-        /// What a standard t variable is multiplied by.
+        /// The factor of a standard t variable.
         scale: f64,
-        /// Above 2.
+        /// Degrees of freedom, above 2.
         degrees_of_freedom: f64,
     },
 }
 
-/// Nodes of a standard normal component: the trapezoidal rule of step 1/4 on [-8, 8] is exact to rounding
-/// for integrands that are smooth on the scale of the standard deviation.
+/// Nodes of a standard normal component. The trapezoidal rule of step 1/4 on [-8, 8] is exact to rounding for
+/// integrands that are smooth on the scale of the standard deviation.
 const NORMAL_NODES: i32 = 32;
 const NORMAL_STEP: f64 = 0.25;
-/// Coarser rule where a mixture has many components: step 1/2, error below 1e-12 for the density itself.
+/// The step of a coarser rule for mixtures with many components; the error is below 1e-12 for the density itself.
 const COARSE_STEP: f64 = 0.5;
 const MANY_COMPONENTS: usize = 16;
 
 impl ContinuousLaw {
-    /// Normals of these (weight, mean, standard deviation); weights sum to 1.
+    /// Creates a mixture of normals with these (weight, mean, standard deviation); weights sum to 1.
     pub fn mixture(components: Vec<(f64, f64, f64)>) -> Self {
         let mut sum = 0.0;
         let weights = components.iter().map(|(weight, ..)| weight);
@@ -46,8 +46,9 @@ impl ContinuousLaw {
         ContinuousLaw::GaussianMixture { reached: reached.collect(), components }
     }
 
-    /// Smoothed bootstrap of a weighted sample: a normal of Silverman's bandwidth at the effective size around each value,
-    /// shrunk towards the mean so that the mean and variance are the sample's own. Source: Silverman (1986), section 6.4.1.
+    /// Creates the smoothed bootstrap of a weighted sample: a normal around each value, with Silverman's bandwidth at
+    /// the effective size. Values are shrunk towards the mean so that the mean and variance are the sample's own.
+    /// Source: Silverman (1986), section 6.4.1.
     pub fn smoothed_bootstrap(sample: &[f64], weights: &[f64]) -> Self {
         let total: f64 = weights.iter().sum();
         let weighted = || sample.iter().zip(weights);
@@ -60,13 +61,13 @@ impl ContinuousLaw {
         ContinuousLaw::mixture(weighted().map(component).collect())
     }
 
-    /// One draw. Cost O(log components).
+    /// Draws one value. Cost O(log components).
     pub fn draw(&self, generator: &mut impl Rng) -> f64 {
         match self {
             ContinuousLaw::GaussianMixture { components, reached } => {
                 let uniform: f64 = generator.random();
                 let normal: f64 = generator.sample(StandardNormal);
-                // Rounding may leave the sum of all below the number drawn.
+                // Rounding may leave the sum of all weights below the number drawn.
                 let chosen = components.get(reached.partition_point(|&sum| sum <= uniform)).or(components.last());
                 let (_, mean, deviation) = chosen.copied().unwrap_or((1.0, 0.0, 0.0));
                 mean + deviation * normal
@@ -79,7 +80,7 @@ impl ContinuousLaw {
         }
     }
 
-    /// `E[Z]`.
+    /// Returns `E[Z]`.
     pub fn mean(&self) -> f64 {
         match self {
             ContinuousLaw::GaussianMixture { components, .. } => components.iter().map(|c| c.0 * c.1).sum(),
@@ -87,7 +88,7 @@ impl ContinuousLaw {
         }
     }
 
-    /// P(Z <= z), and the partial mean E[Z; Z <= z].
+    /// Returns P(Z <= z), and the partial mean E[Z; Z <= z].
     pub fn cumulative(&self, z: f64) -> (f64, f64) {
         match self {
             ContinuousLaw::GaussianMixture { components, .. } => {
@@ -107,7 +108,7 @@ impl ContinuousLaw {
         }
     }
 
-    /// The z with P(Z <= z) = `share`, in (0, 1), to rounding: by bisection.
+    /// Returns the z with P(Z <= z) = `share`, in (0, 1), to rounding, by bisection.
     pub fn quantile(&self, share: f64) -> f64 {
         let (mean, mut reach) = (self.mean(), 1.0);
         while self.cumulative(mean - reach).0 > share || self.cumulative(mean + reach).0 < share {
@@ -123,9 +124,9 @@ impl ContinuousLaw {
         }
     }
 
-    /// Quadrature: ascending atoms and positive masses that sum to 1, by the trapezoidal rule
-    /// (in z / sd for normals, in asinh of z / scale for Student's t), which converges faster than any power
-    /// of the step for such densities. Source: Trefethen and Weideman (2014), SIAM Review 56.
+    /// Returns a quadrature: ascending atoms and positive masses that sum to 1. It uses the trapezoidal rule, in z / sd
+    /// for normals and in asinh of z / scale for Student's t. For such densities it converges faster than any power of
+    /// the step. Source: Trefethen and Weideman (2014), SIAM Review 56.
     pub fn quadrature(&self) -> (Vec<f64>, Vec<f64>) {
         let mut nodes: Vec<(f64, f64)> = Vec::new();
         match self {
@@ -174,13 +175,13 @@ mod tests {
         let student = ContinuousLaw::StudentT { location: 0.01, scale: 0.05, degrees_of_freedom: 6.0 };
         let (atoms, masses) = student.quadrature();
         let variance: f64 = atoms.iter().zip(&masses).map(|(z, p)| p * (z - 0.01).powi(2)).sum();
-        // Variance of t is nu / (nu - 2); the tails beyond sinh(10) carry less than 1e-12 of it.
+        // The variance of t is nu / (nu - 2); the tails beyond sinh(10) carry less than 1e-12 of it.
         assert!((variance / (0.05 * 0.05 * 1.5) - 1.0).abs() < 1e-9);
     }
 
     #[test]
     fn the_smoothed_bootstrap_keeps_mean_and_variance() {
-        // By hand; of the second: mean (0.04 + 2 x 0.01) / 3, and its variance 0.0002.
+        // Computed by hand; the second has mean (0.04 + 2 x 0.01) / 3 and variance 0.0002.
         for (sample, weights, expected_mean, expected_variance) in [
             (&[0.02, -0.05, 0.11, 0.04, 0.07][..], &[1.0; 5][..], 0.038, 0.002_856),
             (&[0.04, 0.01], &[0.5, 1.0], 0.02, 0.0002),

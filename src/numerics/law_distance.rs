@@ -2,28 +2,29 @@
 //!
 //!   W1 = integral over u in (0, 1) of |F_n^{-1}(u) - F^{-1}(u)|
 //!
-//! On the cell (a, b) of one of n sorted values z the sample's quantile function is z, and the law's crosses it once, at
-//! F(z). With B(u) = E[Z; Z <= F^{-1}(u)] and c = F(z) clamped to [a, b] the cell contributes, exactly,
+//! On the cell (a, b) of one of n sorted values z the sample's quantile function is z, and the law's crosses it once,
+//! at F(z). With B(u) = E[Z; Z <= F^{-1}(u)] and c = F(z) clamped to [a, b], the cell contributes exactly
 //!
 //!   z (2c - a - b) + B(a) + B(b) - 2 B(c)
 //!
-//! so all it takes is F and B at the values, once each, and B at the ends of the cells, once a sample size. Where newer values
-//! weigh more, cells have other ends in every sample, and the same distance is
+//! So F and B are needed once at each value, and B at the ends of the cells once for each sample size. If newer values
+//! weigh more, every sample has different cells, and the same distance is
 //!
 //!   W1 = integral over z of |F_n(z) - F(z)|
 //!
-//! between neighbours a and b, where F_n is c: with G(z) = z F(z) - B(z), the integral of F up to z, it is G(b) - G(a) - c (b - a)
-//! or less that, and where F crosses c at q, 2 (c q - G(q)) + G(a) + G(b) - c (a + b), which moves with the square of an error of q.
+//! Between adjacent values a and b, F_n is c. Let G(z) = z F(z) - B(z), the integral of F up to z. The contribution is
+//! G(b) - G(a) - c (b - a), or its negative. If F crosses c at q, it is 2 (c q - G(q)) + G(a) + G(b) - c (a + b), which
+//! changes with the square of an error of q.
 
 use std::collections::HashMap;
 
 use super::law::ContinuousLaw;
 
-/// What a crossing may miss of the probability between its neighbours: squared, it is lost in rounding.
+/// Tolerance of a crossing, as a share of the probability between its values: its square is lost in rounding.
 const CROSSED: f64 = 1e-7;
 const CROSSING_STEPS: usize = 60;
 
-/// A value, and where the law puts it.
+/// A value with its position in the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
     /// The value itself.
@@ -32,12 +33,12 @@ pub struct Placed {
     share: f64,
     /// E[Z; Z <= value].
     partial_mean: f64,
-    /// In the sample; that of one return is 1 while it is the newest.
+    /// Weight in the sample; the weight of one return is 1 while it is the newest.
     weight: f64,
 }
 
 impl Placed {
-    /// G(value).
+    /// Returns G(value).
     fn integral(&self) -> f64 {
         self.value * self.share - self.partial_mean
     }
@@ -46,15 +47,15 @@ impl Placed {
 /// Distances to one law, prepared for some sample sizes.
 pub struct LawDistance {
     law: ContinuousLaw,
-    /// What of a value's weight is left once another was learned.
+    /// The factor by which a value's weight shrinks when another value is added.
     retention: f64,
-    /// `ends[n][i]` is B(i/n), i = 0 to n; none where weights decay.
+    /// `ends[n][i]` is B(i/n), i = 0 to n; empty if weights decay.
     ends: HashMap<usize, Vec<f64>>,
 }
 
 impl LawDistance {
-    /// Of samples that are learned at a retention. Cost, where that is 1: a quantile of the law for each value of each sample size. Where
-    /// no size is prepared, or it is less than 1, values may have any weight.
+    /// Prepares distances of samples with this retention. At retention 1 the cost is a quantile of the law for each
+    /// value of each sample size. If no size is prepared, or the retention is below 1, values may have any weight.
     pub fn new(law: ContinuousLaw, retention: f64, sample_sizes: impl IntoIterator<Item = usize>) -> Self {
         let ends = |size: usize| {
             let inner = (1..size).map(|cell| law.cumulative(law.quantile(cell as f64 / size as f64)).1);
@@ -65,13 +66,13 @@ impl LawDistance {
         LawDistance { law, retention, ends }
     }
 
-    /// A value of this weight with what the distance needs to know of it.
+    /// Returns a value of this weight with the numbers that the distance needs.
     pub fn place(&self, value: f64, weight: f64) -> Placed {
         let (share, partial_mean) = self.law.cumulative(value);
         Placed { value, share, partial_mean, weight }
     }
 
-    /// Puts what one more return is made of in its place in `sample`, ascending by value. Cost O(n) a value.
+    /// Adds the parts of one more return to `sample`, which is ascending by value. Cost O(n) for each value.
     pub fn learn(&self, sample: &mut Vec<Placed>, placed: impl IntoIterator<Item = Placed>) {
         sample.iter_mut().for_each(|other| other.weight *= self.retention);
         for placed in placed {
@@ -80,8 +81,8 @@ impl LawDistance {
         }
     }
 
-    /// The distance of the empirical law of `sample`, ascending by value; not a number where its size was not prepared.
-    /// Cost O(n), and where weights differ some sqrt(n) values of F and B.
+    /// Returns the distance of the empirical law of `sample`, ascending by value; NaN if its size was not prepared.
+    /// Cost O(n), and if weights differ about sqrt(n) values of F and B.
     pub fn distance(&self, sample: &[Placed]) -> f64 {
         if self.ends.is_empty() {
             return self.weighted(sample);
@@ -100,7 +101,7 @@ impl LawDistance {
         sample.iter().enumerate().map(cell).sum()
     }
 
-    /// The same by the integral over the values.
+    /// Returns the same distance by the integral over the values.
     fn weighted(&self, sample: &[Placed]) -> f64 {
         let (Some(first), Some(last)) = (sample.first(), sample.last()) else { return f64::NAN };
         let total: f64 = sample.iter().map(|placed| placed.weight).sum();
@@ -122,7 +123,7 @@ impl LawDistance {
         first.integral() + between + self.law.mean() - last.partial_mean - last.value * (1.0 - last.share)
     }
 
-    /// c q - G(q) where F(q) = c, between two values: by false position (Illinois).
+    /// Returns c q - G(q) with F(q) = c, between two values, by false position (Illinois).
     fn crossing(&self, a: &Placed, b: &Placed, level: f64) -> f64 {
         let (mut low, mut high) = ((a.value, a.share - level), (b.value, b.share - level));
         let enough = CROSSED * (b.share - a.share);
@@ -145,8 +146,8 @@ impl LawDistance {
     }
 }
 
-/// The distance of two laws on the same ascending atoms, of which `apart` says how much more mass the one has at each: the integral
-/// of the difference of their distribution functions. Cost O(atoms).
+/// Returns the distance of two laws on the same ascending atoms: the integral of the difference of their distribution
+/// functions. `apart` is the difference of their masses at each atom. Cost O(atoms).
 ///
 /// Checked by: `src/numerics/calibration.rs::the_law_in_atoms_is_the_smoothed_one`.
 pub fn distance_of_masses(atoms: &[f64], apart: &[f64]) -> f64 {
@@ -168,14 +169,14 @@ mod tests {
         sample.iter().for_each(|&value| distances.learn(&mut placed, [distances.place(value, 1.0)]));
         let found = distances.distance(&placed);
         let other_way = distances.weighted(&placed);
-        // Some dozen roundings of numbers up to 9.
+        // About a dozen roundings of numbers up to 9.
         assert!((found - other_way).abs() < 1e-12, "{found} and {other_way}");
         found
     }
 
     #[test]
     fn a_value_of_twice_the_weight_is_two_values() {
-        // Seen in this order at a retention of 1/2: weights 1/4, 1/2 and 1 are one, two and four values alike.
+        // Added in this order at a retention of 1/2: weights 1/4, 1/2 and 1 equal one, two and four values.
         let distances = LawDistance::new(normal(), 0.5, []);
         let mut placed = Vec::new();
         [0.7, -0.4, 1.3].into_iter().for_each(|value| distances.learn(&mut placed, [distances.place(value, 1.0)]));
@@ -211,7 +212,7 @@ mod tests {
 
     #[test]
     fn two_points_far_out_are_at_the_distance_of_the_halves() {
-        // Each half of the normal moves out whole: a - E|N|.
+        // Each half of the normal moves out as a whole: a - E|N|.
         let expected = 9.0 - (2.0 / std::f64::consts::PI).sqrt();
         assert!((distance(normal(), &[-9.0, 9.0]) - expected).abs() < 1e-12);
     }

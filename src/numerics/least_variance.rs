@@ -1,13 +1,14 @@
-//! Shares of least variance.
+//! Minimum-variance portfolio shares.
 
-/// Gain of variance per share moved, below which no move counts.
+/// Decrease in variance per share moved, below which the search ends.
 const LEAST_GAIN: f64 = 1e-12;
-/// Moves of a search at most; those of thirty assets end within some thousand.
+/// The most moves of a search; searches over thirty assets end within some thousand.
 const MOST_MOVES: usize = 1_000_000;
 
-/// Shares that sum to 1, none below 0, of least variance `w' C w`: weight moves from the dearest asset held to the cheapest, as far
-/// as the variance falls, until no move gains. `covariance` is symmetric and positive semidefinite, of at least one asset.
-/// Cost O(d^2) a move. Source: pairwise Frank-Wolfe steps (Lacoste-Julien and Jaggi 2015).
+/// Returns the shares that minimise the variance `w' C w`, sum to 1 and are not below 0. Weight moves from the held
+/// asset with the largest slope to the asset with the smallest, as far as the variance falls, until no move gains.
+/// `covariance` is symmetric and positive semidefinite, for at least one asset. Cost O(d^2) for each move. Source:
+/// pairwise Frank-Wolfe steps (Lacoste-Julien and Jaggi 2015).
 pub fn least_variance(covariance: &[Vec<f64>]) -> Vec<f64> {
     let width = covariance.len();
     let mut shares = vec![1.0 / width as f64; width];
@@ -22,7 +23,7 @@ pub fn least_variance(covariance: &[Vec<f64>]) -> Vec<f64> {
         if gain < LEAST_GAIN {
             break;
         }
-        // Assets that differ by rounding alone have a curvature of rounding, of either sign.
+        // Assets that differ only by rounding have a curvature of rounding size and either sign.
         let curvature = (covariance[from][from] + covariance[to][to] - 2.0 * covariance[from][to]).max(0.0);
         let moved = (gain / curvature).min(shares[from]);
         shares[from] -= moved;
@@ -35,7 +36,8 @@ pub fn least_variance(covariance: &[Vec<f64>]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// `(v2 - c) / (v1 + v2 - 2 c)` of the first where it lies in [0, 1], else all of the one with less variance.
+    /// Checks `(v2 - c) / (v1 + v2 - 2 c)` for the first asset if it lies in [0, 1]; otherwise all goes to the asset
+    /// with less variance.
     #[test]
     fn two_assets_have_the_shares_of_the_formula() {
         for (first, second, covariance) in [(0.04, 0.09, 0.012), (0.04, 0.01, -0.01), (0.04, 0.01, 0.015)] {

@@ -1,32 +1,33 @@
-//! How far a sum of positions can be lowered by moving their logarithms, at a cost.
+//! Water filling: the least sum of positions for a given cost of moving their logarithms.
 //!
-//! Positions h_i > 0 fall to h_i e^(-delta_i), none below its floor. The cost of a move is the largest delta_i, or the sum of
-//! k_i delta_i. The least sum at every cost is reached along one path:
+//! Positions h_i > 0 fall to h_i e^(-delta_i), and none falls below its floor. The cost of a move is the largest
+//! delta_i, or the sum of k_i delta_i. The least sums for all costs lie on one path:
 //!
-//!   max_i delta_i    all positions fall by the same share, each until it is at its floor;
-//!   sum k_i delta_i  the positions of largest h_i / k_i fall first, to one level of it: h_i -> min(h_i, k_i level).
+//!   max_i delta_i    all positions fall by the same share, each until it reaches its floor;
+//!   sum k_i delta_i  positions of largest h_i / k_i fall first, to a common level: h_i -> min(h_i, k_i level).
 //!
-//! (The sum is convex in the moves: dear ones bring equal gains, h_i e^(-delta_i) = k_i level.) Both are the same path of a
-//! level that falls: a position of speed s_i is held between its floor and where it was, `clamp(s_i level)`, with s_i = k_i, or
-//! s_i = h_i and a level that starts at 1. Between two levels at which a position starts or ends to move, the moving ones are
-//! one number y that falls, and y to y' costs `rate ln(y / y')`.
+//! The second rule holds because the sum is convex in the moves, so costly moves have equal gains, h_i e^(-delta_i) =
+//! k_i level. Both rules follow a falling level. A position with speed s_i is clamped between its floor and its
+//! original value, `clamp(s_i level)`. Here s_i = k_i, or s_i = h_i with a level that starts at 1. Between two levels
+//! at which a position starts or ends to move, the moving ones are one number y that falls, and y to y' costs
+//! `rate ln(y / y')`.
 
-/// What moving logarithms of positions costs.
+/// The cost of moving logarithms of positions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ground {
     /// The largest move.
     Sup,
-    /// The sum of the moves, each times its weight; positive weights.
+    /// The weighted sum of the moves, with positive weights.
     Weighted(Vec<f64>),
 }
 
 impl Ground {
-    /// True where the largest move is all that costs.
+    /// Returns true if the cost is the largest move.
     pub fn is_sup(&self) -> bool {
         matches!(self, Ground::Sup)
     }
 
-    /// How fast a position moves per unit of level.
+    /// Returns the movement of a position per unit of level.
     fn speed(&self, index: usize, position: f64) -> f64 {
         match self {
             Ground::Sup => position,
@@ -34,17 +35,17 @@ impl Ground {
         }
     }
 
-    /// What a unit of its move adds to the sum that costs.
+    /// Returns the weight of its move in the sum of costs; 0 if the cost is the largest move.
     fn weight(&self, index: usize) -> f64 {
         if let Ground::Weighted(weights) = self { weights[index] } else { 0.0 }
     }
 
-    /// Where a position is once the level is reached.
+    /// Returns a position once the level is reached.
     pub fn lowered(&self, index: usize, position: f64, floor: f64, level: f64) -> f64 {
         (self.speed(index, position) * level).max(floor).min(position)
     }
 
-    /// The cost of positions as they are once the level is reached: `ratio(i)` is the position over what it is then.
+    /// Returns the cost of the positions at this level; `ratio(i)` is the original position divided by the lowered one.
     pub fn cost(&self, count: usize, level: f64, ratio: impl Fn(usize) -> f64) -> f64 {
         match self {
             Ground::Sup => -level.min(1.0).ln(),
@@ -56,40 +57,40 @@ impl Ground {
     }
 }
 
-/// A stretch of the path along which the same positions move: the sum is `fixed + speed * level`.
+/// A part of the path along which the same positions move: the sum is `fixed + speed * level`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phase {
-    /// The sum of what does not move, with what is no position at all.
+    /// The sum of the positions that do not move, and of anything that is not a position.
     pub fixed: f64,
-    /// What moves, per unit of level.
+    /// The sum of the moving positions per unit of level.
     pub speed: f64,
-    /// What moves falls from y to y' at the cost of this times ln(y / y').
+    /// Cost factor: the moving sum falls from y to y' at the cost `rate * ln(y / y')`.
     pub rate: f64,
     /// The level at which the phase starts.
     pub high: f64,
-    /// The lower level at which it ends, 0 for a phase without an end.
+    /// The lower level at which the phase ends; 0 for a phase without an end.
     pub low: f64,
 }
 
-/// The path of one set of positions, and the memory for the next.
+/// The path of one set of positions, with memory that is reused for the next.
 #[derive(Debug, Clone, Default)]
 pub struct Levelling {
     /// Levels at which a position ends (true) or starts (false) to move, ascending.
     turns: Vec<(f64, bool, usize)>,
-    /// From the lowest level up.
+    /// Phases, from the lowest level up.
     phases: Vec<Phase>,
 }
 
 impl Levelling {
-    /// The phases of the path from the lowest level up. `rest` is what the sum holds beside the positions; a position at or
-    /// below its floor, or of 0, does not move. Cost O(d ln d) for d positions.
+    /// Returns the phases of the path from the lowest level up. `rest` is the part of the sum besides the positions. A
+    /// position at or below its floor, or of 0, does not move. Cost O(d ln d) for d positions.
     ///
-    /// Sums run from the lowest level up, so that the small ones, of which a logarithm is taken, are not rounded by large ones.
+    /// Sums run from the lowest level up, so that large terms do not round away small ones, whose logarithm is needed.
     pub fn phases(&mut self, rest: f64, positions: &[f64], floors: &[f64], ground: &Ground) -> &[Phase] {
         self.turns.clear();
         self.phases.clear();
         if ground.is_sup() && floors.iter().all(|floor| *floor <= 0.0) {
-            // All fall together, without an end.
+            // All positions fall together, without an end.
             let speed = positions.iter().sum();
             let whole = Phase { fixed: rest, speed, rate: 1.0, high: 1.0, low: 0.0 };
             self.phases.extend((speed > 0.0).then_some(whole));
@@ -129,14 +130,15 @@ impl Levelling {
     }
 }
 
-/// `(1 / sigma_i) / sum_l (1 / sigma_l)` of a sample, row by row: moving every coordinate by s costs s. Deviations are the
-/// sample's own; one without any counts as the smallest of the others, and without others all count alike.
+/// Returns `(1 / sigma_i) / sum_l (1 / sigma_l)` for a sample, row by row; with these weights, moving every coordinate
+/// by s costs s. Deviations are the sample's own. A column that does not vary counts as the one with the smallest
+/// deviation; if none varies, all count equally.
 pub fn inverse_volatility(rows: &[Vec<f64>]) -> Vec<f64> {
     let (count, width) = (rows.len().max(1) as f64, rows.first().map_or(0, Vec::len));
     let deviation = |column: usize| {
         let mean = rows.iter().map(|row| row[column]).sum::<f64>() / count;
         let deviation = (rows.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / count).sqrt();
-        // What a sum of the same number again and again is rounded by is no deviation.
+        // The rounding error in summing one number repeatedly does not count as deviation.
         let largest = rows.iter().map(|row| row[column].abs()).fold(0.0, f64::max);
         if deviation > count * f64::EPSILON * largest { deviation } else { 0.0 }
     };
@@ -154,7 +156,7 @@ mod tests {
     use super::*;
     use crate::numerics::streams::stream;
 
-    /// The sum at a cost, along the phases from the top down.
+    /// Returns the sum at a cost, along the phases from the top down.
     fn least(phases: &[Phase], whole: f64, mut cost: f64) -> f64 {
         let mut sum = whole;
         for phase in phases.iter().rev() {
@@ -171,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_column_that_does_not_vary_weighs_as_the_one_that_varies_least() {
-        // The mean of 0.004 of so many rows is another number than 0.004 for some counts.
+        // For some counts the rounded mean of equal values 0.004 differs from 0.004.
         for count in 2..300 {
             let rows: Vec<Vec<f64>> =
                 (0..count).map(|row| vec![0.004, 0.02 * f64::from(row % 2), 0.01 * f64::from(row % 2)]).collect();
@@ -198,7 +200,8 @@ mod tests {
                 let whole = rest + positions.iter().sum::<f64>();
                 let mut levelling = Levelling::default();
                 let found = least(levelling.phases(rest, &positions, &floors, &ground), whole, cost);
-                // All moves of this cost on a grid: of the sum, what is left of the budget moves the third position.
+                // All moves of this cost on a grid; for the weighted sum, the rest of the budget moves the third
+                // position.
                 let steps = 400;
                 let mut best = f64::INFINITY;
                 for (first, second) in (0..=steps).flat_map(|first| (0..=steps).map(move |second| (first, second))) {
@@ -218,7 +221,7 @@ mod tests {
                         break;
                     }
                 }
-                // A grid of a 400th of the budget is off by its square, times what is moved.
+                // A grid of a 400th of the budget is off by its square, times the amount moved.
                 assert!(found <= best + 1e-12 && found > best - 2e-3, "{ground:?}: {found} {best}");
             }
         }

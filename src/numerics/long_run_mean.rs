@@ -1,4 +1,4 @@
-//! Means of a short series whose neighbours may depend on each other, with intervals that hold for one mean or for several at once.
+//! Means of a short series with dependence between nearby values, with intervals for one mean or for several at once.
 
 use std::f64::consts::PI;
 
@@ -9,18 +9,19 @@ use super::streams::stream;
 use super::student::student_two_sided;
 use super::summary::quantile;
 
-/// Cosines at most: more make an interval hardly shorter.
+/// The most cosines: more hardly shorten an interval.
 const MOST_COSINES: usize = 50;
-/// Draws of the largest ratio: they give a spread within half a percent of itself.
+/// Number of draws of the largest ratio, which give a spread within half a percent of itself.
 pub const DRAWS: usize = 20_000;
 
-/// A mean, its standard error, and what that was estimated from:
+/// A mean, its standard error, and the cosine terms from which the error is estimated:
 ///
 ///   L_k = sqrt(2 / n) sum_t cos(pi k (t - 1/2) / n) y_t,   k = 1 .. K,   error^2 = (1/n) (1/K) sum_k L_k^2.
 ///
-/// The mean less the truth over its error has Student's law with K degrees of freedom. With K = n - 1 it is the ratio of independent
-/// values; with K = n / m, dependence within m neighbours counts.
-/// Source: Lazarus, Lewis, Stock and Watson (2018), HAR inference: recommendations for practice, J. Bus. Econ. Statist. 36.
+/// The mean less the truth, divided by its error, has Student's law with K degrees of freedom. K = n - 1 gives the
+/// ratio for independent values. K = n / m allows for dependence among m consecutive values.
+/// Source: Lazarus, Lewis, Stock and Watson (2018), HAR inference: recommendations for practice, J. Bus. Econ. Statist.
+/// 36.
 /// Checked by: `intervals_hold_in_few_years_also_for_several_means_at_once`.
 #[derive(Debug, Clone)]
 pub struct LongRunMean {
@@ -30,8 +31,8 @@ pub struct LongRunMean {
 }
 
 impl LongRunMean {
-    /// The mean `value` that `parts` add up to, up to a constant; up to `block` neighbours among them depend on each other. A single
-    /// part tells no error.
+    /// Creates the mean `value`, which `parts` add up to, up to a constant; up to `block` consecutive parts depend on
+    /// each other. A single part gives no error.
     pub fn new(value: f64, parts: &[f64], block: usize) -> Self {
         let size = parts.len() as f64;
         let mean = parts.iter().sum::<f64>() / size;
@@ -46,25 +47,26 @@ impl LongRunMean {
         LongRunMean { value, error, cosines }
     }
 
-    /// The interval at `level` of this mean alone.
+    /// Returns the interval at `level` for this mean alone.
     pub fn interval(&self, level: f64) -> [f64; 2] {
         self.within(student_two_sided(level, self.cosines.len() as f64))
     }
 
-    /// The ends that lie `spread` standard errors away.
+    /// Returns the ends that are `spread` standard errors away.
     pub fn within(&self, spread: f64) -> [f64; 2] {
         [self.value - spread * self.error, self.value + spread * self.error]
     }
 
-    /// The mean.
+    /// Returns the mean.
     pub fn value(&self) -> f64 {
         self.value
     }
 }
 
-/// How many standard errors hold all the means at once with probability `level`: the quantile of the largest |T_j| of ratios that
-/// depend on each other as the means do. Their numerator and the cosines below it are drawn as random combinations of the L_k.
-/// Means without an error do not count. All have as many parts. Stream: (seed, "simultaneous", 0, 0). Cost O(draws K^2 J).
+/// Returns the number of standard errors that covers all the means at once with probability `level`: the quantile of
+/// the largest |T_j| among ratios that depend on each other as the means do. The numerator of each ratio and the
+/// cosines in its denominator are drawn as random combinations of the L_k. Means without an error do not count. All
+/// have the same number of parts. Stream: (seed, "simultaneous", 0, 0). Cost O(draws K^2 J).
 pub fn simultaneous_spread(means: &[LongRunMean], level: f64, draws: usize, seed: u64) -> f64 {
     let vary: Vec<&LongRunMean> = means.iter().filter(|mean| mean.error > 0.0).collect();
     let count = vary.iter().map(|mean| mean.cosines.len()).min().unwrap_or(1);
@@ -120,7 +122,7 @@ mod tests {
         assert!((simultaneous_spread(&means, 0.9, DRAWS, 1) / student - 1.0).abs() < 0.015);
     }
 
-    /// Years in which nothing differs on average: `shares` of one market each, and something of their own.
+    /// Returns years of differences with mean zero: `shares` of one market each, and noise of their own.
     fn differences(years: usize, crashes: bool, generator: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
         let market: Vec<f64> = (0..years)
             .map(|_| {
@@ -137,7 +139,8 @@ mod tests {
             .into()
     }
 
-    /// How often any of seven is called better, and worse, of 90 % at once; and how often one interval misses.
+    /// Returns how often any of seven means counts as better, and as worse, at 90 % jointly, and how often one interval
+    /// misses.
     fn false_verdicts(years: usize, crashes: bool) -> [f64; 3] {
         let mut generator = stream(3, "test", years, usize::from(crashes));
         let (trials, mut counts) = (600_u32, [0.0; 3]);
@@ -155,7 +158,9 @@ mod tests {
         counts.map(|count| count / f64::from(trials))
     }
 
-    /// Five percent a side. Three standard errors of 600 trials are 0.027, and few years make the spread a little too short.
+    /// Checks for five percent a side. Three standard errors of 600 trials are 0.027, and few years make the spread
+    /// slightly too short.
+    /// slightly too short.
     #[test]
     fn intervals_hold_in_few_years_also_for_several_means_at_once() {
         for (years, crashes) in [(10, false), (20, false), (72, false), (20, true), (72, true)] {

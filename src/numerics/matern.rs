@@ -1,7 +1,8 @@
 //! The Matern-5/2 kernel with a length scale for each dimension, over contiguous slices.
 //!
-//! Every loop is compiled once for each instruction set and chosen at run time. What is fused is written fused and every
-//! sum has `LANES` fixed accumulators, so the bits of a result do not depend on the processor.
+//! Every loop is compiled once for each instruction set, and the version is chosen at run time. Fused operations are
+//! written as such and every sum has `LANES` fixed accumulators, so the bits of a result do not depend on the
+//! processor.
 
 use super::dispatch::dispatched;
 use super::elementary::exp;
@@ -10,21 +11,21 @@ use super::elementary::exp;
 pub(super) const LANES: usize = 8;
 /// Values staged on the stack between the two passes of a kernel sum; a multiple of `LANES`.
 const BLOCK: usize = 256;
-/// (1 + r + r^2/3) exp(-r) with r = sqrt(5 d2): the correlation at squared scaled distance d2.
+/// Returns the correlation at squared scaled distance d2: (1 + r + r^2/3) exp(-r) with r = sqrt(5 d2).
 #[inline(always)]
 fn correlation(squared: f64) -> f64 {
     let r = (5.0 * squared).sqrt();
     (r * (1.0 / 3.0)).mul_add(r, 1.0 + r) * exp(-r)
 }
 
-/// (5/3)(1 + r) exp(-r): minus twice the derivative of [`correlation`] with respect to d2.
+/// Returns (5/3)(1 + r) exp(-r): minus twice the derivative of [`correlation`] with respect to d2.
 #[inline(always)]
 fn steepness(squared: f64) -> f64 {
     let r = (5.0 * squared).sqrt();
     (5.0 / 3.0) * (1.0 + r) * exp(-r)
 }
 
-/// Adds left_j right_j to accumulator j mod `LANES`; every call but the last takes whole blocks.
+/// Adds left_j right_j to accumulator j mod `LANES`. Every call but the last must get whole blocks.
 #[inline(always)]
 fn accumulate(lanes: &mut [f64; LANES], left: &[f64], right: &[f64]) {
     let (left_blocks, right_blocks) = (left.chunks_exact(LANES), right.chunks_exact(LANES));
@@ -44,7 +45,7 @@ fn total(lanes: &[f64; LANES]) -> f64 {
     ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
 }
 
-/// sum_j left_j right_j, for use inside a dispatched loop.
+/// Returns sum_j left_j right_j, for use inside a dispatched loop.
 #[inline(always)]
 pub(super) fn dot_inline(left: &[f64], right: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
@@ -52,13 +53,13 @@ pub(super) fn dot_inline(left: &[f64], right: &[f64]) -> f64 {
     total(&lanes)
 }
 
-/// sum_j left_j right_j over slices of one length. Cost O(n).
+/// Returns sum_j left_j right_j over slices of one length. Cost O(n).
 pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     assert_eq!(left.len(), right.len());
     dispatched!(dot_inline(left, right))
 }
 
-/// sum_j values_j. Cost O(n).
+/// Returns sum_j values_j. Cost O(n).
 pub fn sum(values: &[f64]) -> f64 {
     dispatched!({
         let mut lanes = [0.0; LANES];
@@ -74,7 +75,7 @@ pub fn sum(values: &[f64]) -> f64 {
     })
 }
 
-/// sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j) with r_j = sqrt(5 d2_j), without the signal variance.
+/// Returns sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j) with r_j = sqrt(5 d2_j), without the signal variance.
 ///
 /// Shapes: one weight for each squared scaled distance. No allocation. Cost O(n).
 /// Source: Rasmussen and Williams 2006, eqs. (2.27) and (4.17).
@@ -85,7 +86,8 @@ pub fn weighted_sum(squared_distances: &[f64], weights: &[f64]) -> f64 {
     for (squared, weights) in squared_distances.chunks(BLOCK).zip(weights.chunks(BLOCK)) {
         let staged = &mut staged[..squared.len()];
         staged.copy_from_slice(squared);
-        // Dispatched apart: in one function with the sum, LLVM leaves the loop over the exponential scalar.
+        // Dispatched separately, because in one function with the sum LLVM does not vectorise the loop over the
+        // exponential.
         matern_from_squared(staged);
         dispatched!(accumulate(&mut lanes, staged, weights));
     }
@@ -103,7 +105,7 @@ pub fn matern_from_squared(squared: &mut [f64]) {
 
 /// Writes sum_i (x_ij - centre_i)^2 to each `out[j]`.
 ///
-/// `columns` holds x column by column, `stride` entries each, and `out` stands for the rows from `first` on; all are
+/// `columns` holds x column by column, `stride` entries each. `out` belongs to the rows from `first` on. All are
 /// already divided by the length scales. Each block of `LANES` sums stays in registers over the columns. Cost O(n d).
 pub(super) fn squared_distances(columns: &[f64], stride: usize, first: usize, centre: &[f64], out: &mut [f64]) {
     assert!(columns.len() == stride * centre.len() && first + out.len() <= stride, "a block of the columns");
@@ -133,7 +135,7 @@ pub(super) fn squared_distances(columns: &[f64], stride: usize, first: usize, ce
     });
 }
 
-/// One column of the contraction of a symmetric weight matrix with the derivatives of the kernel matrix.
+/// Contracts one column of a symmetric weight matrix with the derivatives of the kernel matrix.
 ///
 /// On entry `squared[j]` is a squared scaled distance and `weights[j]` its weight w_j. On return `weights[j]` is
 /// w_j (5/3)(1 + r_j) exp(-r_j), the factor of each squared coordinate difference in dk / d log l; the returned
@@ -148,7 +150,7 @@ pub fn contract_column(squared: &[f64], weights: &mut [f64]) -> f64 {
     value
 }
 
-/// sum_j weights_j (column_j - centre)^2. Cost O(n).
+/// Returns sum_j weights_j (column_j - centre)^2. Cost O(n).
 pub fn weighted_squares(column: &[f64], centre: f64, weights: &[f64]) -> f64 {
     assert_eq!(column.len(), weights.len());
     dispatched!({

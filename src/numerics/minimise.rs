@@ -8,36 +8,36 @@ use basin::{
     Lbfgsb, Termination,
 };
 
-/// Largest component of the projected gradient at a point called a minimum.
+/// Largest component of the projected gradient at a point that counts as a minimum.
 const GRADIENT_TOLERANCE: f64 = 1e-6;
-/// An accepted step that lowers the value by less than this share of it ends the search.
+/// The search ends if an accepted step lowers the value by less than this share of it.
 const REDUCTION_TOLERANCE: f64 = 1e-9;
-/// Golden ratio squared, inverted: the share of an interval at which Brent's method probes it.
+/// Inverse of the squared golden ratio: the share of an interval at which Brent's method probes it.
 const GOLDEN_SHARE: f64 = 0.381_966_011_250_105_1;
-/// Golden sections alone shrink any interval by 1e-20 in this many probes.
+/// Limit on probes: golden sections alone shrink any interval by 1e-20 in this many.
 const PROBE_LIMIT: usize = 100;
 
-/// Why a search ended.
+/// The reason why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchOutcome {
     /// The projected gradient vanished, or the value stopped falling.
     Converged,
     /// The iterations ran out first.
     IterationLimit,
-    /// No step lowers the value although the gradient says one should.
+    /// No step lowers the value, although the gradient says that one should.
     Stalled,
 }
 
-/// The best point a search evaluated.
+/// The best point that a search evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     /// The best point found.
     pub point: Vec<f64>,
-    /// The function there.
+    /// The value of the function at this point.
     pub value: f64,
-    /// Calls of the objective.
+    /// Number of calls of the objective.
     pub evaluations: usize,
-    /// How the search ended.
+    /// The reason why the search ended.
     pub outcome: SearchOutcome,
 }
 
@@ -48,7 +48,7 @@ struct Trial {
     gradient: Vec<f64>,
 }
 
-/// What the search has learnt: the last evaluation, so that none is repeated, and the best.
+/// State of the search: the last evaluation, so that none is repeated, and the best.
 struct Record<F> {
     objective: F,
     last: Option<Trial>,
@@ -70,7 +70,7 @@ impl<F: FnMut(&[f64]) -> (f64, Vec<f64>)> Record<F> {
                 self.worst = self.worst.max(value);
                 Trial { point: point.to_vec(), value, gradient }
             } else {
-                // The line search needs a finite number to interpolate: one that it must reject.
+                // The line search needs a finite number to interpolate, so it gets one that it must reject.
                 let value = if self.worst.is_finite() { self.worst + 1.0 + self.worst.abs() } else { f64::MAX };
                 Trial { point: point.to_vec(), value, gradient: vec![0.0; point.len()] }
             };
@@ -114,10 +114,10 @@ impl<F: FnMut(&[f64]) -> (f64, Vec<f64>)> Gradient for BoxProblem<'_, F> {
 
 /// Minimises a smooth function over lower <= x <= upper by L-BFGS-B.
 ///
-/// `objective_and_gradient` returns the value and its gradient and is called once for each point. A value or
-/// slope that is not finite marks a point outside the domain: the line search retreats from it. `start` is moved
-/// into the box. The answer is the best point evaluated, whatever the outcome; an infinite value at the start
-/// gives `Stalled` and an infinite `value`.
+/// `objective_and_gradient` returns the value and its gradient, and is called once for each point. A value or slope
+/// that is not finite marks a point outside the domain, and the line search retreats from it. `start` is clamped to the
+/// box. Returns the best point evaluated, whatever the outcome. An infinite value at the start gives `Stalled` and an
+/// infinite `value`.
 /// Source: Byrd, Lu, Nocedal and Zhu 1995; Morales and Nocedal 2011, as in the crate basin.
 pub fn minimise_bounded(
     objective_and_gradient: impl FnMut(&[f64]) -> (f64, Vec<f64>),
@@ -166,14 +166,15 @@ fn search<F: FnMut(&[f64]) -> (f64, Vec<f64>)>(
     }
 }
 
-/// The maximum of a concave function over [low, high], as (argmax, maximum).
+/// Maximises a concave function over [low, high] and returns (argmax, maximum).
 ///
-/// Brent's parabolic steps safeguarded by golden sections, until the argument is known to within `tolerance`
-/// (absolute, > 0); both ends are compared too, so a maximum at an end is found exactly. A function that is not
-/// concave gets a local maximum no worse than its ends. 3 evaluations at an end, about 10 to 40 inside. Source: Brent 1973, chapter 5.
+/// Brent's parabolic steps, safeguarded by golden sections, run until the argument is known to within `tolerance`
+/// (absolute, > 0). Both ends are also compared, so a maximum at an end is exact. A function that is not concave gets a
+/// local maximum no worse than its ends. Needs 3 evaluations at an end, about 10 to 40 inside. Source: Brent 1973,
+/// chapter 5.
 pub fn maximise_concave_scalar(mut f: impl FnMut(f64) -> f64, low: f64, high: f64, tolerance: f64) -> (f64, f64) {
     let ends = [(low, f(low)), (high, f(high))];
-    // Where a concave function falls from the better end inwards, that end is the maximum.
+    // If a concave function falls from the better end inwards, that end is the maximum.
     let (best, inward) = if ends[0].1 >= ends[1].1 { (ends[0], tolerance) } else { (ends[1], -tolerance) };
     if high - low <= tolerance || f(best.0 + inward) <= best.1 {
         return best;
@@ -182,7 +183,7 @@ pub fn maximise_concave_scalar(mut f: impl FnMut(f64) -> f64, low: f64, high: f6
     ends.into_iter().fold(inner, |best, end| if end.1 >= best.1 || best.1.is_nan() { end } else { best })
 }
 
-/// Brent's search on the open interval; `x` is the best probe, `w` the second, `v` the third.
+/// Runs Brent's search on the open interval; `x` is the best probe, `w` the second, `v` the third.
 fn brent(f: &mut impl FnMut(f64) -> f64, low: f64, high: f64, tolerance: f64) -> (f64, f64) {
     let (mut a, mut b) = (low, high);
     let mut x = (a + GOLDEN_SHARE * (b - a), 0.0);
@@ -233,7 +234,7 @@ fn brent(f: &mut impl FnMut(f64) -> f64, low: f64, high: f64, tolerance: f64) ->
     x
 }
 
-/// Step from x to the vertex of the parabola through three probes; NaN or infinite when there is none.
+/// Returns the step from x to the vertex of the parabola through three probes; NaN or infinite if there is none.
 fn vertex_step(x: (f64, f64), w: (f64, f64), v: (f64, f64)) -> f64 {
     let r = (x.0 - w.0) * (x.1 - v.1);
     let q = (x.0 - v.0) * (x.1 - w.1);

@@ -5,12 +5,12 @@ use super::empirical::EmpiricalDistribution;
 /// Highest moment order supported.
 pub const ORDERS: usize = 6;
 
-/// Mean and central power sums `M_p = sum_j w_j (z_j - mean)^p`, p = 2 to 6, of values of weights w, which sum to n: the number
-/// of values where every weight is 1.
+/// Mean and central power sums `M_p = sum_j w_j (z_j - mean)^p`, p = 2 to 6, of values with weights w. The weights sum
+/// to n, which is the number of values if every weight is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CentralMoments {
     size: f64,
-    /// What of every weight is left once one more value is learned.
+    /// The factor by which every weight shrinks when one more value is added.
     retention: f64,
     mean: f64,
     /// `sums[p]` is M_p; entries 0 and 1 are n and 0.
@@ -18,7 +18,7 @@ pub struct CentralMoments {
 }
 
 impl CentralMoments {
-    /// Two passes over the sample. Cost O(n).
+    /// Computes the moments in two passes over the sample. Cost O(n).
     pub fn of(law: &EmpiricalDistribution) -> Self {
         let (size, retention) = (law.total_weight(), law.retention());
         let weighted = || law.atoms().iter().zip(law.weights());
@@ -35,8 +35,8 @@ impl CentralMoments {
         CentralMoments { size, retention, mean, sums }
     }
 
-    /// The moments after one more value z of weight 1, n and every M_p first multiplied by the retention. With d = z - mean,
-    /// n' = n + 1 and e = d / n':
+    /// Returns the moments after one more value z of weight 1. First n and every M_p are multiplied by the retention.
+    /// With d = z - mean, n' = n + 1 and e = d / n':
     ///
     ///   M_p' = M_p + sum_{k=1}^{p-2} C(p,k) M_{p-k} (-e)^k + (n e)^p (1 - (-1/n)^(p-1))
     ///
@@ -62,22 +62,22 @@ impl CentralMoments {
         CentralMoments { size, mean: self.mean + shift, sums, ..*self }
     }
 
-    /// m, in the unit of the values.
+    /// Returns the mean, in the unit of the values.
     pub fn mean(&self) -> f64 {
         self.mean
     }
 
-    /// Central moment of order p, `M_p / n`.
+    /// Returns the central moment of order p, `M_p / n`.
     pub fn central(&self, order: usize) -> f64 {
         self.sums[order] / self.size
     }
 
-    /// Population variance, M_2 / n.
+    /// Returns the population variance, M_2 / n.
     pub fn variance(&self) -> f64 {
         self.central(2)
     }
 
-    /// Raw moment of order p by the binomial theorem.
+    /// Returns the raw moment of order p, by the binomial theorem.
     pub fn raw(&self, order: usize) -> f64 {
         let (mut binomial, mut total) = (1.0, 0.0);
         for k in 0..=order {
@@ -88,8 +88,8 @@ impl CentralMoments {
         total
     }
 
-    /// Shape of order p: mean, log standard deviation, then for p >= 3 the standardised moment,
-    /// itself for odd p and its logarithm for even p. `smallest_deviation` bounds the standard deviation below.
+    /// Returns the shape of order p: the mean, the log standard deviation, then for p >= 3 the standardised moment:
+    /// itself for odd p, and its logarithm for even p. `smallest_deviation` bounds the standard deviation below.
     pub fn shape(&self, order: usize, smallest_deviation: f64) -> f64 {
         let deviation = self.variance().max(0.0).sqrt().max(smallest_deviation);
         match order {

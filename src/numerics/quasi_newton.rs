@@ -1,24 +1,25 @@
-//! Minimisation in a box from a start whose curvature is known: few, costly evaluations.
+//! Minimisation in a box from a start with known curvature, for functions that are costly to evaluate.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::minimise::{Minimum, SearchOutcome};
 
-/// The share of the promised fall that a step must bring (Armijo).
+/// The share of the predicted decrease that a step must achieve (Armijo).
 const SUFFICIENT_SHARE: f64 = 1e-4;
-/// No coordinate moves farther in one step: beyond, the quadratic model is not believed.
+/// The farthest that a coordinate moves in one step, because the quadratic model is not trusted beyond it.
 const LONGEST_MOVE: f64 = 1.0;
-/// Curvatures count as no less than this share of the greatest: a flat direction is not run along.
+/// Curvatures are bounded below by this share of the largest, so that no step runs far along a flat direction.
 const LEAST_CURVATURE_SHARE: f64 = 1e-4;
-/// Shortenings of a step before the search gives up, and the least share that one leaves of it.
+/// The most shortenings of a step before the search gives up, and the least share of it that one shortening leaves.
 const SHORTENINGS: usize = 10;
 const LEAST_SHORTENING: f64 = 0.1;
-/// Distance of the differences behind [`curvature_at`].
+/// The step of the differences in [`curvature_at`].
 const DIFFERENCE: f64 = 1e-3;
 
-/// The second derivatives at `point`, from differences of `gradient` towards the inside of the box, symmetrised.
+/// Returns the second derivatives at `point`, from differences of `gradient` towards the inside of the box,
+/// symmetrised.
 ///
-/// `None` where a gradient is `None` or not finite. Cost: the gradient at one point more than there are coordinates.
+/// `None` if a gradient is `None` or not finite. Cost: one gradient more than there are coordinates.
 pub fn curvature_at(
     mut gradient: impl FnMut(&[f64]) -> Option<Vec<f64>>,
     point: &[f64],
@@ -38,13 +39,13 @@ pub fn curvature_at(
     curvature.iter().all(|entry| entry.is_finite()).then_some(curvature)
 }
 
-/// Minimises a smooth function over lower <= x <= upper by projected quasi-Newton steps from `start`, near which
-/// `curvature`, symmetric, is about its second derivative.
+/// Minimises a smooth function over lower <= x <= upper by projected quasi-Newton steps from `start`. `curvature` is
+/// symmetric and approximates its second derivative near `start`.
 ///
-/// A coordinate that the gradient presses against its bound is held; the others take the Newton step, moved into the box
-/// and shortened until the value falls (Armijo). The curvature is then corrected by BFGS. The search ends where the
-/// quadratic model promises a fall of less than `tolerance` (absolute, > 0). `objective_and_gradient` returns the value
-/// and its gradient; a value that is not finite is stepped back from, and at the start gives `Stalled`.
+/// A coordinate that the gradient presses against its bound is held. The others take the Newton step, clamped to the
+/// box and shortened until the value falls (Armijo). BFGS then corrects the curvature. The search ends if the quadratic
+/// model predicts a decrease of less than `tolerance` (absolute, > 0). `objective_and_gradient` returns the value and
+/// its gradient. The search steps back from a value that is not finite; at the start such a value gives `Stalled`.
 /// Source: Bertsekas 1982, Projected Newton methods, section 2; Nocedal and Wright 2006, eqs. (3.4), (3.58), (6.19).
 pub fn minimise_from(
     mut objective_and_gradient: impl FnMut(&[f64]) -> (f64, Vec<f64>),
@@ -74,7 +75,7 @@ pub fn minimise_from(
             let mut next = None;
             for _ in 0..SHORTENINGS {
                 let trial = into_box(&here.point + share * &step);
-                // Of a whole step, twice the fall that the model promises.
+                // For a whole step this is twice the decrease that the model predicts.
                 let slope = here.gradient.dot(&(&trial - &here.point));
                 if -slope <= 2.0 * tolerance * share {
                     break 'search SearchOutcome::Converged;
@@ -97,14 +98,14 @@ pub fn minimise_from(
     Minimum { point: here.point.as_slice().to_vec(), value: here.value, evaluations, outcome }
 }
 
-/// A point of the search, with the function and its slopes there.
+/// A point of the search, with the function's value and gradient there.
 struct Iterate {
     point: DVector<f64>,
     value: f64,
     gradient: DVector<f64>,
 }
 
-/// -H^-1 g among the coordinates that are free, H with its eigenvalues made positive; 0 for those held at a bound.
+/// Returns -H^-1 g for the free coordinates, H with its eigenvalues made positive, and 0 for those held at a bound.
 fn newton_step(curvature: &DMatrix<f64>, here: &Iterate, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
     let Iterate { point, gradient, .. } = here;
     let held = |i: usize| point[i] <= lower[i] && gradient[i] > 0.0 || point[i] >= upper[i] && gradient[i] < 0.0;
@@ -123,7 +124,8 @@ fn newton_step(curvature: &DMatrix<f64>, here: &Iterate, lower: &DVector<f64>, u
     step
 }
 
-/// The BFGS correction after a move along which the gradient `turned`; none where the function is not convex there.
+/// Applies the BFGS correction after a move along which the gradient `turned`; skips it if the function is not convex
+/// there.
 fn correct(curvature: &mut DMatrix<f64>, moved: &DVector<f64>, turned: &DVector<f64>) {
     let along = moved.dot(turned);
     let image = &*curvature * moved;
@@ -137,7 +139,7 @@ fn correct(curvature: &mut DMatrix<f64>, moved: &DVector<f64>, turned: &DVector<
 mod tests {
     use super::*;
 
-    /// Two wells in x, a valley along them, bent.
+    /// Returns a test function with two wells in x, and a bent valley along them.
     fn valley(x: &[f64]) -> (f64, Vec<f64>) {
         let (a, b) = (x[0] * x[0] - 1.0, x[1] - 0.5 * x[0]);
         (a * a + 3.0 * b * b, vec![4.0 * x[0] * a - 3.0 * b, 6.0 * b])
@@ -151,7 +153,7 @@ mod tests {
 
     #[test]
     fn differences_of_the_gradient_are_the_second_derivatives() {
-        // The gradient is cubic: a forward difference errs by half the third derivative times its distance.
+        // The gradient is cubic, so a forward difference errs by half the third derivative times its step.
         for point in [[1.2, 0.3], [5.0, -5.0]] {
             let found = curvature_at(|x| Some(valley(x).1), &point, &WIDE.0, &WIDE.1).unwrap();
             let error = (found - curvature_of_valley(&point)).amax();

@@ -1,17 +1,18 @@
-//! Which points of a line send their mass to which others, a run of neighbours at a time.
+//! Maps points of a line to the points that receive their mass, as runs of adjacent points.
 //!
 //! Checked by: `src/numerics/wasserstein.rs::primal_and_dual_meet_over_many_points`.
 
 use std::ops::Range;
 
-/// Points side by side whose mass all goes to one other.
+/// Adjacent points whose mass all goes to one point.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
     pub points: Range<usize>,
     pub to: usize,
 }
 
-/// Where the run at a point goes, if there is one, and where that ends or the next begins. Runs that end before are left out.
+/// Returns the target of the run at a point, if there is one, and the end of that run or the start of the next. Drops
+/// runs that end before the point.
 pub(super) fn passed(runs: &mut &[Run], at: usize) -> (Option<usize>, usize) {
     let before = runs.iter().take_while(|run| run.points.end <= at).count();
     *runs = &runs[before..];
@@ -22,9 +23,9 @@ pub(super) fn passed(runs: &mut &[Run], at: usize) -> (Option<usize>, usize) {
     }
 }
 
-/// `v - slope s` at every point. Mass that moves down at a multiplier goes to the least of it below, with the multiplier for its
-/// slope; mass that moves up goes to the least above, with the opposite. What rises from a least level is a run that goes there,
-/// until a level is as low.
+/// Levels `v - slope s` at every point. At a multiplier, mass that moves down goes to the least level below, with the
+/// multiplier as slope. Mass that moves up goes to the least level above, with the negative multiplier as slope. Points
+/// that rise from a least level form a run that goes to it, until another level is as low.
 #[derive(Clone, Copy)]
 pub(super) struct Levels<'a> {
     pub support: &'a [f64],
@@ -39,7 +40,7 @@ impl Levels<'_> {
         support[points.clone()].iter().zip(&payoff[points]).map(move |(point, value)| value - slope * point)
     }
 
-    /// How many neighbours change in some way, and how many points are as low: no branch is taken for any of them.
+    /// Counts the adjacent pairs for which `is` holds, without branches.
     #[inline(always)]
     fn steps(self, pairs: Range<usize>, is: impl Fn(f64, f64) -> bool) -> usize {
         let next = self.of(pairs.start + 1..pairs.end + 1);
@@ -52,7 +53,7 @@ impl Levels<'_> {
         move |points| self.of(points).map(|level| usize::from(level <= least)).sum()
     }
 
-    /// What of `from` goes down to a point of `between`.
+    /// Finds the runs of `from` that go down to a point of `between`.
     #[inline(always)]
     pub fn downs(self, between: &Range<usize>, from: &Range<usize>, downs: &mut Vec<Run>) {
         downs.clear();
@@ -67,7 +68,7 @@ impl Levels<'_> {
         }
     }
 
-    /// What of `from` goes up to a point of `between`, from the highest on.
+    /// Finds the runs of `from` that go up to a point of `between`, from the highest on.
     #[inline(always)]
     pub fn ups(self, between: &Range<usize>, from: &Range<usize>, ups: &mut Vec<Run>) {
         ups.clear();
@@ -84,10 +85,10 @@ impl Levels<'_> {
     }
 }
 
-/// Points that are counted together before one of them is sought.
+/// The number of points that are counted together before one of them is searched for.
 const BLOCK: usize = 64;
 
-/// The first of `points` that counts.
+/// Returns the first of `points` that counts.
 #[inline(always)]
 fn first(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<usize> {
     let block = |start: usize| start..points.end.min(start + BLOCK);
@@ -95,7 +96,7 @@ fn first(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<
     found.next().and_then(|mut some| some.find(|&point| count(point..point + 1) > 0))
 }
 
-/// The last of `points` that counts.
+/// Returns the last of `points` that counts.
 #[inline(always)]
 fn last(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<usize> {
     let block = |passed: usize| points.start.max((points.end - passed).saturating_sub(BLOCK))..points.end - passed;

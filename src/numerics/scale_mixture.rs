@@ -1,10 +1,10 @@
-//! Quantiles of a scale mixture: of R h, where R has a chi law and is independent of h, from draws of h alone.
+//! Quantiles of a scale mixture R h, where R has a chi law and is independent of h, from draws of h alone.
 //!
 //!   P(R h <= q) = E[ F(q / h) ],   F the distribution function of R
 //!
-//! The scale is integrated out, not drawn: the estimate varies less than one from draws of R h, and moves smoothly with
-//! the draws, which order statistics do not. Source: conditional Monte Carlo, Asmussen and Glynn (2007), Stochastic
-//! Simulation, section V.4.
+//! The scale is integrated out and not drawn. The estimate therefore varies less than one from draws of R h, and moves
+//! smoothly with the draws, unlike order statistics. Source: conditional Monte Carlo, Asmussen and Glynn (2007),
+//! Stochastic Simulation, section V.4.
 
 use std::f64::consts::PI;
 
@@ -13,58 +13,59 @@ use statrs::function::gamma::checked_gamma_lr;
 use super::dispatch::dispatched;
 use super::matern::{dot, sum};
 
-/// Coefficients of the polynomial that stands for F, and half the width of its interval. A chi law has a standard
-/// deviation below 0.71: outside lies at most 7e-5 of it, inside the polynomial is off by at most 3e-5, and in single precision by
-/// 4e-6 more. The share of 2000 draws is off by about 0.01, of 100,000 by 0.001.
+/// Number of coefficients of the polynomial that approximates F, and half the width of its interval. A chi law has a
+/// standard deviation below 0.71, so at most 7e-5 of it lies outside. Inside, the polynomial is off by at most 3e-5,
+/// and by 4e-6 more in single precision. For comparison, the share from 2000 draws is off by about 0.01, and from
+/// 100,000 by 0.001.
 const COEFFICIENTS: usize = 18;
 const HALF_WIDTH: f64 = 3.0;
 /// Shares staged on the stack between the two passes of a sum.
 const BLOCK: usize = 256;
 /// Accumulators of a sum: one 512-bit vector of sixteen, or two of eight.
 const LANES: usize = 16;
-/// What a search may leave in ln q. After a step that is the step times the relative error of its slope, and a slope
-/// measured over the step before is off by about the length of that.
+/// The error that a search may leave in ln q. After a step the error is the step times the relative error of its slope.
+/// A slope measured over the previous step has a relative error of about that step's length.
 const TOLERANCE: f64 = 1e-7;
-/// The same for one of many sets of draws.
+/// The tolerance for one of many similar sets of draws.
 const NEXT_TOLERANCE: f64 = 5e-6;
 const LONGEST_STEP: f64 = 0.5;
 const STEP_LIMIT: usize = 60;
-/// The slope of the share in ln q is at least this.
+/// A lower bound on the slope of the share in ln q.
 const LEAST_SLOPE: f64 = 1e-6;
-/// Relative error of the slope of a lognormal law in the place of the mixture, and of that of draws that are alike.
+/// Relative error of the slope if a lognormal law approximates the mixture, and if it comes from similar draws.
 const LOGNORMAL_SLOPE_ERROR: f64 = 0.1;
 const LAST_SLOPE_ERROR: f64 = 0.01;
 
 /// The law of R: chi, the length of a standard normal vector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScaleMixture {
-    /// F(x) is the polynomial with these coefficients, constant first, at `rate * x + offset` held in [-1, 1].
+    /// Coefficients of the polynomial for F(x), constant first, in `rate * x + offset` clamped to [-1, 1].
     coefficients: [f32; COEFFICIENTS],
     rate: f64,
     offset: f64,
     typical: f64,
 }
 
-/// What one quantile leaves for the next of similar draws: where a search starts.
+/// Warm start for the next quantile of similar draws.
 #[derive(Debug, Clone, Default)]
 pub struct LastQuantile {
     found: Option<Found>,
-    /// Of the mean of the draws over each of them.
+    /// The mean of the draws divided by each of them.
     over: Vec<f32>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Found {
-    /// Of the draws, along the line that they lie on.
+    /// Position of the draws along their line.
     at: f64,
-    /// The quantile over the mean of the draws, and how it changes along the line.
+    /// The quantile divided by the mean of the draws, and its rate of change along the line.
     ratio: f64,
     rate: f64,
     slope: f64,
 }
 
-/// Where a search starts: a quantile over the mean of the draws, the slope of the share in ln q there, and the relative error of
-/// that slope.
+/// Start of a search: a quantile divided by the mean of the draws, the slope of the share in ln q there, and the
+/// relative error of that slope.
 struct Start {
     ratio: f64,
     slope: f64,
@@ -72,7 +73,7 @@ struct Start {
 }
 
 impl ScaleMixture {
-    /// R of `freedom` >= 1 dimensions. Cost O(freedom + 1000).
+    /// Creates the chi law of R with `freedom` >= 1 dimensions. Cost O(freedom + 1000).
     pub fn chi(freedom: usize) -> Self {
         let typical = (freedom as f64).sqrt();
         let (low, high) = ((typical - HALF_WIDTH).max(0.0), typical + HALF_WIDTH);
@@ -81,19 +82,19 @@ impl ScaleMixture {
         ScaleMixture { coefficients: polynomial(share).map(|coefficient| coefficient as f32), rate, offset, typical }
     }
 
-    /// The `share`-quantile of R h from draws of h, none negative; `share` in [0.001, 0.999], where the polynomial
-    /// stands for F. Cost O(draws), here and below.
+    /// Returns the `share`-quantile of R h from draws of h, none of them negative. `share` must be in [0.001, 0.999],
+    /// where the polynomial approximates F. Cost O(draws), here and below.
     pub fn quantile(&self, share: f64, draws: &[f64]) -> f64 {
         self.quantile_within(TOLERANCE, share, draws, 0.0, &mut LastQuantile::default())
     }
 
-    /// The same, to 5e-6 of itself, for one of many sets of draws that are alike: where they change along a line, `at` is where
-    /// on it they lie, and else always the same.
+    /// Returns the quantile to 5e-6 of itself, for one of many sets of similar draws. If the draws change along a line,
+    /// `at` is their position on it; otherwise it is always the same number.
     pub fn quantile_next(&self, share: f64, draws: &[f64], at: f64, last: &mut LastQuantile) -> f64 {
         self.quantile_within(NEXT_TOLERANCE, share, draws, at, last)
     }
 
-    /// The quantile with its standard error: the deviation of F(q / h), over the density at q.
+    /// Returns the quantile with its standard error: the standard error of the mean of F(q / h), over the density at q.
     pub fn quantile_with_error(&self, share: f64, draws: &[f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, 0.0, &mut last);
@@ -129,8 +130,8 @@ impl ScaleMixture {
         ratio * mean
     }
 
-    /// The quantile and its slope were R h lognormal with the mean and the variance it has, nearly: ln R has a variance of
-    /// about 1/(2 m). Within 2 % from m = 20 on, which saves half of a search.
+    /// Returns the quantile and its slope as if R h were lognormal with approximately its mean and variance; ln R has a
+    /// variance of about 1/(2 m). Within 2 % from m = 20 on, which saves half of a search.
     fn lognormal(&self, share: f64, mean: f64, draws: &[f64]) -> Start {
         let square = dot(draws, draws) / draws.len() as f64;
         let spread = (square / (mean * mean)).ln().max(0.0);
@@ -143,8 +144,9 @@ impl ScaleMixture {
         }
     }
 
-    /// The mean of a function of F(q / h) over the draws, of which `over` are what their mean is over each of them and `ratio` what
-    /// q is over it. What is fused is written so, and the sum has fixed accumulators: the bits do not depend on the processor.
+    /// Returns the mean of a function of F(q / h) over the draws. `over` holds the mean of the draws divided by each of
+    /// them, and `ratio` is q divided by that mean. Fused operations are written as such and the sum has fixed
+    /// accumulators, so the bits do not depend on the processor.
     #[inline(always)]
     fn mean(&self, ratio: f64, over: &[f32], function: impl Fn(f32) -> f32) -> f64 {
         let (rate, offset) = ((ratio * self.rate) as f32, self.offset as f32);
@@ -152,7 +154,8 @@ impl ScaleMixture {
         let mut staged = [0.0; BLOCK];
         for block in over.chunks(BLOCK) {
             let staged = &mut staged[..block.len()];
-            // Dispatched apart: in one function with the sum, LLVM leaves the loop over the polynomial scalar.
+            // Dispatched separately, because in one function with the sum LLVM does not vectorise the loop over the
+            // polynomial.
             dispatched!({
                 for (value, over) in staged.iter_mut().zip(block) {
                     *value = function(self.share_at(over.mul_add(rate, offset)));
@@ -163,7 +166,7 @@ impl ScaleMixture {
         total / over.len() as f64
     }
 
-    /// F where its polynomial stands at `position`.
+    /// Returns F, by its polynomial at `position`.
     #[inline(always)]
     fn share_at(&self, position: f32) -> f32 {
         let position = if position < -1.0 { -1.0 } else { position };
@@ -173,7 +176,7 @@ impl ScaleMixture {
     }
 }
 
-/// The sum of up to [`BLOCK`] values, none of which is large.
+/// Returns the sum of up to [`BLOCK`] values, none of which is large.
 fn sum_of(values: &[f32]) -> f64 {
     dispatched!({
         let mut lanes = [0.0; LANES];
@@ -188,8 +191,9 @@ fn sum_of(values: &[f32]) -> f64 {
     })
 }
 
-/// The q over the mean of h at which `share_below`, the mean of F(q / h), is `share`, and the slope there in ln q: secants from a
-/// start, and halves of the bracket where they leave it, until no more than the tolerance is left.
+/// Finds q over the mean of h at which `share_below`, the mean of F(q / h), is `share`; also returns the slope there in
+/// ln q. Takes secant steps from the start, or halves the bracket if a step leaves it, until the error is below the
+/// tolerance.
 fn search(tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
     let Start { mut ratio, mut slope, mut slope_error } = start;
     let (mut low, mut high) = (0.0, f64::INFINITY);
@@ -220,15 +224,15 @@ fn search(tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(
     (ratio, slope)
 }
 
-/// Of the standard normal law, to 0.003 for shares in [0.001, 0.999]. Source: Shore (1982), Simple approximations for the
-/// inverse cumulative function, Applied Statistics 31.
+/// Returns a quantile of the standard normal law, to 0.003 for shares in [0.001, 0.999]. Source: Shore (1982), Simple
+/// approximations for the inverse cumulative function, Applied Statistics 31.
 fn normal_quantile(share: f64) -> f64 {
     let beyond = share.min(1.0 - share);
     let size = 5.5556 * (1.0 - (beyond / (1.0 - beyond)).powf(0.1186));
     if share < 0.5 { -size } else { size }
 }
 
-/// The coefficients, constant first, of the polynomial through `value` at the Chebyshev points of [-1, 1].
+/// Returns the coefficients, constant first, of the polynomial through `value` at the Chebyshev points of [-1, 1].
 fn polynomial(value: impl Fn(f64) -> f64) -> [f64; COEFFICIENTS] {
     let angles: [f64; COEFFICIENTS] = std::array::from_fn(|k| (k as f64 + 0.5) * PI / COEFFICIENTS as f64);
     let values = angles.map(|angle| value(angle.cos()));
@@ -249,7 +253,7 @@ fn polynomial(value: impl Fn(f64) -> f64) -> [f64; COEFFICIENTS] {
     sum
 }
 
-/// P(R <= x): the regularised incomplete gamma function P(m/2, x^2/2), which the library has above 0 alone.
+/// Returns P(R <= x): the regularised incomplete gamma function P(m/2, x^2/2), which the library defines only above 0.
 fn chi_cdf(x: f64, freedom: usize) -> f64 {
     checked_gamma_lr(0.5 * freedom as f64, 0.5 * x * x).unwrap_or(0.0)
 }
@@ -279,14 +283,14 @@ mod tests {
         for (freedom, x, expected) in published {
             assert!((chi_cdf(x, freedom) - expected).abs() < 1e-11, "{freedom} {x}: {}", chi_cdf(x, freedom));
             let found = share_of(&ScaleMixture::chi(freedom), x);
-            // The error named where the polynomial is.
+            // The error bound is stated at `COEFFICIENTS`.
             assert!((found - expected).abs() < 3e-5, "{freedom} {x}: {found} against {expected}");
         }
     }
 
     #[test]
     fn a_constant_draw_has_the_quantiles_of_its_chi_law() {
-        // scipy.stats.chi.ppf(p, m). The density is 0.2 at least, so that 6e-5 of share are 3e-4 of quantile.
+        // scipy.stats.chi.ppf(p, m). The density is at least 0.2, so 6e-5 of share are 3e-4 of quantile.
         for (freedom, share, expected) in
             [(1, 0.9, 1.6448536270), (2, 0.5, 1.1774100225), (29, 0.9, 6.2519972625), (29, 0.5, 5.3231688745)]
         {
@@ -308,10 +312,10 @@ mod tests {
                 let draws: Vec<f64> = (0..403).map(|k| scale * (least + f64::from(k * 7919 % 403) / 403.0)).collect();
                 let alone = mixture.quantile(share, &draws);
                 let mean = draws.iter().map(|draw| share_of(&mixture, alone / draw)).sum::<f64>() / 403.0;
-                // Each of the shares is rounded another way in single precision.
+                // Single precision rounds each share differently.
                 assert!((mean - share).abs() < 1e-6, "{scale} {share}: {mean}");
                 let next = mixture.quantile_next(share, &draws, at as f64, &mut last);
-                // Twenty times the tolerance: slopes of draws as different as these are off by as much more.
+                // Twenty times the tolerance, because slopes of draws as different as these are off by that much more.
                 assert!((next / alone - 1.0).abs() < 1e-4, "{scale} {share}: {next} against {alone}");
             }
         }

@@ -1,17 +1,17 @@
-//! Labelled random streams: a draw added in one place changes nothing elsewhere.
+//! Labelled random streams, so that an added draw changes no other stream.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Longest purpose, in bytes, that the key has room for.
+/// Longest purpose that fits the key, in bytes.
 const PURPOSE_BYTES: usize = 16;
 
-/// The stream of `(seed, purpose, step, index)`; distinct labels give independent streams.
+/// Returns the stream of `(seed, purpose, step, index)`; distinct labels give independent streams.
 ///
 /// The ChaCha key holds the seed, the step and the purpose; the index is the stream number.
 ///
 /// # Panics
-/// A purpose that the key has no room for: cut off, two of them could share a stream.
+/// Panics if the purpose does not fit the key: if it were cut off, two purposes could share a stream.
 pub fn stream(seed: u64, purpose: &str, step: usize, index: usize) -> ChaCha8Rng {
     assert!(purpose.len() <= PURPOSE_BYTES && !purpose.contains('\0'), "{purpose} is no label of at most 16 bytes");
     let mut key = [0_u8; 32];

@@ -4,24 +4,25 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use statrs::function::beta::checked_beta_reg;
 
-/// P(N <= x) for a standard normal N.
+/// Returns P(N <= x) for a standard normal N.
 pub fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x * FRAC_1_SQRT_2)
 }
 
-/// Density of a standard normal.
+/// Returns the density of a standard normal.
 pub fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / (2.0 * PI).sqrt()
 }
 
-/// Density of Student's t with `freedom` > 0 degrees of freedom.
+/// Returns the density of Student's t with `freedom` > 0 degrees of freedom.
 pub fn student_density(x: f64, freedom: f64) -> f64 {
     let norm = libm::lgamma(0.5 * (freedom + 1.0)) - libm::lgamma(0.5 * freedom) - 0.5 * (freedom * PI).ln();
     (norm - 0.5 * (freedom + 1.0) * (x * x / freedom).ln_1p()).exp()
 }
 
-/// P(T <= x): half the regularised incomplete beta function I_y(freedom/2, 1/2) at y = freedom / (freedom + x^2) lies
-/// beyond |x|. Near 0, where 1 - y would lose its digits, half of I_(1-y)(1/2, freedom/2) lies within. NaN where x is.
+/// Returns P(T <= x). Half the regularised incomplete beta function I_y(freedom/2, 1/2) at y = freedom / (freedom +
+/// x^2) is the mass beyond |x|. Near 0, where 1 - y would lose its digits, half of I_(1-y)(1/2, freedom/2) is the mass
+/// within. NaN if x is.
 pub fn student_cdf(x: f64, freedom: f64) -> f64 {
     let square = x * x;
     let beyond = match square < freedom {
@@ -32,7 +33,7 @@ pub fn student_cdf(x: f64, freedom: f64) -> f64 {
     if x > 0.0 { 1.0 - beyond } else { beyond }
 }
 
-/// The x >= 0 with P(|T| <= x) = `level`, by bisection. `level` in (0, 1).
+/// Returns the x >= 0 with P(|T| <= x) = `level`, by bisection; `level` must be in (0, 1).
 pub fn student_two_sided(level: f64, freedom: f64) -> f64 {
     let share = |x: f64| 1.0 - 2.0 * student_cdf(-x, freedom);
     let (mut low, mut high) = (0.0, 1.0);
@@ -53,7 +54,7 @@ mod tests {
     #[test]
     fn distribution_functions_have_their_closed_forms() {
         for x in [-7.0_f64, -1.3, -0.01, 0.0, 0.4, 2.5, 30.0] {
-            // t with 1 and 2 degrees of freedom.
+            // The closed forms of t with 1 and 2 degrees of freedom.
             assert!((student_cdf(x, 1.0) - (0.5 + x.atan() / PI)).abs() < 1e-14);
             assert!((student_cdf(x, 2.0) - (0.5 + 0.5 * x / (2.0 + x * x).sqrt())).abs() < 1e-14);
             assert!((student_density(x, 1.0) * PI * (1.0 + x * x) - 1.0).abs() < 1e-13);

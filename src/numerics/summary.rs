@@ -5,7 +5,7 @@ use statrs::function::beta::checked_beta_reg;
 
 use super::student::student_two_sided;
 
-/// The order statistic below which a share of `values` lies; not a number where there is none. Cost O(n ln n).
+/// Returns the order statistic below which a share of `values` lies; NaN if there are no values. Cost O(n ln n).
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -13,7 +13,8 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
 }
 
-/// The quantile by linear interpolation of order statistics (Hyndman and Fan, type 7) of ascending, non-empty `sorted`.
+/// Returns the quantile of ascending, non-empty `sorted` by linear interpolation of order statistics (Hyndman and Fan,
+/// type 7).
 pub fn interpolated_quantile(sorted: &[f64], share: f64) -> f64 {
     let position = (sorted.len() - 1) as f64 * share.clamp(0.0, 1.0);
     let index = (position as usize).min(sorted.len() - 1);
@@ -21,12 +22,15 @@ pub fn interpolated_quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[index] + (position - index as f64) * (next - sorted[index])
 }
 
-/// The interval at `level` of a probability of which a share was seen in `count` independent trials, whole or not:
+/// Returns the interval at `level` for a probability whose event occurred in a share of `count` independent trials.
+/// The counts need not be whole.
 ///
-///   [B(tail; share count, count - share count + 1), B(1 - tail; share count + 1, count - share count)],   tail = (1 - level) / 2,
+///   [B(tail; share count, count - share count + 1), B(1 - tail; share count + 1, count - share count)],
+///   tail = (1 - level) / 2.
 ///
-/// B(p; a, b) the quantile of the beta law. It holds at least as often as it says, and reaches beyond 0 and 1 where they were seen.
-/// Source: Clopper and Pearson (1934), Biometrika 26; for counts that are not whole Korn and Graubard (1998), Surv. Methodol. 24.
+/// B(p; a, b) is the quantile of the beta law. Coverage is at least `level`. The interval does not shrink to a point if
+/// the share is 0 or 1. Source: Clopper and Pearson (1934), Biometrika 26; for counts that are not whole Korn and
+/// Graubard (1998), Surv. Methodol. 24.
 pub fn share_interval(share: f64, count: f64, level: f64) -> [f64; 2] {
     let (seen, missed, tail) = (share * count, (1.0 - share) * count, 0.5 * (1.0 - level));
     let low = if seen > 0.0 { beta_quantile(tail, seen, missed + 1.0) } else { 0.0 };
@@ -34,7 +38,7 @@ pub fn share_interval(share: f64, count: f64, level: f64) -> [f64; 2] {
     [low, high]
 }
 
-/// The quantile of the beta law, by bisection.
+/// Returns the quantile of the beta law, by bisection.
 fn beta_quantile(probability: f64, a: f64, b: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
@@ -56,32 +60,33 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Both ends and the value through an increasing function.
+    /// Applies an increasing function to the value and both ends.
     pub fn mapped(self, increasing: impl Fn(f64) -> f64) -> Estimate {
         Estimate { value: increasing(self.value), low: increasing(self.low), high: increasing(self.high) }
     }
 }
 
-/// How a sample was drawn: `values` come in groups, one after another, of `group` values each. The groups are independent;
-/// the values within one are not, unless it is the only one, and then they speak of that group alone.
+/// The structure of a sample: `values` come in groups of `group` values, one after another. The groups are independent,
+/// but values within a group are not. A single group is the exception: its values are independent, and results apply to
+/// that group alone.
 #[derive(Debug, Clone, Copy)]
 pub struct Clustered {
     group: usize,
-    /// Half-width of an interval over standard error.
+    /// Half-width of an interval divided by the standard error.
     spread: f64,
     level: f64,
-    /// Values in a unit of sampling.
+    /// Values in each sampling unit.
     unit: usize,
 }
 
 impl Clustered {
-    /// `count` groups of `group` values; intervals at `level`. At least two units of sampling.
+    /// Describes `count` groups of `group` values, with intervals at `level`. Needs at least two sampling units.
     pub fn new(count: usize, group: usize, level: f64) -> Self {
         let (units, unit) = if count > 1 { (count, group) } else { (group, 1) };
         Clustered { group, spread: student_two_sided(level, units as f64 - 1.0), level, unit }
     }
 
-    /// The mean m of the unit means m_k, within t sqrt(sum_k (m_k - m)^2 / (K (K - 1))) of it.
+    /// Returns the mean m of the unit means m_k, with half-width t sqrt(sum_k (m_k - m)^2 / (K (K - 1))).
     pub fn mean(&self, values: &[f64]) -> Estimate {
         let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let means: Vec<f64> = values.chunks(self.unit).map(mean_of).collect();
@@ -91,10 +96,11 @@ impl Clustered {
         Estimate { value, low: value - reach, high: value + reach }
     }
 
-    /// The share of values for which `holds`, within the interval of as many independent trials as tell as much: n p (1 - p) over the
-    /// variance of the shares of the units, n (t_(n-1) / t_(K-1))^2 of those where all or none hold.
-    /// Source: Korn and Graubard (1998), Confidence intervals for proportions with small expected number of positive counts estimated
-    /// from survey data, Surv. Methodol. 24.
+    /// Returns the share of values for which `holds`, with the interval of an equally informative number of independent
+    /// trials. That number is p (1 - p) over the squared standard error of the share, at most n, and n if all or none
+    /// hold; times (t_(n-1) / t_(K-1))^2.
+    /// Source: Korn and Graubard (1998), Confidence intervals for proportions with small expected number of positive
+    /// counts estimated from survey data, Surv. Methodol. 24.
     pub fn share<T>(&self, values: &[T], holds: impl Fn(&T) -> bool) -> Estimate {
         let shares: Vec<f64> = values.iter().map(|value| if holds(value) { 1.0 } else { 0.0 }).collect();
         let found = self.mean(&shares);
@@ -106,7 +112,7 @@ impl Clustered {
         Estimate { value: share, low, high }
     }
 
-    /// The mean squared deviation of all values from their mean.
+    /// Returns the mean squared deviation of all values from their mean.
     pub fn variance(&self, values: &[f64]) -> Estimate {
         let mean = self.mean(values).value;
         let squares: Vec<f64> = values.iter().map(|value| (value - mean).powi(2)).collect();
@@ -114,8 +120,9 @@ impl Clustered {
         Estimate { low: found.low.max(0.0), ..found }
     }
 
-    /// The quantile at `share`, between those at `share` -+ the reach of the share of values below it. `sorted` holds
-    /// `values` in ascending order. Source: Woodruff (1952), J. Amer. Statist. Assoc. 47.
+    /// Returns the quantile at `share`. Its interval reaches to the quantiles at `share` minus and plus the half-widths
+    /// for the share of values below it. `sorted` holds `values` in ascending order. Source: Woodruff (1952), J. Amer.
+    /// Statist. Assoc. 47.
     pub fn quantile(&self, values: &[f64], sorted: &[f64], share: f64) -> Estimate {
         let value = interpolated_quantile(sorted, share);
         let below: Vec<f64> = values.iter().map(|&other| if other <= value { 1.0 } else { 0.0 }).collect();
@@ -125,7 +132,8 @@ impl Clustered {
         Estimate { value, low: at(share - down), high: at(share + up) }
     }
 
-    /// The mean of the lowest share of all values; of the value at its edge as much counts as makes the share whole:
+    /// Returns the mean of the lowest share of all values; the value at the edge counts in part, to make the share
+    /// exact:
     ///
     ///   mean of q - (q - x)^+ / share,   q the quantile at the share.
     ///
@@ -135,13 +143,14 @@ impl Clustered {
         self.mean(&values.iter().map(|value| edge - (edge - value).max(0.0) / share).collect::<Vec<f64>>())
     }
 
-    /// The largest value of a group, averaged over groups. It has no interval: a sample says next to nothing of what lies beyond it.
+    /// Returns the largest value of a group, averaged over groups. It has no interval, because a sample says almost
+    /// nothing about values beyond it.
     pub fn largest(&self, values: &[f64]) -> f64 {
         let of_group = |group: &[f64]| group.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         values.chunks(self.group).map(of_group).sum::<f64>() / (values.len() as f64 / self.group as f64)
     }
 
-    /// As [`Self::largest`], of the smallest.
+    /// Returns the smallest value of a group, averaged over groups; see [`Self::largest`].
     pub fn smallest(&self, values: &[f64]) -> f64 {
         -self.largest(&values.iter().map(|value| -value).collect::<Vec<f64>>())
     }
@@ -161,7 +170,7 @@ mod tests {
         }
     }
 
-    /// Expected values by numpy and scipy.
+    /// Expected values are from numpy and scipy.
     #[test]
     fn clustered_estimates_are_those_of_numpy() {
         let sample = Clustered::new(4, 5, 0.95);
@@ -173,7 +182,7 @@ mod tests {
         assert_estimate(sample.quantile(&VALUES, &sorted, 0.2), [0.38, 0.0, 0.9]);
     }
 
-    /// The three lowest of thirty are 0 to 2, and an eighth of twenty is the two lowest and half of the third.
+    /// The three lowest of thirty are 0 to 2. An eighth of twenty is the two lowest and half of the third.
     #[test]
     fn the_lowest_share_is_averaged_and_its_edge_counted_in_part() {
         let values: Vec<f64> = (0..30).map(|index| f64::from((7 * index) % 30)).collect();
@@ -210,8 +219,8 @@ mod tests {
         assert_eq!(Clustered::new(2, 50, 0.95).largest(&values), 75.0);
     }
 
-    /// A share of 0.3 % of 100 values, which most samples do not show at all; one of 30 %; and one of 3 % that comes in whole groups,
-    /// of which one in ten has a third.
+    /// The shares are 0.3 % of 100 values, which most samples do not show at all; 30 %; and 3 % in whole groups, where
+    /// one group in ten has a share of 30 %.
     #[test]
     fn intervals_of_shares_hold_the_truth_at_least_as_often_as_they_say() {
         use rand::RngExt;

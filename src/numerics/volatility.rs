@@ -1,14 +1,15 @@
-//! Returns brought to the volatility of now.
+//! Returns rescaled to the current volatility.
 
-/// Below this share of its first value the volatility counts as this: a return after a long calm would be magnified without bound.
+/// Lower bound of the volatility as a share of its first value; without it a return after a long calm would be
+/// magnified without bound.
 const SMALLEST_SHARE: f64 = 0.01;
 
-/// A record, oldest first, as if each return had come at the volatility that is expected for the next one:
+/// Rescales a record, oldest first, as if each return had occurred at the volatility that is expected for the next one:
 ///
 ///   y_t = z_t s_(n+1) / s_t,   s_(t+1)^2 = d s_t^2 + (1 - d) z_t^2,   d = 2^(-1 / half_life),
 ///
-/// s_1^2 the mean square of the record. What is expected for a period follows from the returns before it, but for the start. A
-/// record of zeros stays as it is. Cost O(n). Source: RiskMetrics (1996), section 5.2.
+/// s_1^2 is the mean square of the record. The volatility expected for a period follows from the returns before it,
+/// except at the start. A record of zeros is returned as it is. Cost O(n). Source: RiskMetrics (1996), section 5.2.
 pub fn rescaled(record: &[f64], half_life: f64) -> Vec<f64> {
     let start = record.iter().map(|z| z * z).sum::<f64>() / record.len() as f64;
     if start <= 0.0 {
@@ -65,7 +66,7 @@ mod tests {
 
     #[test]
     fn the_calm_before_a_storm_counts_as_a_storm() {
-        // Long enough at either size for the start to be forgotten; the first returns of the storm stand out as they did.
+        // Each half is long enough for the start to be forgotten; the first returns of the storm stand out as they did.
         let size = |t: usize| if t < 300 { 0.01 } else { 0.03 };
         let record: Vec<f64> = (0..600).map(|t| if t % 2 == 0 { size(t) } else { -size(t) }).collect();
         let found = rescaled(&record, 12.0);

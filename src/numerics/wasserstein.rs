@@ -1,53 +1,53 @@
 //! Worst expectation over a Wasserstein-1 ball on a finite support, solved exactly.
 //!
-//! The paper maximises a dual over the multiplier gamma, (3.3). It is concave and made of finitely many lines: at any gamma
-//! every atom's mass goes where `v(z) + gamma |z - z_k|` is least, and what that plan costs in distance and pays is the line
-//! that touches the dual there. Here the two lines are found between which the radius lies, and they are enough: the multiplier
-//! is where they meet, and the worst law moves from the plan of the one to that of the other until the radius is spent.
-//! The value is that of this law, and so bounds the infimum from above; the dual at the multiplier bounds it from below, and
-//! the difference of the two is reported as the duality gap.
+//! The paper maximises a dual over the multiplier gamma, (3.3). The dual is concave and piecewise linear. At any gamma
+//! each atom's mass goes to the point where `v(z) + gamma |z - z_k|` is least, and the distance cost and loss of that
+//! plan give the line that touches the dual there. This module finds the two lines between which the radius lies. The
+//! multiplier is where they meet, and the worst law moves from one plan to the other until the radius is spent. Its
+//! expectation bounds the infimum from above, and the dual at the multiplier bounds it from below. The difference is
+//! reported as the duality gap.
 
 use std::ops::Range;
 
 use super::dispatch::dispatched;
 use super::runs::{Levels, Run, passed};
 
-/// A ball around a discrete law: `masses[k]` sits at `support[k]` (ascending, distinct), the masses sum to 1.
+/// A ball around a discrete law: `masses[k]` is at `support[k]` (ascending, distinct), and the masses sum to 1.
 #[derive(Debug, Clone, Copy)]
 pub struct WassersteinBall<'a> {
-    /// s_k, ascending and distinct.
+    /// Support points s_k, ascending and distinct.
     pub support: &'a [f64],
-    /// p_k, which sum to 1.
+    /// Masses p_k, which sum to 1.
     pub masses: &'a [f64],
-    /// In the unit of the support, at least 0.
+    /// Radius in the unit of the support, at least 0.
     pub radius: f64,
 }
 
-/// Mass moved from one support point to another (or kept, where they are equal); indices into the support.
+/// Mass moved from one support point to another, or kept if they are equal; indices into the support.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Move {
-    /// Where the mass was.
+    /// Index of the mass's original point.
     pub from: usize,
-    /// Where it is put.
+    /// Index of the point to which the mass is moved.
     pub to: usize,
-    /// How much.
+    /// The mass moved.
     pub mass: f64,
 }
 
 /// The solution of the inner problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorstLaw {
-    /// Expectation of the payoff under the worst law: an upper bound of the infimum, being feasible.
+    /// Expectation of the payoff under the worst law: an upper bound of the infimum, because the law is feasible.
     pub expectation: f64,
     /// Dual value at the multiplier: a lower bound of the infimum.
     pub dual: f64,
     /// Lagrange multiplier of the radius, at least 0.
     pub multiplier: f64,
-    /// That make the law out of the ball's own.
+    /// The moves that turn the ball's centre into the worst law.
     pub moves: Vec<Move>,
 }
 
-/// Where the mass of all atoms goes at one multiplier: what that takes, in distance, and by how much it lowers the mean.
+/// The destination of all mass at one multiplier: its cost in distance, and the amount by which it lowers the mean.
 #[derive(Debug, Clone, Copy)]
 struct Plan {
     multiplier: f64,
@@ -55,33 +55,33 @@ struct Plan {
     loss: f64,
 }
 
-/// Where nothing moves.
+/// The plan that moves nothing.
 const STAYING: Plan = Plan { multiplier: f64::INFINITY, cost: 0.0, loss: 0.0 };
-/// Plans tried at most: each halves what is left, nearly.
+/// The most plans tried: each nearly halves the remaining interval.
 const PLAN_LIMIT: usize = 200;
-/// Factors of a guess at the multiplier that are tried, to bound it from both sides.
+/// The factors of a guessed multiplier that are tried, to bound it from both sides.
 const GUESSES: [f64; 3] = [0.99, 1.01, 0.8];
-/// A plan that is better than a mixture of two others by less than this share of what they lose is as good.
+/// If a plan improves on a mixture of two others by less than this share of their loss, it counts as equal.
 const ROUNDING: f64 = 1e-12;
 
-/// The plans between which a law spends the radius, and the multiplier at which both are best.
+/// The two plans between which the worst law spends the radius, and the multiplier at which both are optimal.
 struct Edge {
     near: Plan,
     far: Plan,
     multiplier: f64,
 }
 
-/// A search for places at which `v + gamma distance` is least.
+/// A search for the points at which `v + gamma distance` is least.
 struct Search<'a> {
     ball: &'a WassersteinBall<'a>,
     payoff: &'a [f64],
-    /// Where mass lies that may still move, for what stays at one multiplier stays at every greater one.
+    /// Range of the mass that may still move: mass that stays at one multiplier stays at every greater one.
     from: Range<usize>,
-    /// Where that and all that it may move to lies.
+    /// Range that contains this mass and every point it may move to.
     between: Range<usize>,
-    /// What the plan found last moves, ascending.
+    /// The runs moved by the latest plan, ascending.
     runs: Vec<Run>,
-    /// What would move if all went down, ascending, and what if all went up, descending.
+    /// The runs that would move if all moved down, ascending, and if all moved up, descending.
     downs: Vec<Run>,
     ups: Vec<Run>,
 }
@@ -95,7 +95,7 @@ impl<'a> Search<'a> {
         Search { ball, payoff, from, between, runs: Vec::new(), downs: Vec::new(), ups: Vec::new() }
     }
 
-    /// What moves at a multiplier, and the better of two ways for it. Cost O(points between).
+    /// Finds the runs that move at a multiplier, each in the better of two directions. Cost O(points between).
     fn look(&mut self, multiplier: f64) {
         let (support, payoff) = (self.ball.support, self.payoff);
         let Search { from, between, runs, downs, ups, .. } = self;
@@ -117,7 +117,8 @@ impl<'a> Search<'a> {
                 (None, None) => {}
                 (Some(to), None) | (None, Some(to)) => push(at..end, to),
                 (Some(below), Some(above)) => {
-                    // Down where `v(s) - v(below) - gamma (s - below)` is no less than `v(s) - v(above) - gamma (above - s)`.
+                    // Down if `v(s) - v(below) - gamma (s - below)` is no less than
+                    // `v(s) - v(above) - gamma (above - s)`.
                     let bound = payoff[above] - payoff[below] + multiplier * (support[above] + support[below]);
                     let cut = at + support[at..end].partition_point(|point| 2.0 * multiplier * point <= bound);
                     push(at..cut, below);
@@ -128,7 +129,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The best plan at a multiplier. Cost O(points between).
+    /// Returns the best plan at a multiplier. Cost O(points between).
     fn plan(&mut self, multiplier: f64) -> Plan {
         self.look(multiplier);
         let WassersteinBall { support, masses, .. } = *self.ball;
@@ -137,29 +138,29 @@ impl<'a> Search<'a> {
                 |Run { points, to }: &Run| sum_beyond(values[*to], &values[points.clone()], &masses[points.clone()]);
             dispatched!(self.runs.iter().map(of_run).map(f64::abs).sum())
         };
-        // Every point of a run moves the same way, and to where the payoff is less.
+        // All points of a run move in one direction, to a point with a lower payoff.
         Plan { multiplier, cost: beyond(support), loss: beyond(self.payoff) }
     }
 
-    /// Leaves out what stays in the plan found last, whose multiplier is below the one sought.
+    /// Drops the mass that stays in the latest plan; its multiplier must be below the one sought.
     fn narrow(&mut self) {
         let support = self.ball.support;
         let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
         for Run { points, to } in &self.runs {
             let [first, last, to] = [points.start, points.end - 1, *to].map(|point| support[point]);
-            // What moved to one side may move less far to the other.
+            // Mass that moved to one side may move less far to the other.
             (lowest, highest) = (lowest.min(to).min(2.0 * first - to), highest.max(to).max(2.0 * last - to));
         }
         let ends = self.runs.first().zip(self.runs.last());
         self.from = ends.map_or(0..0, |(first, last)| first.points.start..last.points.end);
         let first = support.partition_point(|&point| point < lowest);
         let last = support.partition_point(|&point| point <= highest);
-        // A rounding may have left the farthest place out.
+        // Rounding may have excluded the farthest point.
         self.between = first.saturating_sub(1)..(last + 1).min(support.len());
     }
 
-    /// The edge of the frontier of cost and loss on which the radius lies. A chord of the frontier names the multiplier of the
-    /// plan farthest beyond it, which takes the place of one of its ends, until there is none.
+    /// Finds the edge of the frontier of cost and loss on which the radius lies. The slope of a chord of the frontier
+    /// is the multiplier of the plan farthest beyond it. That plan replaces one end of the chord, until there is none.
     fn edge(&mut self, guess: f64) -> Edge {
         let radius = self.ball.radius;
         let (mut near, mut far) = (STAYING, None);
@@ -177,7 +178,7 @@ impl<'a> Search<'a> {
             }
         }
         let Some(mut far) = far else {
-            // The rest of the radius buys nothing.
+            // The rest of the radius gains nothing.
             return Edge { near, far: near, multiplier: 0.0 };
         };
         let chord = |near: Plan, far: Plan| (far.loss - near.loss) / (far.cost - near.cost);
@@ -198,7 +199,7 @@ impl<'a> Search<'a> {
         Edge { near, far, multiplier: chord(near, far) }
     }
 
-    /// Where a plan sends the mass of each point.
+    /// Returns the point to which a plan sends the mass of each point.
     fn destinations(&mut self, plan: Plan) -> Vec<usize> {
         let mut places: Vec<usize> = (0..self.payoff.len()).collect();
         if plan.multiplier < f64::INFINITY {
@@ -209,10 +210,10 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Sums that are taken side by side.
+/// The number of sums that run in parallel.
 const LANES: usize = 8;
 
-/// `sum_k p_k (v_k - level)`, in an order of its own that no processor changes.
+/// Returns `sum_k p_k (v_k - level)`, in a fixed order that does not depend on the processor.
 #[inline(always)]
 fn sum_beyond(level: f64, values: &[f64], masses: &[f64]) -> f64 {
     let ((values, last_values), (masses, last_masses)) = (values.as_chunks::<LANES>(), masses.as_chunks::<LANES>());
@@ -227,25 +228,26 @@ fn sum_beyond(level: f64, values: &[f64], masses: &[f64]) -> f64 {
 }
 
 impl WassersteinBall<'_> {
-    /// `min { E_F[payoff] : W1(F, law) <= radius, F on the support }` and its multiplier.
+    /// Returns `min { E_F[payoff] : W1(F, law) <= radius, F on the support }` and its multiplier.
     ///
     /// `payoff[k]` is the payoff at `support[k]`, finite. Cost O(K) for each of a dozen plans.
     pub fn worst_expectation(&self, payoff: &[f64]) -> (f64, f64) {
         self.worst_expectation_near(payoff, 0.0)
     }
 
-    /// The same, to rounding, with a guess at the multiplier, or 0: half as many plans where it is good.
+    /// Returns the same values, up to rounding, given a guess of the multiplier, or 0: half as many plans if the guess
+    /// is good.
     pub fn worst_expectation_near(&self, payoff: &[f64], guess: f64) -> (f64, f64) {
         let edge = Search::new(self, payoff).edge(guess);
         (self.expectation(payoff, &edge), edge.multiplier)
     }
 
-    /// The worst law itself with both bounds; at most one atom's mass is split. Cost as [`Self::worst_expectation`].
+    /// Returns the worst law with both bounds; at most one atom's mass is split. Cost as [`Self::worst_expectation`].
     pub fn worst_law(&self, payoff: &[f64]) -> WorstLaw {
         self.worst_law_near(payoff, 0.0)
     }
 
-    /// The same with a guess at the multiplier, as [`Self::worst_expectation_near`].
+    /// Returns the worst law given a guess of the multiplier, as in [`Self::worst_expectation_near`].
     pub fn worst_law_near(&self, payoff: &[f64], guess: f64) -> WorstLaw {
         let mut search = Search::new(self, payoff);
         let edge = search.edge(guess);
@@ -264,7 +266,7 @@ impl WassersteinBall<'_> {
         WorstLaw { expectation, dual: self.dual(payoff, multiplier), multiplier, moves }
     }
 
-    /// Dual value of the worst expectation.
+    /// Returns the dual value of the worst expectation.
     ///
     ///   D(gamma) = sum_k p_k min_l { v(s_l) + gamma |s_l - s_k| } - gamma radius
     ///
@@ -276,7 +278,7 @@ impl WassersteinBall<'_> {
         mean - multiplier * self.radius
     }
 
-    /// `E(k) = min_l { v(s_l) + gamma |s_l - s_k| }`, the largest gamma-Lipschitz function below the payoff.
+    /// Returns `E(k) = min_l { v(s_l) + gamma |s_l - s_k| }`, the largest gamma-Lipschitz function below the payoff.
     pub fn envelope(&self, payoff: &[f64], multiplier: f64) -> Vec<f64> {
         let mut envelope = payoff.to_vec();
         for k in 1..envelope.len() {
@@ -290,12 +292,12 @@ impl WassersteinBall<'_> {
         envelope
     }
 
-    /// The expectation under the law in the middle of the ball.
+    /// Returns the expectation under the law at the centre of the ball.
     pub fn mean(&self, payoff: &[f64]) -> f64 {
         dispatched!(sum_beyond(0.0, payoff, self.masses))
     }
 
-    /// That of the law that spends the radius between two plans.
+    /// Returns the expectation under the law that spends the radius between the two plans of `edge`.
     fn expectation(&self, payoff: &[f64], edge: &Edge) -> f64 {
         self.mean(payoff) - edge.near.loss - edge.multiplier * (self.radius - edge.near.cost)
     }
@@ -312,7 +314,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Both bounds meet at a law that is one of the ball, whatever is guessed.
+    /// Checks that both bounds meet at a law in the ball, for any guess.
     fn meet(ball: WassersteinBall<'_>, payoff: &[f64]) -> Result<(), TestCaseError> {
         let WassersteinBall { support, radius, .. } = ball;
         let worst = ball.worst_law(payoff);
@@ -352,7 +354,7 @@ mod tests {
             for atom in atoms {
                 masses[atom] += 0.2;
             }
-            // Without a radius the multiplier is the steepest fall from an atom.
+            // With radius 0 the multiplier is the steepest fall from an atom.
             let centre = WassersteinBall { support: &support, masses: &masses, radius: 0.0 };
             let fall = |from: usize, to: usize| (payoff[from] - payoff[to]) / (support[from] - support[to]).abs();
             let falls = (0..144).filter(|pair| masses[pair / 12] > 0.0 && pair / 12 != pair % 12);

@@ -45,7 +45,7 @@ impl Bank<'_> {
     /// Returns the rates of the last `used` periods next to returns in `unit`, or the reason why they are not used.
     ///
     /// # Errors
-    /// The unit of the rates must be asked for.
+    /// A question about the unit of the rates.
     pub fn rates(&self, used: usize, unit: Option<Unit>, said: &Choices) -> Result<Result<BankRate, String>, Stop> {
         let cells = &self.cells[self.cells.len() - used..];
         let is_percent = self.says_percent() || unit == Some(Unit::Percent);

@@ -95,7 +95,7 @@ pub struct Choices {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excess: Option<bool>,
-    /// How many of the latest returns to use; all of them by default
+    /// Number of the latest returns to use; all of them by default
     #[arg(skip)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub latest: Option<usize>,
