@@ -160,7 +160,6 @@ mod tests {
 
     /// Checks for five percent a side. Three standard errors of 600 trials are 0.027, and few years make the spread
     /// slightly too short.
-    /// slightly too short.
     #[test]
     fn intervals_hold_in_few_years_also_for_several_means_at_once() {
         for (years, crashes) in [(10, false), (20, false), (72, false), (20, true), (72, true)] {

@@ -277,7 +277,7 @@ fn judge(columns: &mut [Column]) {
         !given.is_empty() && headings().all(|heading| heading != core) && are_dates(&given, false)
     };
     let is_dates: Vec<bool> = columns.iter().map(is_date).collect();
-    // A column that looks like dates in no known form is set aside only if no other column holds dates.
+    // A column that looks like dates in no known form holds the dates if no other column does.
     let named = |column: &Column| heads_dates(&column.name) || (!column.is_mostly_numbers() && column.is_labels());
     let dates = is_dates.iter().position(|is| *is).or_else(|| columns.iter().position(&named));
     let is_numbers = |(column, is_dates): (&Column, &bool)| {
