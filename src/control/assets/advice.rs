@@ -9,54 +9,55 @@ use super::AssetsSolution;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::levels::LevelsAdvised;
 
-/// What to hold of several assets through the coming period.
+/// The allocation over several assets through the coming period.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsAdvice {
     /// Share of wealth in each asset; the rest is in the bank.
     pub allocation: BTreeMap<String, f64>,
-    /// The allocation less the holdings: shares of wealth to buy, or where they are negative to sell.
+    /// The allocation less the holdings: shares of wealth to buy, or to sell if negative.
     pub trade: BTreeMap<String, f64>,
-    /// Share of each asset in what is held; where next to nothing is, that of inverse volatilities.
+    /// Share of each asset in the holdings advised; if these are next to nothing, the shares by inverse volatility.
     pub composition: BTreeMap<String, f64>,
     /// Share of wealth in all assets together.
     pub total: f64,
-    /// The same were no log-return below the lowest seen of any asset: what it is above `total` is the part of the caution that
-    /// is for a crash which nobody has seen. Null where `problem.support` rules one out already.
+    /// `total` if no log-return could fall below the lowest seen of any asset. Its excess over `total` is the part of
+    /// the caution against a crash that nobody has seen. Null if `problem.support` rules one out already.
     pub without_crash: Option<f64>,
-    /// Wealth for certain that is worth as much as the allocation is against the worst law, less what trading costs: at least this.
+    /// Lower bound on the certain wealth that is worth as much as the allocation against the worst law, less trading
+    /// costs.
     pub certainty_equivalent: f64,
     /// No allocation is worth more than this.
     pub bound: f64,
-    /// Wealth of selling everything now and staying in the bank.
+    /// Wealth from selling everything now and staying in the bank.
     pub floor: f64,
     /// Radius of the ball, in log-return.
     pub radius: f64,
-    /// Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs low: by little
-    /// where assets move together, by more than a tenth for a dozen that are independent.
+    /// Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs
+    /// low: by little if assets move together, by more than a tenth for a dozen that are independent.
     pub radius_factor: f64,
-    /// The levels of caution, where one of them is followed: found for the fund of inverse volatilities.
+    /// The levels of caution, if one of them is followed: found for the fund of inverse volatilities.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<LevelsAdvised>,
     /// Number of dates seen.
     pub sample_size: usize,
-    /// What the law behind `bound` makes of each asset, which is the worst law where the two sides meet.
+    /// The mean of each asset under the law behind `bound`, which is the worst law if the two bounds meet.
     pub worst_means: BTreeMap<String, WorstMean>,
-    /// What to know before the advice is followed.
+    /// Warnings to read before following the advice.
     pub caution: Vec<Caution>,
 }
 
 /// The one-step problem of several assets, by their names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct OneStep {
-    /// Shares of wealth that are best for who looks one period ahead.
+    /// Shares of wealth that are best when looking one period ahead.
     pub allocation: BTreeMap<String, f64>,
-    /// Wealth for certain after the period that they are worth against the worst law: at least this.
+    /// Lower bound on the certain wealth after the period that is worth as much as they are against the worst law.
     pub certainty_equivalent: f64,
     /// No allocation is worth more than this.
     pub bound: f64,
-    /// What the worst law makes of each asset.
+    /// The mean of each asset under the worst law.
     pub worst_means: BTreeMap<String, WorstMean>,
-    /// What to know before the allocation is followed; left out where there is nothing.
+    /// Warnings to read before following the allocation; left out if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub caution: Vec<Caution>,
 }
@@ -64,18 +65,18 @@ pub struct OneStep {
 /// The mean of an asset's log-return.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstMean {
-    /// Of those seen.
+    /// The mean of the log-returns seen.
     pub seen: f64,
-    /// Under the worst law.
+    /// The mean under the worst law.
     pub worst: f64,
 }
 
-/// By the names of the assets.
+/// Returns the values by the names of the assets.
 pub fn named(names: &[String], values: &[f64]) -> BTreeMap<String, f64> {
     names.iter().cloned().zip(values.iter().copied()).collect()
 }
 
-/// What the law behind the bound of a solution makes of each asset.
+/// Returns the mean of each asset, as seen and under the law behind the bound of a solution.
 pub fn worst_means(names: &[String], rows: &[Vec<f64>], solution: &AssetsSolution) -> BTreeMap<String, WorstMean> {
     let of = |(asset, (name, moved)): (usize, (&String, &f64))| {
         let seen = rows.iter().map(|row| row[asset]).sum::<f64>() / rows.len() as f64;

@@ -1,4 +1,4 @@
-//! From a question about several assets to the advice.
+//! Turns a request about several assets into advice.
 
 use super::advice::{AssetsAdvice, named, worst_means};
 use super::{AssetsLaw, AssetsStep};
@@ -17,12 +17,13 @@ use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{Extent, Support};
 use crate::numerics::fund_bridges::FundBridges;
 
-/// Paths of the joint factor: its standard error is then a hundredth of it.
+/// Paths of the joint factor: its relative standard error is then a hundredth.
 pub const FACTOR_PATHS: usize = 1000;
-/// Returns up to which what each level would hold is solved too: a fraction of a second.
+/// Returns up to which the allocation at each level is also solved: a fraction of a second.
 const SOLVED_BY_LEVEL: usize = 6000;
 
-/// Of the radius of all funds at once over that of one; 1 where there is one, and under rules that look at the sample size alone.
+/// Returns the radius that holds for all funds at once over that of one. It is 1 for a single asset, and under rules
+/// that use the sample size alone.
 pub fn radius_factor(problem: &AssetsProblem, fund: &ProblemSpecification, seed: u64) -> f64 {
     match fund.radius_rule() {
         RadiusRule::Bridge { alpha, .. } | RadiusRule::Calibrated { alpha, .. } if problem.assets.len() > 1 => {
@@ -32,17 +33,18 @@ pub fn radius_factor(problem: &AssetsProblem, fund: &ProblemSpecification, seed:
     }
 }
 
-/// The utility of the investor, relative to what the bank makes of his wealth.
+/// Returns the utility of the investor, relative to what the bank makes of their wealth.
 pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
     RelativeUtility::new(fund.utility, fund.initial_wealth * (1.0 + fund.rate_per_step))
 }
 
-/// The step of `problem`, whose fund has the completed problem `fund`, had `rows` been seen, in a ball of this radius.
+/// Returns the step of `problem`, whose fund has the completed problem `fund`, as if `rows` had been seen, in a ball of
+/// this radius.
 pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
     step_above(floors(fund.support_rule(), rows), problem, fund, rows, radius)
 }
 
-/// Of each asset, what no log-return is moved below.
+/// Returns the log-return of each asset below which no move goes.
 pub fn floors(support: Support, rows: &[Vec<f64>]) -> Vec<f64> {
     let of = |asset: usize| {
         let extent = || Extent::of(rows.iter().map(|row| row[asset]));
@@ -71,17 +73,18 @@ fn step_above(
 /// The ball around the law of several assets that holds for all of their funds at once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FundsBall {
-    /// What the radius of the fund of inverse volatilities is multiplied by.
+    /// Factor on the radius of the fund of inverse volatilities.
     pub radius_factor: f64,
     /// In log-return, at the paper's caution.
     pub radius: f64,
-    /// What of it the levels act on, where one of them is followed.
+    /// The shares of the radius at the levels of caution, if one of them is followed.
     pub levels: Option<Box<CautionLevels>>,
 }
 
 impl FundsBall {
-    /// That of `problem`, whose fund of inverse volatilities is `fund`. Cost: the joint factor under `bridge` and `calibrated`, and
-    /// that of [`Specification::resolved`](crate::control::request::specification::Specification::resolved).
+    /// Returns the ball of `problem`, whose fund of inverse volatilities is `fund`. Cost: the joint factor under
+    /// `bridge` and `calibrated`, and that of
+    /// [`Specification::resolved`](crate::control::request::specification::Specification::resolved).
     ///
     /// # Errors
     /// The history of the fund breaks a rule, which a completed one does not.
@@ -93,16 +96,17 @@ impl FundsBall {
         Ok(FundsBall { radius_factor, radius: whole.radius()?, levels: whole.problem().levels.clone() })
     }
 
-    /// In log-return, at a level.
+    /// Returns the radius at a level, in log-return.
     pub fn radius_at(&self, level: CautionLevel) -> f64 {
         self.radius * level.share(self.levels.as_deref())
     }
 }
 
 impl AssetsAdvice {
-    /// The advice for `problem`, whose fund of inverse volatilities is `fund`, to who holds these shares; and why, where nothing is held.
-    /// Cost: that of its levels of caution, where one is followed; that of [`AssetsStep::solve_from`], twice where a return may fall below
-    /// those seen, and once for each level of a short record; and of the joint factor under `bridge` and `calibrated`.
+    /// Returns the advice for `problem`, whose fund of inverse volatilities is `fund`, given these holdings as shares
+    /// of wealth; and the reason if nothing is held. Cost: its levels of caution, if one is followed, and the joint
+    /// factor under `bridge` and `calibrated`. Also [`AssetsStep::solve_from`], twice if a return may fall below those
+    /// seen, and once for each level of a short record.
     /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     ///

@@ -1,54 +1,56 @@
-//! What the adversary can do to each atom at one allocation and one price of distance: to leave it, or to move it to where
-//! moving further does not pay any more.
+//! The adversary's possible best moves of each atom at one allocation and one price of distance: it leaves the atom, or
+//! moves it until moving further no longer pays.
 //!
-//! An atom that is moved along its levelling for the cost D pays `f(D) = u(w(D)) + gamma D`. Along a phase, in which y falls and
-//! b stays, `w = b + y` and f falls by `U'(w) y / rate - gamma` per unit of D. In ln y that slope rises to one peak and falls, so
-//! f has at most one local minimum inside a phase, on the side of small y, where U' y still grows. Where a position reaches its
-//! floor f may have a local minimum at the end of a phase. With the atom left where it is these are all that a worst law needs.
+//! An atom that is moved along its water-filling path for the cost D pays `f(D) = u(w(D)) + gamma D`. Along a phase y
+//! falls and b stays, so `w = b + y`, and f falls by `U'(w) y / rate - gamma` per unit of D. In ln y that slope rises
+//! to one peak and falls. So f has at most one local minimum inside a phase, on the side of small y, where U' y still
+//! grows. At the end of a phase, when a position reaches its floor, f may have another local minimum. A worst law needs
+//! only these points and the atom in place.
 
 use super::AssetsStep;
 use crate::control::problem::utility::RelativeUtility;
 use crate::numerics::interruption;
 use crate::numerics::levelling::{Levelling, Phase};
 
-/// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
+/// Largest number of Newton steps for a local minimum; they approach it from one side, and double the digits from about
+/// the third on.
 const NEWTON_STEPS: usize = 40;
 const NEWTON_TOLERANCE: f64 = 1e-13;
 /// At 1 a local minimum and a maximum meet.
 const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
-/// One way of the adversary with an atom.
+/// One candidate move of an atom by the adversary.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Branch {
-    /// Distance that it moves the atom by.
+    /// Distance by which it moves the atom.
     pub cost: f64,
     /// `u(w) + gamma D`.
     pub payoff: f64,
     /// `U'(w)`, by relative wealth.
     pub slope: f64,
-    /// The curvature of the payoff against what does not move, over the slope.
+    /// The curvature of the payoff with respect to the part that does not move, over the slope.
     pub bend: f64,
-    /// The level to which positions are lowered; infinite where the atom is left.
+    /// The level to which positions are lowered; infinite if the atom stays.
     pub level: f64,
-    /// True where the level follows allocation and price: at a local minimum inside a phase.
+    /// True if the level follows allocation and price: at a local minimum inside a phase.
     pub follows: bool,
 }
 
-/// All branches of all atoms; those of an atom lie together, the first leaves it.
+/// All branches of all atoms. Branches of one atom are contiguous, and its first branch leaves it in place.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Branches {
     assets: usize,
-    /// Where those of an atom start, and the end.
+    /// The start of each atom's branches, and the end.
     pub first: Vec<usize>,
     pub all: Vec<Branch>,
     /// Growth over the bank, less 1, asset by asset of each branch.
     excesses: Vec<f64>,
-    /// The derivative of what does not move by the allocation and by gamma.
+    /// The derivative, by the allocation and by gamma, of the part that does not move.
     still: Vec<f64>,
     levelling: Levelling,
     /// The last local minimum inside a phase: most atoms share their last phase.
     last: Inside,
-    /// False where some atom pays the less the further it is moved, without an end.
+    /// False if the payoff of some atom falls without bound as it is moved further.
     pub bounded: bool,
 }
 
@@ -61,12 +63,12 @@ impl Branches {
         &self.still[branch * (self.assets + 1)..][..self.assets + 1]
     }
 
-    /// Branches of an atom.
+    /// Returns the branches of an atom.
     pub fn of(&self, atom: usize) -> std::ops::Range<usize> {
         self.first[atom]..self.first[atom + 1]
     }
 
-    /// The branch of an atom that pays least.
+    /// Returns the branch of an atom that pays least.
     pub fn worst(&self, atom: usize) -> usize {
         self.of(atom)
             .min_by(|&left, &right| self.all[left].payoff.total_cmp(&self.all[right].payoff))
@@ -94,7 +96,7 @@ impl Branches {
         self.last = Inside::default();
     }
 
-    /// Adds the atom left where it is.
+    /// Adds the branch that leaves the atom in place.
     fn leave(&mut self, utility: RelativeUtility, allocation: &[f64], growths: &[f64]) {
         let start = self.excesses.len();
         self.excesses.extend(growths.iter().map(|growth| growth - 1.0));
@@ -143,7 +145,7 @@ impl Branches {
             });
             let (value, slope) = known.unwrap_or_else(|| step.utility.at(wealth));
             let aversion = step.utility.relative_aversion(wealth) / wealth;
-            // Where the level follows only just, it would follow without bounds: such a move counts as one that stays.
+            // Near the limit the level would follow without bound: such a move counts as fixed.
             let (room, follows) = (1.0 - aversion * moving, moving > 0.0 && aversion * moving < MOST_FOLLOWED);
             if follows {
                 self.still.push(moving / price);
@@ -160,22 +162,22 @@ impl Branches {
     }
 }
 
-/// A local minimum inside a phase, of a price: it depends on what stays and on the rate alone.
+/// A local minimum inside a phase, at one price: it depends on the fixed part and on the rate alone.
 #[derive(Debug, Clone, Copy, Default)]
 struct Inside {
     fixed: f64,
     rate: f64,
-    /// What a unit of distance takes where it takes most.
+    /// The largest loss per unit of distance.
     at_peak: f64,
-    /// What moves; NaN before it is asked for.
+    /// The moving part of wealth; NaN until it is needed.
     moving: f64,
     /// The utility and its slope there.
     utility: (f64, f64),
 }
 
-/// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, whether it
-/// follows price and allocation, and U and U' there where they are known.
-/// `slope` is U' where nothing is moved. False where there is no least value: it falls for ever.
+/// Reports every local minimum of u(w) + price D along the phases, except D = 0: its level, whether it follows price
+/// and allocation, and U and U' there if they are known. `slope` is U' if nothing is moved. Returns false if there is
+/// no minimum because the payoff falls without bound.
 fn local_minima(
     phases: &[Phase],
     utility: RelativeUtility,
@@ -184,7 +186,7 @@ fn local_minima(
     last: &mut Inside,
     mut found: impl FnMut(f64, bool, Option<(f64, f64)>),
 ) -> bool {
-    // What a unit of distance takes just before a phase starts; the first one starts at the atom itself.
+    // The loss per unit of distance just before a phase starts; the first one starts at the atom itself.
     let mut before = None;
     for phase in phases.iter().rev() {
         let &Phase { fixed, speed, rate, high, low } = phase;
@@ -210,7 +212,7 @@ fn local_minima(
                     last.moving = inside(phase, utility, price, peak.min(speed * high));
                     last.utility = utility.at(fixed + last.moving);
                 }
-                // Below the end of its phase the level is that of a move all the same, whose utility is another.
+                // Below the end of its phase the level is still that of a move, but with another utility.
                 found(last.moving / speed, true, (last.moving >= speed * low).then_some(last.utility));
             }
         }
@@ -223,8 +225,8 @@ fn local_minima(
     true
 }
 
-/// The y below `peak` at which `U'(b + y) y / rate` is the price: by Newton's method in ln y on the logarithms, whose difference
-/// is concave there, from the left.
+/// Returns the y below `peak` at which `U'(b + y) y / rate` is the price. Newton's method in ln y runs from the left on
+/// the logarithms, whose difference is concave there.
 fn inside(phase: &Phase, utility: RelativeUtility, price: f64, peak: f64) -> f64 {
     let &Phase { fixed, speed, rate, low, .. } = phase;
     let target = price * rate;

@@ -1,4 +1,4 @@
-//! The bounds that the search tells of every point: they hold whatever its state.
+//! The bounds that the search computes at every point: they hold in any state of the search.
 
 use super::AssetsStep;
 use super::cuts::dot;
@@ -6,13 +6,13 @@ use super::interior::Interior;
 use super::trading::Tangent;
 use crate::numerics::dispatch::dispatched;
 
-/// Others enter where they raise the bound by more than this share of the gap without them, and with the one that raises it
-/// most those of at least this share of its slope.
+/// Other assets enter if they raise the bound by more than this share of the gap without them. With the one that raises
+/// it most, those of at least this share of its slope enter.
 const ENTERING: f64 = 1.0;
 const ENTERING_TOO: f64 = 0.5;
 
 impl Interior<'_> {
-    /// The lower bound of this point, of which the dual is given.
+    /// Updates the lower bound by this point, whose dual is given.
     pub fn tell_lower(&mut self, dual: f64) {
         let (shares, price) = self.point.split_at(self.step.assets());
         let lower = dual - self.step.trading.taken(shares);
@@ -21,7 +21,7 @@ impl Interior<'_> {
         }
     }
 
-    /// The upper bound by the law of the multipliers, and the assets that would raise it.
+    /// Updates the upper bound by the law of the multipliers, and the assets that would raise it.
     pub fn tell_upper(&mut self) {
         let assets = self.step.assets();
         let shares = &self.point[..assets];
@@ -62,20 +62,20 @@ impl Interior<'_> {
         }
     }
 
-    /// The tangent at shares of the assets searched among as one at shares of all.
+    /// Takes the tangent, with its shares extended from the assets searched among to all.
     pub fn tangent_of_all(&mut self) -> Option<Tangent> {
         let tangent = self.tangent.take()?;
         Some(Tangent { shares: self.of_all(&tangent.shares), ..tangent })
     }
 
-    /// A row of the assets searched among as one of all.
+    /// Extends a row of the assets searched among to all assets; the others get 0.
     pub fn of_all(&self, row: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.whole.assets()];
         self.held.iter().zip(row).for_each(|(&asset, entry)| all[asset] = *entry);
         all
     }
 
-    /// By how much the law of this point moves each log-return, on average.
+    /// Returns the average move of each log-return under the law of this point.
     pub fn mean_moves(&self) -> Vec<f64> {
         let masses = self.law();
         let mut moves = vec![0.0; self.whole.assets()];
@@ -95,7 +95,7 @@ impl Interior<'_> {
         moves
     }
 
-    /// The masses of the moves that the multipliers make, in the ball: a law that is too far is mixed with the centre.
+    /// Returns the masses of the moves that the multipliers make. A law outside the ball is mixed with the centre.
     fn law(&self) -> Vec<f64> {
         let mut masses = vec![0.0; self.cuts.all.len()];
         let mut distance = 0.0;
@@ -107,7 +107,7 @@ impl Interior<'_> {
                 distance += masses[cut] * self.cuts.all[cut].cost;
             }
         }
-        // A distance that is no number is that of no law, and tells no bound.
+        // If the distance is NaN there is no law, and so no bound.
         let kept = if distance <= self.step.radius { 1.0 } else { self.step.radius / distance };
         masses.iter_mut().for_each(|mass| *mass *= kept);
         for (atom, mass) in self.step.masses.iter().enumerate() {

@@ -1,14 +1,15 @@
-//! The composition of a fund: what share of it each asset has, whatever the share of wealth in the fund.
+//! The composition of a fund: the share of the fund in each asset, for any share of wealth in the fund.
 
 use super::AssetsSolution;
 use crate::control::request::fund::CompositionRule;
 use crate::numerics::levelling::inverse_volatility;
 
-/// A total below this says nothing about its parts.
+/// A total below this carries no information about its parts.
 const LEAST_TOTAL: f64 = 1e-4;
 
 impl CompositionRule {
-    /// The composition after the log-returns `rows`, date by date; `one_step` solves the one-step problem, where it is asked.
+    /// Returns the composition after the log-returns `rows`, date by date. `one_step` solves the one-step problem and
+    /// is called only if the rule needs it.
     pub fn composition(&self, rows: &[Vec<f64>], one_step: impl FnOnce() -> AssetsSolution) -> Vec<f64> {
         match self {
             CompositionRule::OneStep => of(&one_step().allocation).unwrap_or_else(|| inverse_volatility(rows)),
@@ -25,19 +26,20 @@ impl CompositionRule {
     }
 }
 
-/// The composition of an allocation; `None` where it holds next to nothing.
+/// Returns the composition of an allocation; `None` if it holds next to nothing.
 pub fn of(allocation: &[f64]) -> Option<Vec<f64>> {
     let total: f64 = allocation.iter().sum();
     (total >= LEAST_TOTAL).then(|| allocation.iter().map(|share| share / total).collect())
 }
 
-/// The guard of the promise: a new composition takes the place of the one held only where the policy values the law of its fund
-/// at least as much. `value` is the policy's value at the law of a fund's returns, given the fund.
+/// Returns the proposed composition if the policy values the law of its fund at least as much as that of the fund held;
+/// otherwise the one held. `value` is the policy's value at the law of a fund's returns, given the fund.
 ///
-/// Then what the policy promises at the fund held stays true whatever proposes the new one: by induction over the steps the
-/// payoff depends on the returns through the fund held alone, and what follows is worth at least what keeping it would be.
+/// This keeps the policy's promise at the fund held true for any rule of proposal, by induction over the steps. The
+/// payoff depends on the returns through the fund held alone, and what follows is worth at least what keeping the fund
+/// would be.
 ///
-/// Of two values both must be as high; a fund without any is never taken.
+/// Both of the two values must be as high; a fund without values is never chosen.
 pub fn guarded(held: Vec<f64>, proposed: Vec<f64>, value: impl Fn(&[f64]) -> Option<[f64; 2]>) -> Vec<f64> {
     let Some(new) = value(&proposed) else { return held };
     let is_as_high = value(&held).is_none_or(|old| new.iter().zip(old).all(|(new, old)| *new >= old));
@@ -80,7 +82,7 @@ mod tests {
         assert_eq!(guarded(vec![0.5, 0.5], vec![0.5, 0.5], value), [0.5, 0.5]);
         assert_eq!(guarded(vec![0.0, 1.0], vec![0.05, 0.95], value), [0.0, 1.0]);
         assert_eq!(guarded(vec![0.0, 1.0], vec![0.2, 0.8], value), [0.2, 0.8]);
-        // One that is dearer to get to, though it is worth more.
+        // A proposal that is worth more but costs more to reach.
         let dear = |fund: &[f64]| Some([fund[0], fund[1]]);
         assert_eq!(guarded(vec![0.5, 0.5], vec![0.6, 0.4], dear), [0.5, 0.5]);
     }

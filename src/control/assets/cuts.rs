@@ -1,11 +1,12 @@
-//! What the search knows of the adversary: of each atom, moves that it found. A move bounds what the atom pays from above, at every
-//! allocation a and price of distance gamma, by a concave function:
+//! The moves of the adversary that the search has found so far, atom by atom. A move bounds the payoff of its atom from
+//! above, at every allocation a and price of distance gamma, by a concave function:
 //!
-//!   one that stays     U(w(a)) + gamma D;
-//!   one that follows   min over what moves of `U(w) + U' (w(a) - w) + gamma D`, less `U' bend (s . dx)^2 / 2`,
+//!   a fixed move       U(w(a)) + gamma D;
+//!   a following move   min over moving positions of `U(w) + U' (w(a) - w) + gamma D`, less `U' bend (s . dx)^2 / 2`,
 //!
-//! the tangent and its bend at the origin, the point where the move was found, s the derivative of what does not move by itself. The
-//! second is that of the branch to second order, and bounds near the origin alone: where it is kept longer, it stays.
+//! the tangent and its bend at the origin, the point where the move was found. s is the derivative of the part that
+//! does not move by itself. The second agrees with its branch to second order, and is a bound near the origin alone: if
+//! it is kept longer, it becomes a fixed move.
 
 use super::AssetsStep;
 use super::branches::Branches;
@@ -20,14 +21,14 @@ const SAME: f64 = 0.02;
 /// One move of an atom, and the pair of slack and multiplier of `t_j <= payoff`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
-    /// Distance that it moves the atom by.
+    /// Distance by which it moves the atom.
     pub cost: f64,
-    /// The level to which positions are lowered; infinite where the atom is left.
+    /// The level to which positions are lowered; infinite if the atom stays.
     pub level: f64,
     /// U and U' at the point.
     pub utility: f64,
     pub slope: f64,
-    /// What it lets the atom pay at the point, at most.
+    /// Upper bound on the atom's payoff at the point.
     pub payoff: f64,
     /// The curvature of the payoff along `still`.
     pub curvature: f64,
@@ -36,33 +37,33 @@ pub(super) struct Cut {
     pub multiplier: f64,
 }
 
-/// The tangent of utility at the origin, `at_bank + slope (w - 1)`, of a move that follows.
+/// The tangent of utility at the origin, `at_bank + slope (w - 1)`, of a following move.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Following {
     at_bank: f64,
     pub slope: f64,
 }
 
-/// All moves known of all atoms; those of an atom lie together, the first leaves it.
+/// All known moves of all atoms. Moves of one atom are contiguous, and its first move leaves it in place.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cuts {
     assets: usize,
-    /// Where those of an atom start, and the end.
+    /// The start of each atom's moves, and the end.
     first: Vec<usize>,
     pub all: Vec<Cut>,
     /// Growth over the bank, less 1, asset by asset.
     excesses: Vec<f64>,
-    /// The derivative of what does not move by itself, by the allocation and by gamma.
+    /// The derivative, by the allocation and by gamma, of the part that does not move by itself.
     stills: Vec<f64>,
     /// The derivative of the payoff.
     gradients: Vec<f64>,
-    /// The growth over the bank of what moves by itself at the point; 0 of what does not.
+    /// The growth over the bank of each asset that moves by itself at the point; 0 for an asset that does not.
     moving: Vec<f64>,
-    /// The point at which the moves that follow were found.
+    /// The point at which the following moves were found.
     origin: Vec<f64>,
 }
 
-/// Of the entries that both have.
+/// Returns the scalar product over the entries that both have.
 pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()
 }
@@ -88,17 +89,18 @@ impl Cuts {
         &self.moving[cut * self.assets..][..self.assets]
     }
 
-    /// Where the moves that follow were found.
+    /// Returns the point at which the following moves were found.
     pub fn origin(&self) -> &[f64] {
         &self.origin
     }
 
-    /// What the moves let an atom pay at most.
+    /// Returns the upper bound that the moves give on the payoff of an atom.
     pub fn least(&self, atom: usize) -> f64 {
         self.all[self.of(atom)].iter().map(|cut| cut.payoff).fold(f64::INFINITY, f64::min)
     }
 
-    /// Takes the branches found at a point, and of the moves known before those that count and that are none of them.
+    /// Takes over the branches found at a point, and those earlier moves that still carry mass and differ from all of
+    /// the new ones.
     pub fn renew(&mut self, step: &AssetsStep, branches: &Branches, point: &[f64], before: &Cuts) {
         self.assets = step.assets();
         self.origin.clear();
@@ -118,7 +120,7 @@ impl Cuts {
                 self.stills.extend_from_slice(branches.still(branch));
             }
             let new = self.first[atom]..self.all.len();
-            // Before the first there were none.
+            // Before the first call there were none.
             let known = if before.first.is_empty() { 0..0 } else { before.of(atom) };
             for old in known.filter(|old| before.all[*old].multiplier > LEAST_MASS * mass) {
                 let (cut, excess) = (&before.all[old], before.excess(old));
@@ -148,7 +150,7 @@ impl Cuts {
             && growths.all(|(left, right)| (left - right).abs() <= SAME * (1.0 + left.max(*right)))
     }
 
-    /// Puts payoffs and their derivatives at a point. Cost O(n d) for n moves of d assets.
+    /// Sets payoffs and their derivatives at a point. Cost O(n d) for n moves of d assets.
     pub fn evaluate(&mut self, step: &AssetsStep, point: &[f64]) {
         dispatched!({
             for atom in 0..step.atoms() {
@@ -198,27 +200,27 @@ impl Cuts {
         found.payoff = following.at_bank + following.slope * (wealth - 1.0) + price * cost - 0.5 * bent * along;
     }
 
-    /// `s . dx` of a move that follows.
+    /// Returns `s . dx` of a following move.
     #[inline(always)]
     fn along(&self, cut: usize, point: &[f64]) -> f64 {
         let since = point.iter().zip(&self.origin).map(|(at, from)| at - from);
         self.still(cut).iter().zip(since).map(|(still, since)| still * since).sum()
     }
 
-    /// The level at which a move that follows is best where U' is `slope`.
+    /// Returns the level at which a following move is optimal if U' is `slope`.
     #[inline(always)]
     fn level(&self, step: &AssetsStep, atom: usize, cut: usize, point: &[f64], slope: f64) -> f64 {
         let price = point[self.assets];
         if !step.ground.is_sup() {
             return price / slope;
         }
-        // Where all move together, the level is a share of what moved at the origin.
+        // If all move together, the level is a share of the sum that moved at the origin.
         let positions = point.iter().zip(step.growth(atom)).zip(self.still(cut));
         let moved = positions.filter(|(_, still)| **still == -1.0).map(|((share, growth), _)| share * growth);
         price / (slope * moved.sum::<f64>())
     }
 
-    /// Puts the moves that follow where they are best at a point, for the law: U' has changed too since the origin.
+    /// Sets the following moves to their optimum at a point, for the law: U' has also changed since the origin.
     pub fn follow(&mut self, step: &AssetsStep, point: &[f64]) {
         let assets = self.assets;
         for atom in 0..step.atoms() {
@@ -239,7 +241,8 @@ impl Cuts {
     }
 }
 
-/// The growth of an asset of which a share is held once positions are lowered to a level, and whether it moves by itself there.
+/// Returns the growth of an asset with a positive share once positions are lowered to a level, and whether it moves by
+/// itself there.
 #[inline(always)]
 fn lowered(step: &AssetsStep, index: usize, share: f64, growth: f64, level: f64) -> (f64, bool) {
     let (position, floor) = (share * growth, share * step.least_growths[index].min(growth));
@@ -258,7 +261,7 @@ mod tests {
     use crate::numerics::levelling::{Ground, inverse_volatility};
     use crate::numerics::streams::stream;
 
-    /// By the branches that are found anew where it is compared, and by differences of its own payoffs.
+    /// Compares with branches found anew at each point, and with differences of the move's own payoffs.
     #[test]
     fn a_move_is_its_branch_to_second_order_and_bounds_it() {
         const ASSETS: usize = 4;
@@ -292,7 +295,7 @@ mod tests {
                 cuts.all.iter().map(|cut| cut.payoff).collect()
             };
             let (up, down) = (payoffs(1e-5), payoffs(-1e-5));
-            // The error of a move that follows, if it is found again with the same that moves.
+            // The error of a following move, if it is found again with the same moving assets.
             let error = |atom: usize, cut: usize, length: f64| -> Option<f64> {
                 let there = found_at(length);
                 let pattern = |cuts: &Cuts, cut: usize| {
@@ -311,11 +314,12 @@ mod tests {
                         continue;
                     }
                     let (Some(far), Some(near)) = (error(atom, cut, 2e-2), error(atom, cut, 1e-2)) else { continue };
-                    // An error of third order falls to an eighth on half the way, one of second order to a quarter.
+                    // With half the distance an error of third order falls to an eighth, one of second order to a
+                    // quarter.
                     assert!(near < far / 6.0 + 1e-12 || far < 1e-9, "{case} {atom}: {far:e} {near:e}");
                     followed += 1;
                 }
-                // What is known of an atom bounds what it pays elsewhere but for what follows.
+                // The known fixed moves of an atom bound its payoff elsewhere too; following moves need not.
                 let elsewhere = found_at(0.5).least(atom);
                 let kept = here.of(atom).filter(|cut| here.all[*cut].follows.is_none()).map(|cut| payoffs(0.5)[cut]);
                 assert!(kept.fold(f64::INFINITY, f64::min) > elsewhere - 1e-12, "{case} {atom}");

@@ -1,14 +1,16 @@
-//! A fund of several assets that one policy is lived by: its composition is chosen first, then the policy says what of wealth is
-//! in it.
+//! A fund of several assets that one policy manages: its composition is chosen first, then the policy decides which
+//! share of wealth is in the fund.
 //!
-//! The composition theta is proposed by its rule from the returns seen. The log-return of the fund, `zeta = ln sum_i theta_i
-//! e^(z_i)`, is what the policy knows of the assets: the state's law is that of the zetas of all dates, its radius holds for all
-//! funds at once, and the advice is the policy's share times theta. A proposal takes the place of the composition held only where
-//! the policy values it as much (see [`guarded`]): then the policy's certainty equivalent at the fund held is a promise, whatever
-//! proposes. Checked by: `tests/service/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
+//! A rule proposes the composition theta from the returns seen. The policy knows the assets only through the log-return
+//! of the fund, `zeta = ln sum_i theta_i e^(z_i)`. The state's law is that of the zetas of all dates, its radius holds
+//! for all funds at once, and the advice is the policy's share times theta. A proposal replaces the composition held
+//! only if the policy values it as much (see [`guarded`]). The policy's certainty equivalent at the fund held then
+//! stays a valid promise for any proposal rule. Checked by:
+//! `tests/service/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
 //!
-//! Where trading costs, a proposal must also pay for the way there, by a rule that is no optimum: what the policy gains by it, an
-//! equal part of that each period left, must be more than what the trade costs beyond that of staying.
+//! If trading costs, a proposal must also pay for its trade, by a rule that is not an optimum. The policy's gain from
+//! it is spread equally over the periods left. One period's part must exceed the extra cost of the trade compared with
+//! staying.
 
 use super::advice::{OneStep, named, worst_means};
 use super::advising::{floors, radius_factor};
@@ -27,21 +29,21 @@ use crate::control::request::specification::{
 use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
 
-/// Several assets as a session knows them.
+/// The assets of a session's fund, with its composition and holdings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fund {
-    /// Log-returns that the law is of, date by date.
+    /// Log-returns that make up the law, date by date.
     pub rows: Vec<Vec<f64>>,
     /// Share of each asset in the fund; they sum to 1.
     pub composition: Vec<f64>,
-    /// The composition that was held when this one was chosen.
+    /// The composition held before this one was chosen.
     pub before: Vec<f64>,
     /// Share of wealth in each asset, before trading.
     pub holdings: Vec<f64>,
 }
 
 impl AssetsProblem {
-    /// The training of a policy for a fund of these assets.
+    /// Returns the training of a policy for a fund of these assets.
     ///
     /// # Errors
     /// A field breaks a rule.
@@ -67,7 +69,7 @@ impl AssetsProblem {
         Specification { problem, design, fund: Some(Box::new(fund)), ..plain }.completed()
     }
 
-    /// What a policy was trained for, had `history` been seen; `None` where that is one asset.
+    /// Returns the problem that a policy was trained for, as if `history` had been seen; `None` if it has one asset.
     pub fn of(specification: &Specification, history: Vec<Vec<f64>>) -> Option<Self> {
         let Specification { problem, fund, .. } = specification;
         let fund = fund.as_deref()?;
@@ -93,23 +95,23 @@ impl AssetsProblem {
 }
 
 impl Fund {
-    /// Who has seen `rows` and holds these shares of wealth, before a composition is chosen.
+    /// Starts a fund from the returns `rows` and these shares of wealth, before a composition is chosen.
     pub fn at(rows: Vec<Vec<f64>>, holdings: Vec<f64>) -> Self {
         let composition = inverse_volatility(&rows);
         Fund { rows, before: composition.clone(), composition, holdings }
     }
 
-    /// Holds these shares from now on.
+    /// Replaces the composition by this one.
     pub fn take(&mut self, composition: Vec<f64>) {
         self.before = std::mem::replace(&mut self.composition, composition);
     }
 
-    /// Log-returns of the fund, date by date.
+    /// Returns the log-returns of the fund, date by date.
     pub fn returns(&self) -> Vec<f64> {
         fund_returns(&self.rows, &self.composition)
     }
 
-    /// Log-return of what is held where the shares of wealth are `executed`, in a period of these log-returns.
+    /// Returns the log-return of the holdings in a period of these log-returns, if the shares of wealth are `executed`.
     pub fn log_return(&self, executed: &[f64], log_returns: &[f64]) -> f64 {
         let total: f64 = executed.iter().sum();
         let of = |shares: &[f64], whole: f64| {
@@ -118,12 +120,12 @@ impl Fund {
         if total > 0.0 { of(executed, total) } else { of(&self.composition, 1.0) }
     }
 
-    /// Share of wealth that is traded on the way to `executed`.
+    /// Returns the share of wealth that is traded to reach `executed`.
     pub fn traded(&self, executed: &[f64]) -> f64 {
         self.holdings.iter().zip(executed).map(|(held, share)| f64::abs(share - held)).sum()
     }
 
-    /// After a period through which `executed` was held, and which left the share `holding` in all assets.
+    /// Updates the fund after a period in which `executed` was held and that left the share `holding` in all assets.
     pub fn passed(&mut self, executed: &[f64], log_returns: Option<&[f64]>, holding: f64) {
         let grown = |(asset, share): (usize, &f64)| share * log_returns.map_or(1.0, |all| all[asset].exp());
         let grown: Vec<f64> = executed.iter().enumerate().map(grown).collect();
@@ -132,16 +134,16 @@ impl Fund {
         self.rows.extend(log_returns.map(<[f64]>::to_vec));
     }
 
-    /// The state of a fund of other shares.
+    /// Returns the state of a fund with another composition.
     fn state(&self, advisor: &Advisor, state: &State, composition: &[f64]) -> State {
         let returns = fund_returns(&self.rows, composition);
         let law = advisor.specification().problem.learning.law(&returns);
         State { wealth: state.wealth, holding: state.holding, law }
     }
 
-    /// Chooses the composition before the period after `step`, below the horizon, and gives the state of its fund and the one-step
-    /// solution that proposed it, where one did. Cost: a one-step problem where the rule has one, some policy values, and a law of n
-    /// returns each.
+    /// Chooses the composition before the period after `step`, which is below the horizon. Returns the state of its
+    /// fund, and the one-step solution if one made the proposal. Cost: a one-step problem if the rule needs one, some
+    /// policy values, and a law of n returns each.
     pub fn compose(
         &mut self,
         advisor: &Advisor,
@@ -162,11 +164,11 @@ impl Fund {
             let [lowest, highest] = problem.action_interval;
             let total = ActionInterval { lowest, highest };
             let step = AssetsStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
-            // From nothing, so that what is proposed depends on what was seen alone.
+            // A cold start, so that the proposal depends on the returns seen alone.
             solution.insert(step.solve(None)).clone()
         });
         let left = (problem.horizon - step) as f64;
-        // What the policy values the fund, and that less the way there.
+        // The policy's value of the fund, and that value less the cost of the trade.
         let value = |composition: &[f64]| {
             let varies = problem.learning.check_deviation("fund", &fund_returns(&self.rows, composition)).is_ok();
             let (total, gain) = advisor.surrogate(step, &self.state(advisor, state, composition));
@@ -179,7 +181,7 @@ impl Fund {
         (self.state(advisor, state, &self.composition), solution)
     }
 
-    /// A one-step solution in wealth, by the names of the assets; the bank alone makes `floor`.
+    /// Reports a one-step solution in wealth, by the names of the assets; the bank alone makes `floor`.
     pub fn one_step(&self, names: &[String], solution: &AssetsSolution, floor: f64) -> OneStep {
         OneStep {
             allocation: named(names, &solution.allocation),

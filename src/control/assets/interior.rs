@@ -1,15 +1,18 @@
-//! The search for the best allocation and price of distance: what is known of the adversary is solved by an interior point method,
+//! The search for the best allocation and price of distance. The problem with the known moves of the adversary is
+//! solved by an interior point method,
 //!
 //!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for every move m known of atom j (`cuts.rs`),
 //!
-//! within the bounds of the shares, of their sum and of gamma, and at what is found the adversary is asked anew. Every multiplier
-//! m >= 0, sum_m m_jm = p_j, makes a law in the ball or, after a mixture with the centre, one that is.
+//! within the bounds of the shares, of their sum and of gamma. At its solution the adversary's answer adds new moves.
+//! Every set of multipliers m >= 0 with sum_m m_jm = p_j makes a law in the ball, or one that is after a mixture with
+//! the centre.
 //!
-//! A barrier of mu p_j for each move makes it smooth, with t_j where it is best. Steps are Newton's on `slack x multiplier = mu p_j`;
-//! they raise the barrier function, which the step's length is found by. Where the answer of the adversary lies far below what was
-//! known, the search goes back on half of its way, and mu stays as large as a share of what was not known. Where trading costs,
-//! u_i >= |a_i - h_i| join the point, and `p sum u_i` is taken off (`trading.rs`). Sources: Boyd and Vandenberghe (2004), Convex
-//! Optimization, section 11.7; Reemtsen and Rueckmann (1998), Semi-Infinite Programming, chapter 7 (exchange methods).
+//! A barrier of mu p_j for each move makes it smooth, with the best t_j. Steps are Newton's on
+//! `slack x multiplier = mu p_j`; they raise the barrier function, which also sets the step's length. If the
+//! adversary's answer lies far below the known value, the search halves its step back, and mu stays as large as a share
+//! of that gap. If trading costs, u_i >= |a_i - h_i| join the point, and `p sum u_i` is subtracted (`trading.rs`).
+//! Sources: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7; Reemtsen and Rueckmann (1998),
+//! Semi-Infinite Programming, chapter 7 (exchange methods).
 
 mod newton;
 
@@ -20,36 +23,37 @@ use super::cuts::{Cut, Cuts, dot};
 use super::trading::Tangent;
 use crate::numerics::interruption;
 
-/// Questions to the adversary at most, and steps between two.
+/// Largest number of calls of the adversary, and of steps between two.
 const ROUNDS: usize = 60;
 const STEPS: usize = 60;
-/// What the barrier is brought to, of what it was, and of what was not known of the adversary.
+/// The next barrier, as a share of the last one and of the gap to the adversary's answer.
 const REDUCTION: f64 = 0.1;
 const OF_UNKNOWN: f64 = 0.1;
-/// Rounding takes what steps at a lower barrier gain.
+/// At a lower barrier rounding exceeds the gain of a step.
 const LEAST_BARRIER: f64 = 1e-12;
 /// A gain of a step below this share of the barrier ends a round.
 const LEAST_GAIN: f64 = 0.2;
-/// Barriers that the adversary's answer may lie below what was known, before the search goes back; and how often it does.
+/// How far the adversary's answer may lie below the known value, in barriers, before the search goes back; and how
+/// often it does.
 const BELOW_KNOWN: f64 = 30.0;
 const HALVINGS: usize = 10;
-/// Of the gain that a step foresees, what it must make; steps shorter than this are taken whatever they make.
+/// The share of its predicted gain that a step must make; shorter steps than this are accepted with any gain.
 const GAIN_MADE: f64 = 1e-4;
 const LEAST_LENGTH: f64 = 1e-8;
 /// Rounding of a mean of utilities.
 const ROUNDING: f64 = 1e-15;
-/// Newton steps for t_j at most, and their end as a share of the barrier.
+/// Largest number of Newton steps for t_j, and their tolerance as a share of the barrier.
 const TOP_STEPS: usize = 30;
 const TOP_TOLERANCE: f64 = 1e-10;
-/// Radius that the search has at least.
+/// Smallest radius used in the search.
 const LEAST_RADIUS: f64 = 1e-9;
 /// Multipliers are kept within this factor of the central path.
 const OFF_CENTRE: f64 = 100.0;
-/// Shares of the start by which one near a similar step is drawn inside.
+/// Weight of the default start in a warm start, which keeps it inside the bounds.
 const DRAWN_INSIDE: f64 = 0.002;
-/// Shares of a start sum to this over the risk aversion at most, above the least they may sum to.
+/// Above the least sum allowed, the shares of a start sum to at most this over the risk aversion.
 const SHARE_AT_START: f64 = 0.5;
-/// Room that the sum of the shares has at least.
+/// Smallest width of the interval for the sum of the shares.
 const LEAST_ROOM: f64 = 1e-6;
 
 /// `offset + direction . (a, gamma) >= 0`, with its multiplier.
@@ -66,15 +70,15 @@ impl Bound {
     }
 }
 
-/// The search.
+/// The state of the interior point search.
 pub(super) struct Interior<'a> {
     /// The step with the assets searched among, which are `held` of the `whole`.
     pub step: &'a AssetsStep,
     pub whole: &'a AssetsStep,
     pub held: &'a [usize],
-    /// Others that would raise the value by more than what is left to find among these.
+    /// Other assets, which would raise the value by more than the remaining gap among these.
     pub entering: Vec<usize>,
-    /// The shares, then the price gamma, then where trading costs what is traded of each asset.
+    /// The shares, then the price gamma, then the trade in each asset if trading costs.
     pub point: Vec<f64>,
     pub bounds: Vec<Bound>,
     /// Barrier of a bound, over that of all atoms.
@@ -82,21 +86,21 @@ pub(super) struct Interior<'a> {
     pub barrier: f64,
     /// The adversary's answer at the point.
     branches: Branches,
-    /// What is known of the adversary.
+    /// The known moves of the adversary.
     pub cuts: Cuts,
     known_before: Cuts,
     /// The allocation of the best lower bound, and its price.
     pub best: Vec<f64>,
     pub best_price: f64,
-    /// What the best is worth at least, and every allocation at most, in relative utility.
+    /// Lower bound on the worth of the best allocation, and upper bound for every allocation, in relative utility.
     pub lower: f64,
     pub upper: f64,
-    /// Of the law that told the lowest upper bound; none where no law told one.
+    /// The tangent of the law with the lowest upper bound; none if no law gave a bound.
     pub tangent: Option<Tangent>,
     pub evaluations: usize,
 }
 
-/// t with `sum 1 / (f_m - t) = 1 / barrier`, by Newton's method on its reciprocal, which is concave.
+/// Returns t with `sum 1 / (f_m - t) = 1 / barrier`, by Newton's method on its reciprocal, which is concave.
 fn top(cuts: &[Cut], barrier: f64) -> f64 {
     let least = cuts.iter().map(|cut| cut.payoff).fold(f64::INFINITY, f64::min);
     let mut top = least - barrier;
@@ -117,7 +121,7 @@ fn top(cuts: &[Cut], barrier: f64) -> f64 {
 }
 
 impl<'a> Interior<'a> {
-    /// `near`, where the search starts, are shares of the assets searched among, and a price.
+    /// Starts the search. `near` is a warm start: shares of the assets searched among, and a price.
     pub fn start(
         step: &'a AssetsStep,
         whole: &'a AssetsStep,
@@ -128,8 +132,8 @@ impl<'a> Interior<'a> {
         let assets = step.assets();
         let highest = step.total.highest;
         let lowest = step.total.lowest.min(highest - LEAST_ROOM);
-        // Halfway between the bounds of the sum, or where a loss of all that is held still weighs little: deeper in, utilities of
-        // a risk aversion of 20 and more are so large that rounding takes what a step could gain.
+        // Halfway between the bounds of the sum, or at a sum whose total loss still weighs little. Further inside,
+        // utilities of a risk aversion of 20 and more are so large that rounding exceeds the gain of a step.
         let weighs_little = SHARE_AT_START / step.utility.relative_risk_aversion();
         let middle = (0.5 * (lowest + highest)).min(lowest + weighs_little);
         let even = middle / assets as f64;
@@ -182,7 +186,7 @@ impl<'a> Interior<'a> {
         interior
     }
 
-    /// Asks the adversary at the point. The dual there, which is a lower bound.
+    /// Computes the adversary's answer at the point. Returns the dual there, which is a lower bound.
     fn ask(&mut self) -> f64 {
         let (shares, price) = self.point.split_at(self.step.assets());
         self.branches.find(self.step, shares, price[0]);
@@ -192,7 +196,7 @@ impl<'a> Interior<'a> {
         dual
     }
 
-    /// Joins the adversary's answer to what is known.
+    /// Adds the adversary's answer to the known moves.
     fn learn(&mut self) {
         std::mem::swap(&mut self.cuts, &mut self.known_before);
         self.cuts.renew(self.step, &self.branches, &self.point, &self.known_before);
@@ -203,7 +207,7 @@ impl<'a> Interior<'a> {
         }
     }
 
-    /// What is traded, and the multipliers of the bounds, at the start: on the central path.
+    /// Sets the trades and the multipliers of the bounds at the start, on the central path.
     fn open(&mut self) {
         let barrier = self.barrier * self.bound_weight;
         let (assets, price) = (self.step.assets(), self.step.trading.price);
@@ -234,7 +238,8 @@ impl<'a> Interior<'a> {
         }
     }
 
-    /// Brings the point to the best by what is known, but for the barrier. False where no step can be told.
+    /// Brings the point to the optimum of the known problem, up to the barrier. Returns false if no step can be
+    /// computed.
     fn solve_known(&mut self) -> bool {
         let mut merit = self.merit();
         self.tame();
@@ -242,7 +247,7 @@ impl<'a> Interior<'a> {
             interruption::checkpoint();
             let Some(direction) = self.direction() else { return false };
             let next = self.go(&direction, merit);
-            // A step that rounding takes the gain of is the last too.
+            // A step whose gain is within rounding is also the last.
             let gains = next > merit + ROUNDING * (1.0 + merit.abs());
             merit = next;
             if !gains || direction.gain < LEAST_GAIN * self.barrier {
@@ -252,19 +257,20 @@ impl<'a> Interior<'a> {
         merit.is_finite()
     }
 
-    /// In a ball of no radius the price would rise without end.
+    /// Returns the radius, at least the smallest used: in a ball of radius 0 the price would rise without bound.
     fn radius(&self) -> f64 {
         self.step.radius.max(LEAST_RADIUS)
     }
 
-    /// Of the point, by what is known of the adversary.
+    /// Returns the value of the point in the known problem.
     fn known(&self) -> f64 {
         let atoms = self.step.masses.iter().enumerate();
         let mean: f64 = atoms.map(|(atom, mass)| mass * self.cuts.least(atom)).sum();
         mean - self.point[self.step.assets()] * self.step.radius
     }
 
-    /// Halves the way from where the adversary was asked before, as long as its answer lies `unknown` below what was known.
+    /// Halves the step back to the last point where moves were learned, while the adversary's answer lies too far, by
+    /// `unknown`, below the known value.
     fn go_back(&mut self, mut unknown: f64) {
         for _ in 0..HALVINGS {
             if unknown <= BELOW_KNOWN * self.barrier {
@@ -277,7 +283,7 @@ impl<'a> Interior<'a> {
         }
     }
 
-    /// Takes the step, or as many halves of it as raise the barrier function by a part of what was foreseen; its value then.
+    /// Takes the step, halved until the barrier function rises by a part of the predicted gain. Returns its value then.
     fn go(&mut self, direction: &Direction, before: f64) -> f64 {
         let from = self.point.clone();
         let mut length = direction.length;
@@ -301,7 +307,7 @@ impl<'a> Interior<'a> {
         merit
     }
 
-    /// The barrier function at the point, with t of every atom, and so the slacks, where it is best.
+    /// Returns the barrier function at the point. Sets t of every atom to its optimum, and so the slacks.
     fn merit(&mut self) -> f64 {
         let (assets, barrier) = (self.step.assets(), self.barrier);
         let traded: f64 = self.point[assets + 1..].iter().sum();
@@ -323,7 +329,7 @@ impl<'a> Interior<'a> {
         merit
     }
 
-    /// Brings multipliers that are far off the central path nearer to it.
+    /// Clamps multipliers that are far off the central path to within a factor of it.
     fn tame(&mut self) {
         let near = |multiplier: f64, central: f64| multiplier.max(central / OFF_CENTRE).min(central * OFF_CENTRE);
         for (atom, mass) in self.step.masses.iter().enumerate() {

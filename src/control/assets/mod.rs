@@ -1,21 +1,22 @@
-//! One robust step with several assets, where the utility is that of wealth at its end:
+//! One robust step with several assets, with the utility of wealth at its end:
 //!
 //!   max_a  min_F { E_F[ U(w(a, Z)) ] : W1(F, F^) <= radius },   w = (1 - sum a_i)(1 + r) + sum a_i e^(z_i),
 //!
-//! a_i >= 0 the shares of wealth, with a sum in an interval, and the ground cost of W1 the largest |dz_i| (`Ground::Sup`) or
-//! `sum k_i |dz_i|` (`Ground::Weighted`). No move up helps the adversary, so an atom that is moved by D is moved along its
-//! levelling (`numerics/levelling.rs`), and with the price gamma of distance
+//! a_i >= 0 are the shares of wealth, with a sum in an interval. The ground cost of W1 is the largest |dz_i|
+//! (`Ground::Sup`) or `sum k_i |dz_i|` (`Ground::Weighted`). No move up helps the adversary, so an atom that is moved
+//! by D moves along its water-filling path (`numerics/levelling.rs`). With the price gamma of distance
 //!
 //!   the step  =  max_(a, gamma >= 0)  sum_j p_j min_D [ U(w_j(D; a)) + gamma D ]  -  gamma radius,
 //!
-//! concave in a and gamma together: for every move fixed the bracket is concave. At any a and gamma it bounds what a is worth
-//! from below; any law F in the ball bounds the step from above, by `E_F U` and its largest rise over the allocations:
+//! concave in a and gamma together, because the bracket is concave for every fixed move. At any a and gamma it is a
+//! lower bound on the worth of a. Any law F in the ball bounds the step from above, by `E_F U` and its largest rise
+//! over the allocations:
 //!
 //!   the step  <=  E_F[ U(w(a, Z)) ] + max_v (v - a) . E_F[ U'(w(a, Z)) (e^Z / (1 + r) - 1) ].
 //!
-//! The first is told as `value`, the second as `bound`, both in log certainty equivalent over the bank; how they were found
-//! does not matter to them. Under `Ground::Sup` without a floor the step is that of one asset whose log-return is
-//! `ln(sum theta_i e^(z_i))`, theta = a / sum a. Source of the ball: paper (2.5); of the reduction, the levelling.
+//! `value` reports the first and `bound` the second, both in log certainty equivalent over the bank. They hold however
+//! the search found them. Under `Ground::Sup` without a floor the step is that of one asset whose log-return is
+//! `ln(sum theta_i e^(z_i))`, theta = a / sum a. Source of the ball: paper (2.5); of the reduction, the water filling.
 
 pub mod advice;
 pub mod advising;
@@ -37,16 +38,18 @@ use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::MOST_ASSETS;
 use crate::numerics::levelling::Ground;
 
-/// Relative utility between the bounds at which a search ends.
+/// Gap between the bounds at which a search ends, in relative utility.
 const TOLERANCE: f64 = 1e-8;
-/// Log certainty equivalent between the bounds that asks for no other search: a thousandth of a hundredth of a percent.
+/// Gap between the bounds that ends all searches, in log certainty equivalent: a thousandth of a hundredth of a
+/// percent.
 const CONTENT: f64 = 1e-7;
-/// Of a mean of utilities: where a utility hardly grows any more, a value read back from above its rounding would be without end.
+/// Relative rounding of a mean of utilities. If a utility hardly grows any more, inverting a value rounded up would
+/// give infinity.
 const ROUNDING: f64 = 1e-14;
-/// First barriers of searches, in relative utility, and that of one near a similar step.
+/// First barriers of successive searches, in relative utility, and the barrier of a warm start.
 const BARRIERS: [f64; 4] = [1e-3, 1e-4, 1e-2, 1e-1];
 const BARRIER_NEAR: f64 = 1e-6;
-/// Shares below this are rounding of a search that stays inside its bounds.
+/// Smaller shares are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 
 /// A robust step with several assets.
@@ -56,7 +59,7 @@ pub struct AssetsStep {
     /// `e^(z_i) / (1 + r)`, atom after atom.
     growths: Vec<f64>,
     masses: Vec<f64>,
-    /// Of each asset, below which no growth over the bank is moved; 0 where there is no floor.
+    /// The growth over the bank of each asset below which no move goes; 0 without a floor.
     least_growths: Vec<f64>,
     ground: Ground,
     radius: f64,
@@ -72,37 +75,37 @@ pub struct AssetsLaw<'a> {
     pub returns: &'a [Vec<f64>],
     /// In log-return, at least 0.
     pub radius: f64,
-    /// Of each asset, below which no log-return is moved; minus infinity where there is no floor.
+    /// The log-return of each asset below which no move goes; minus infinity without a floor.
     pub floors: Vec<f64>,
 }
 
-/// An allocation and what the search for it found.
+/// An allocation with its bounds and the law behind them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AssetsSolution {
     /// Shares of wealth.
     pub allocation: Vec<f64>,
-    /// Log certainty equivalent of the allocation over the bank, against the worst law: at least this.
+    /// Lower bound on the log certainty equivalent of the allocation over the bank, against the worst law.
     pub value: f64,
-    /// The same of every allocation: at most this.
+    /// Upper bound on that of every allocation.
     pub bound: f64,
     /// Lost relative utility per unit of radius.
     pub multiplier: f64,
-    /// By how much the law behind the bound moves each log-return, on average; at most 0.
+    /// The average move of each log-return under the law behind the bound; at most 0.
     pub mean_moves: Vec<f64>,
-    /// Points at which the adversary's answer was found.
+    /// Number of points at which the adversary's answer was computed.
     pub evaluations: usize,
 }
 
 impl AssetsSolution {
-    /// Warns where the search ended before its bounds met.
+    /// Warns if the search ended before its bounds met.
     pub fn caution(&self) -> Option<Caution> {
         Caution::not_certified(self.bound - self.value)
     }
 }
 
 impl AssetsStep {
-    /// The step at the empirical law of `law.returns`, each date with the same mass; the shares sum to within `total`.
-    /// `utility` is relative to the wealth that the bank makes.
+    /// Builds the step at the empirical law of `law.returns`, each date with the same mass; the shares sum to within
+    /// `total`. `utility` is relative to the wealth that the bank makes.
     pub fn new(
         law: AssetsLaw<'_>,
         ground: Ground,
@@ -125,11 +128,11 @@ impl AssetsStep {
         }
     }
 
-    /// The best allocation. `near` is where the search starts: the solution of a similar step.
+    /// Solves for the best allocation. `near` is a warm start: the solution of a similar step.
     ///
-    /// A search that does not bring its bounds together is followed by others, which start further inside or out; bounds of all of them
-    /// hold. Cost: some 10 to 40 evaluations, each O(n d ln d), and 30 to 120 steps, each O(n d^2), d the assets searched among; of 5
-    /// searches at most.
+    /// If a search leaves its bounds apart, others follow from starts further inside or out; bounds of all of them
+    /// hold. Cost: at most 5 searches, each with some 10 to 40 evaluations of O(n d ln d), and 30 to 120 steps of
+    /// O(n d^2), d the number of assets in the search.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
         let barrier = if near.is_some() { BARRIER_NEAR } else { BARRIERS[0] };
         let (mut best, _) = self.search(self.first_held(near), near, barrier);
@@ -145,7 +148,8 @@ impl AssetsStep {
         self.at_least_the_bank(best)
     }
 
-    /// The assets that a search begins with: those held already or near by, or, where few are ever held, the one of the highest mean.
+    /// Returns the assets that a search begins with: those held or in the warm start; if there are none, the one of
+    /// highest mean under `Ground::Sup`, and otherwise all.
     fn first_held(&self, near: Option<&AssetsSolution>) -> Vec<usize> {
         let counts =
             |asset: usize| self.trading.holding(asset) > 0.0 || near.is_some_and(|near| near.allocation[asset] > 0.0);
@@ -163,8 +167,8 @@ impl AssetsStep {
         (0..self.assets).max_by(|&left, &right| means[left].total_cmp(&means[right])).into_iter().collect()
     }
 
-    /// A search that found nothing better leaves all in the bank where that is allowed, whatever became of it; and nothing is worth
-    /// more than the best growth seen.
+    /// Leaves all in the bank if the search found nothing better and the bank is allowed, even if the search failed.
+    /// Caps the bound at the best growth seen.
     fn at_least_the_bank(&self, found: AssetsSolution) -> AssetsSolution {
         let most = self.most_growth();
         let bound = if found.bound < most && found.bound >= found.value { found.bound } else { most };
@@ -175,8 +179,8 @@ impl AssetsStep {
         AssetsSolution { allocation: nothing.clone(), value: 0.0, bound: bound.max(0.0), mean_moves: nothing, ..found }
     }
 
-    /// Searches among the assets `held`, and among more once they would count: the bound is that of all, and so is the tangent that
-    /// is told beside it.
+    /// Searches among the assets `held`, and adds others once they would raise the value. The bound is that of all
+    /// assets, and so is the tangent returned with it.
     fn search(
         &self,
         mut held: Vec<usize>,
@@ -225,7 +229,7 @@ impl AssetsStep {
         }
     }
 
-    /// The step with some of the assets alone.
+    /// Returns the step with some of the assets alone.
     fn among(&self, held: &[usize]) -> AssetsStep {
         let of = |row: &[f64]| held.iter().map(|&asset| row[asset]).collect::<Vec<f64>>();
         AssetsStep {
@@ -242,8 +246,8 @@ impl AssetsStep {
         }
     }
 
-    /// The growth of what is not held once positions are lowered to a level: it moves for nothing where all move together, and
-    /// does not move where each is paid for.
+    /// Returns the growth of an asset not held once positions are lowered to a level. It moves at no cost if all move
+    /// together, and does not move if each move is paid for.
     #[inline(always)]
     fn unheld(&self, asset: usize, growth: f64, level: f64) -> f64 {
         let moved = if self.ground.is_sup() { growth * level } else { growth };
@@ -252,14 +256,15 @@ impl AssetsStep {
         if held_up < growth { held_up } else { growth }
     }
 
-    /// What an allocation is worth at least, in relative utility and less what trading takes: the dual at a price of distance.
+    /// Returns a lower bound on the worth of an allocation, in relative utility less the cost of trading: the dual at a
+    /// price of distance.
     fn value_at(&self, allocation: &[f64], price: f64) -> f64 {
         let mut branches = Branches::default();
         branches.find(self, allocation, price);
         self.dual(&branches, price).0 - self.trading.taken(allocation)
     }
 
-    /// The dual at a price of distance, and the distance that its law takes.
+    /// Returns the dual at a price of distance, and the distance that its law uses.
     fn dual(&self, branches: &Branches, price: f64) -> (f64, f64) {
         if !branches.bounded {
             return (f64::NEG_INFINITY, f64::INFINITY);
@@ -273,7 +278,8 @@ impl AssetsStep {
         (mean - price * self.radius, distance)
     }
 
-    /// The log of the best growth over the bank that was seen, or of the bank's: no allocation is worth more.
+    /// Returns the log of the larger of the best growth over the bank seen and that of the bank: no allocation is worth
+    /// more.
     fn most_growth(&self) -> f64 {
         self.growths.iter().copied().fold(1.0, f64::max).ln()
     }

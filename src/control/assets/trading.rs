@@ -1,32 +1,34 @@
-//! The step of who holds some of the assets already, where trading costs:
+//! The step of an investor who already holds some of the assets, if trading costs:
 //!
 //!   max_a  V(a) + ln(1 - c T(a)),   T(a) = sum_i |a_i - h_i|,
 //!
-//! V the log certainty equivalent of the step and `c T` of wealth lost on the way from the holdings h. Under power and log utility
-//! the certainty equivalent is concave and grows with wealth alone, so that V and the whole are concave. The search is that of the
-//! step less `p T` in relative utility: at its best, `p = c / (1 - c T) dU/dV` makes it the best of the whole, and p is found by
-//! going on from there. Any law F in the ball bounds the whole by the tangent of V_F, which is concave too, at any a:
+//! V is the log certainty equivalent of the step, and `c T` the share of wealth lost by trading from the holdings h.
+//! Under power and log utility the certainty equivalent is concave and proportional to wealth, so V and the whole are
+//! concave. The search maximises the step less `p T` in relative utility. At the optimum of the whole,
+//! `p = c / (1 - c T) dU/dV` makes the two agree, and p is found by iteration. Any law F in the ball bounds the whole
+//! by the tangent of V_F, which is also concave, at any a:
 //!
 //!   the whole  <=  V_F(a) + ln(1 - c T(a)) + max_b [ grad V_F(a) . (b - a) - c / (1 - c T(a)) (T(b) - T(a)) ].
 
 use super::{AssetsSolution, AssetsStep, BARRIER_NEAR, BARRIERS, CONTENT, LEAST_SHARE};
 use crate::control::problem::actions::ActionInterval;
 
-/// Searches at most.
+/// Largest number of searches.
 const SEARCHES: usize = 12;
-/// Relative change of the price of trading that asks for another search.
+/// Relative change of the price of trading above which the search runs again.
 const PRICE_STANDS: f64 = 1e-7;
 
-/// What is held before trading, and what a unit of wealth that is traded takes in relative utility. Nothing is held, and trading is
-/// free, unless it is given.
+/// Holdings before trading, and the loss of relative utility per unit of wealth traded. By default nothing is held and
+/// trading is free.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Trading {
-    /// Asset by asset; none where trading is free.
+    /// Asset by asset; empty if trading is free.
     pub holdings: Vec<f64>,
     pub price: f64,
 }
 
-/// What a law of the ball says of every allocation: at `shares` it gives the mean utility `mean`, which rises by `slopes`.
+/// The linear bound that a law of the ball gives on every allocation: mean utility `mean` at `shares`, with gradient
+/// `slopes`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tangent {
     pub shares: Vec<f64>,
@@ -39,27 +41,27 @@ impl Trading {
         self.holdings.get(asset).copied().unwrap_or(0.0)
     }
 
-    /// T, in shares of wealth.
+    /// Returns T, in shares of wealth.
     pub fn turnover(&self, allocation: &[f64]) -> f64 {
         self.holdings.iter().zip(allocation).map(|(held, share)| (share - held).abs()).sum()
     }
 
-    /// In relative utility.
+    /// Returns the cost of trading, in relative utility.
     pub fn taken(&self, allocation: &[f64]) -> f64 {
         self.price * self.turnover(allocation)
     }
 
-    /// That of some of the assets, which are all that are held.
+    /// Restricts this to some of the assets, which are all that are held.
     pub fn among(&self, held: &[usize]) -> Self {
         let holdings =
             if self.holdings.is_empty() { Vec::new() } else { held.iter().map(|&asset| self.holding(asset)).collect() };
         Trading { holdings, price: self.price }
     }
 
-    /// The most of `slopes . b - price T(b)` over allocations b whose sum is within `total`: what is held is kept in the order of
-    /// slopes, and more is bought of the steepest. Cost O(d ln d).
+    /// Returns the maximum of `slopes . b - price T(b)` over allocations b whose sum is within `total`. Existing
+    /// holdings are kept in the order of slopes, and more is bought of the steepest. Cost O(d ln d).
     pub fn most(&self, slopes: &[f64], total: ActionInterval) -> f64 {
-        // What a share of wealth adds, and how much of it there is.
+        // The gain per share of wealth, and how many shares are available at it.
         let kept = self.holdings.iter().zip(slopes).map(|(held, slope)| (slope + self.price, *held));
         let bought = slopes.iter().map(|slope| (slope - self.price, f64::INFINITY));
         let mut pieces: Vec<(f64, f64)> = kept.chain(bought).collect();
@@ -77,9 +79,9 @@ impl Trading {
 }
 
 impl AssetsStep {
-    /// The best allocation for who holds `holdings`, one for each asset, and loses the share `cost` of wealth for each unit of it that
-    /// is bought or sold; `value` and `bound` are less that cost. Under power and log utility. Cost: some searches.
-    /// Checked by: `tests/solver/assets.rs::holdings_and_a_cost_are_best_by_direct_search`.
+    /// Solves for the best allocation given `holdings`, one for each asset, if each unit of wealth bought or sold loses
+    /// the share `cost` of wealth. `value` and `bound` are net of that cost. Under power and log utility. Cost: some
+    /// searches. Checked by: `tests/solver/assets.rs::holdings_and_a_cost_are_best_by_direct_search`.
     pub fn solve_from(&self, holdings: &[f64], cost: f64, near: Option<&AssetsSolution>) -> AssetsSolution {
         if cost <= 0.0 {
             return self.solve(near);
@@ -111,7 +113,7 @@ impl AssetsStep {
         AssetsSolution { bound: best.bound.max(best.value), evaluations, ..best }
     }
 
-    /// Everything sold, where that is allowed; nothing is worth more than the best growth seen.
+    /// Returns the solution that sells everything, if that is allowed; nothing is worth more than the best growth seen.
     fn without_assets(&self, cost: f64) -> AssetsSolution {
         let nothing = vec![0.0; self.assets];
         let may = self.total.lowest <= 0.0;
@@ -125,8 +127,8 @@ impl AssetsStep {
         }
     }
 
-    /// A solution of the search in log certainty equivalent less the cost. Holdings that it hardly changes are kept. Where no law told
-    /// a tangent there is no bound.
+    /// Converts a solution of the search to log certainty equivalent less the cost. Holdings that it hardly changes are
+    /// kept. Without a tangent the bound is infinite.
     fn less_cost(&self, found: AssetsSolution, tangent: Option<Tangent>, cost: f64) -> AssetsSolution {
         let trading = &self.trading;
         let kept = |(held, share): (&f64, &f64)| if (share - held).abs() < LEAST_SHARE { *held } else { *share };
@@ -148,7 +150,7 @@ impl AssetsStep {
         AssetsSolution { allocation, value, bound, ..found }
     }
 
-    /// What no allocation is worth more than, less the cost, by the tangent of a law.
+    /// Returns an upper bound on the value of every allocation, less the cost, by the tangent of a law.
     fn bound_by(&self, tangent: &Tangent, cost: f64) -> f64 {
         let trading = &self.trading;
         let lost = cost * trading.turnover(&tangent.shares);
@@ -160,7 +162,7 @@ impl AssetsStep {
             + free.taken(&tangent.shares)
     }
 
-    /// p at an allocation: `c / (1 - c T) dU/dV`.
+    /// Returns p at an allocation: `c / (1 - c T) dU/dV`.
     fn price_of_trading(&self, found: &AssetsSolution, cost: f64) -> f64 {
         let utility = self.value_at(&found.allocation, found.multiplier) + self.trading.taken(&found.allocation);
         cost / (1.0 - cost * self.trading.turnover(&found.allocation)) / self.utility.inverse_slope(utility)

@@ -1,34 +1,38 @@
 //! The worst law against a given allocation.
 //!
-//! The dual is concave in the price of distance alone: its slope is the distance that the atoms take, less the radius. Between a
-//! price at which they take too much and one at which they take too little, the next is where the two tangents meet, kept off the
-//! ends; the two laws, mixed so that the radius is just spent, are the worst law, and their value the primal.
+//! The dual is concave in the price of distance alone. Its slope is the distance that the atoms use, less the radius.
+//! The search keeps a price at which they use too much and one at which they use too little. The next price is where
+//! the two tangents meet, kept off the ends. The two laws, mixed so that the radius is just used up, are the worst law,
+//! and its value is the primal.
 
 use super::AssetsStep;
 use super::branches::Branches;
 
-/// Prices tried at most.
+/// Largest number of prices tried.
 const PRICES: usize = 200;
-/// Relative utility between the primal and the dual value, and the relative width of prices between which a jump of the distance lies.
+/// Relative utility between the primal and the dual value, and the relative width of a bracket of prices around a jump
+/// of the distance.
 const TOLERANCE: f64 = 1e-11;
 const WIDTH: f64 = 1e-14;
-/// A price that no atom moves at is sought by this factor.
+/// Growth factor of the search for a price at which the radius suffices.
 const GROWTH: f64 = 4.0;
-/// Beyond it an allocation is worth nothing: some atom is worth the less the further it is moved, at any price.
+/// At a higher price an allocation is worth nothing: the payoff of some atom falls the further it is moved, at any
+/// price.
 const HIGHEST_PRICE: f64 = 1e15;
 
-/// What an allocation is worth against the worst law for it.
+/// The value of an allocation against the worst law for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AssetsWorth {
-    /// Log certainty equivalent over the bank: at least this, by duality.
+    /// Lower bound on the log certainty equivalent over the bank, by duality.
     pub value: f64,
-    /// The same under a law in the ball; minus infinity where no atom has a last place to be moved to.
+    /// The log certainty equivalent under a law in the ball; minus infinity if some atom has no furthest point to be
+    /// moved to.
     pub primal: f64,
     /// Lost relative utility per unit of radius.
     pub multiplier: f64,
 }
 
-/// One price: the dual, the distance taken, and the mean utility of the atoms where they are put.
+/// The dual at one price, and the distance that the atoms use.
 #[derive(Clone, Copy)]
 struct Priced {
     price: f64,
@@ -37,7 +41,7 @@ struct Priced {
 }
 
 impl AssetsStep {
-    /// What an allocation is worth. Cost: some 20 to 60 evaluations.
+    /// Returns the worth of an allocation. Cost: some 20 to 60 evaluations.
     pub fn worth(&self, allocation: &[f64]) -> AssetsWorth {
         let mut branches = Branches::default();
         let mut at = |price: f64| {
@@ -50,7 +54,7 @@ impl AssetsStep {
             primal: self.utility.inverse(primal),
             multiplier: price,
         };
-        // A price of 0 is no price: an atom that gains nothing by a move stays.
+        // A price of 0 cannot be evaluated: an atom that gains nothing by a move stays.
         let mut low = Priced { price: 0.0, dual: f64::NEG_INFINITY, distance: f64::INFINITY };
         let mut high = at(1.0);
         while high.distance > self.radius {
@@ -62,7 +66,7 @@ impl AssetsStep {
         }
         let primal = |priced: &Priced| priced.dual + priced.price * (self.radius - priced.distance);
         for _ in 0..PRICES {
-            // Mixed so that the radius is spent, or the high one alone, which spends less.
+            // Mixed so that the radius is used up, or the high one alone, which uses less.
             let share = if low.distance.is_finite() && low.distance > high.distance {
                 (self.radius - high.distance) / (low.distance - high.distance)
             } else {

@@ -8,28 +8,28 @@ use crate::control::request::assets::MOST_ASSETS;
 use crate::numerics::cholesky::Cholesky;
 use crate::numerics::dispatch::dispatched;
 
-/// Steps keep this share of the way to a bound.
+/// Steps keep this share of the distance to a bound.
 const TO_BOUND: f64 = 0.95;
-/// A move of less of its atom's mass weighs nothing in the step of the others.
+/// A move with a smaller share of its atom's mass is left out of the matrix.
 const NO_MASS: f64 = 1e-13;
 /// Rows of the matrix start at multiples of this.
 const ROW_START: usize = 4;
-/// What rounding may take of a pivot, as a share of the diagonal.
+/// Largest rounding error of a pivot, as a share of the diagonal.
 const ROUNDING: f64 = 1e-11;
 
-/// A step of everything but the tops, and how much of it keeps bounds and multipliers positive.
+/// A step of everything but the tops t_j, and how much of it keeps bounds and multipliers positive.
 pub(super) struct Direction {
     pub point: Vec<f64>,
     pub multipliers: Vec<f64>,
     pub bounds: Vec<f64>,
-    /// For the point, within its bounds, and for the multipliers.
+    /// Step length of the point that stays within its bounds, and below that of the multipliers.
     pub length: f64,
     pub dual_length: f64,
     /// The slope of the barrier function along the step.
     pub gain: f64,
 }
 
-/// A symmetric matrix of a sum of squares, of which the rows are kept from near the diagonal on, and a right-hand side.
+/// A symmetric matrix that is a sum of squares, with a right-hand side. Each row is kept from near the diagonal on.
 struct System {
     size: usize,
     matrix: Vec<f64>,
@@ -43,7 +43,7 @@ impl System {
         self.add_rows(weight, vector, vector);
     }
 
-    /// Adds `weight v w'` in the rows of v, from the diagonal on, or a little before it: whole registers.
+    /// Adds `weight v w'` in the rows of v, from the diagonal on, or a little before it to fill whole registers.
     #[inline(always)]
     fn add_rows(&mut self, weight: f64, rows: &[f64], vector: &[f64]) {
         let size = vector.len();
@@ -56,16 +56,18 @@ impl System {
 }
 
 impl Interior<'_> {
-    /// The Newton step towards `slack x multiplier = barrier` (times the mass of the atom, or the weight of a bound).
+    /// Solves for the Newton step towards `slack x multiplier = barrier` (times the mass of the atom, or the weight of
+    /// a bound).
     ///
-    /// With theta = multiplier / slack, g and H the first and second derivatives of a move's payoff, the step of (a, gamma) solves
+    /// With theta = multiplier / slack, g and H the first and second derivatives of a move's payoff, the step of (a,
+    /// gamma) solves
     ///
     ///   ( -sum m H + sum_j [ sum theta g g' - (sum theta g)(sum theta g)' / sum theta ] + bounds ) dx
     ///     = sum_j sum q g - radius e_gamma + bounds,   q = barrier p_j / slack,
     ///
     /// the right-hand side being the gradient of the barrier function: at the best t_j the sum of q is p_j.
     ///
-    /// `None` where the matrix is not positive definite to working precision. Cost O(n d^2) for n moves.
+    /// `None` if the matrix is not positive definite to working precision. Cost O(n d^2) for n moves.
     pub(super) fn direction(&self) -> Option<Direction> {
         let size = self.step.assets() + 1;
         let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
@@ -98,7 +100,8 @@ impl Interior<'_> {
         Some(self.with_multipliers(point, &tops, gain))
     }
 
-    /// The system of shares and price with what is traded of each asset, of which every unit takes the price of trading.
+    /// Extends the system of shares and price by the trade in each asset, of which every unit costs the price of
+    /// trading.
     fn with_trades(&self, system: System) -> System {
         let (size, whole) = (system.size, self.point.len());
         if whole == size {
@@ -113,7 +116,8 @@ impl Interior<'_> {
         System { size: whole, matrix, right }
     }
 
-    /// Adds what the moves of an atom bring, its t eliminated; answers the sum of theta, and puts that of theta g into `whole`.
+    /// Adds the contribution of the moves of an atom, with its t eliminated. Returns the sum of theta, and puts that of
+    /// theta g into `whole`.
     #[inline(always)]
     fn add_atom(&self, atom: usize, whole: &mut [f64], system: &mut System) -> f64 {
         let (last, mass) = (system.size - 1, self.step.masses[atom]);
@@ -136,7 +140,7 @@ impl Interior<'_> {
                 system.add(curvature, self.cuts.still(cut));
                 self.add_moving(found.multiplier * following.slope, self.cuts.moving(cut), system);
             } else {
-                // The gradient is that of what does not move but for the price.
+                // Except for the price, the gradient is proportional to the excess growth of the fixed move.
                 let both = theta * found.slope * found.slope + curvature;
                 along[..last].copy_from_slice(self.cuts.excess(cut));
                 along[last] = theta * found.slope * found.cost / both;
@@ -148,8 +152,8 @@ impl Interior<'_> {
         stiffness
     }
 
-    /// `weight sum_i p_i v_i v_i'`, v_i = e_i / a_i - e_gamma / gamma over what moves by itself; where all move together, what
-    /// moves counts as one position, whose v is their mean.
+    /// Adds `weight sum_i p_i v_i v_i'`, v_i = e_i / a_i - e_gamma / gamma over positions that move by themselves. If
+    /// all move together, the moving ones count as one position, whose v is their mean.
     #[inline(always)]
     fn add_moving(&self, weight: f64, moving: &[f64], system: &mut System) {
         let last = system.size - 1;
@@ -172,7 +176,7 @@ impl Interior<'_> {
         }
     }
 
-    /// The steps of the multipliers, and the lengths that keep them and the bounds positive.
+    /// Returns the steps of the multipliers, and the lengths that keep them and the bounds positive.
     fn with_multipliers(&self, point: Vec<f64>, tops: &[f64], gain: f64) -> Direction {
         let (mut length, mut dual_length): (f64, f64) = (1.0, 1.0);
         let mut change = |slack: f64, step: f64, multiplier: f64, target: f64| {
