@@ -2,9 +2,10 @@
 //!
 //!   V_t(x, F^) = max_a  min_{F in C(F^)}  E_F[ V_(t+1)( S(x, a, Z), R(F^, Z) ) ].
 //!
-//! Gains of the next state are predicted at every return of the support and, where its description depends on the action, at even
-//! actions, between which they are read along cubics; the dynamics themselves are followed for every action. The investor's own step
-//! (`super::BellmanStep`) knows that wealth is affine in the action, and predicts at fewer returns.
+//! Gains of the next state are predicted at every return of the support. If the state's description depends on the
+//! action, they are also predicted at even actions, with local cubics between. The dynamics themselves are followed for
+//! every action. The investor's own step (`super::BellmanStep`) knows that wealth is affine in the action, and predicts
+//! at fewer returns.
 
 use super::field::{Field, Payoffs};
 use super::problem::Problem;
@@ -17,19 +18,20 @@ use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::numerics::chebyshev::local_cubic;
 use crate::numerics::empirical::EmpiricalDistribution;
 
-/// Even actions at which gains are predicted, where the description of the next state depends on the action: where changing
-/// it costs, a value bends, and cubics are good to a twentieth of the jump of its second derivative times the distance's square.
+/// Even actions at which gains are predicted if the description of the next state depends on the action. If changing
+/// the description costs, a value has kinks. Cubics are then good to a twentieth of the jump of its second derivative
+/// times the distance's square.
 const EVEN_ACTIONS: usize = 33;
-/// A law has no wealth.
+/// Placeholder for the wealth, which a law does not have.
 const NO_WEALTH: f64 = 1.0;
 
 /// The robust step of a controlled problem at every state of one step.
 pub struct ControlledStep<'a, P> {
-    /// What is controlled.
+    /// The controlled problem.
     pub problem: &'a P,
     /// The uncertainty sets and the features of laws.
     pub laws: &'a Problem,
-    /// Periods observed before it.
+    /// Periods observed before this step.
     pub step: usize,
     /// The value of the step after; `None` at the horizon.
     pub next: Option<&'a ControlledValue>,
@@ -37,9 +39,9 @@ pub struct ControlledStep<'a, P> {
 
 /// The gain of a step over its baseline.
 pub enum ControlledValue {
-    /// Where nothing is seen of a state: all are one.
+    /// One gain for all states, if the state has no features.
     Constant(f64),
-    /// By what is seen of it.
+    /// Gains predicted from the features of a state.
     Surrogate(Box<ValueSurrogate>),
 }
 
@@ -59,16 +61,16 @@ pub struct ControlledSolution {
     pub action: f64,
     /// Its certainty equivalent against the worst law, an amount at the horizon.
     pub certainty_equivalent: f64,
-    /// The same over the state's baseline.
+    /// The gain of the certainty equivalent over the state's baseline.
     pub gain: f64,
     /// Primal minus dual value, in certainty equivalent.
     pub duality_gap: f64,
-    /// True where no mass wants to leave the window of returns.
+    /// True if no mass wants to leave the window of returns.
     pub certified: bool,
 }
 
 impl<P: Controlled> ControlledStep<'_, P> {
-    /// What the surrogates see of a state and its law: the description, then the features of the law.
+    /// Returns the features of a state and its law: the description, then the features of the law.
     pub fn features(&self, state: &P::State, law: &EmpiricalDistribution) -> Features {
         let law = State { wealth: NO_WEALTH, holding: 0.0, law: law.clone() };
         self.laws.features(self.step, &law).after(self.problem.describe(self.step, state))
@@ -85,7 +87,7 @@ impl<P: Controlled> ControlledStep<'_, P> {
             let described = |action: f64, log_return: f64| {
                 problem.describe(self.step + 1, &problem.next(self.step, state, action, log_return))
             };
-            // One action serves all where none of them moves what is described.
+            // One action is enough if none of them changes the description.
             let ends = [returns.first(), returns.last()].map(|end| end.copied().unwrap_or_default());
             let moves = |z: f64| even.iter().any(|&action| described(action, z) != described(actions.lowest, z));
             if part <= 0.0 || !ends.into_iter().any(moves) {
@@ -93,7 +95,7 @@ impl<P: Controlled> ControlledStep<'_, P> {
             }
             ControlledField { step: self, state, law, actions: even, baseline, returns }
         };
-        // What trading costs is the problem's own matter.
+        // The cost of trading is part of the problem itself.
         let free = (Dynamics::plain(0.0, 0.0), 0.0);
         best_response(&set, actions, free, field, |_, BestResponse { trade, worst, .. }| {
             let certain = |value: f64| problem.certainty_equivalent(value, baseline);
@@ -114,9 +116,9 @@ struct ControlledField<'a, P: Controlled> {
     step: &'a ControlledStep<'a, P>,
     state: &'a P::State,
     law: &'a EmpiricalDistribution,
-    /// At which gains are predicted, ascending.
+    /// Actions at which gains are predicted, ascending.
     actions: Vec<f64>,
-    /// Of this state.
+    /// The baseline of this state.
     baseline: f64,
     returns: Vec<f64>,
 }

@@ -1,16 +1,16 @@
-//! The floor gain of the step after, over everything one robust step can reach.
+//! The floor gain of the step after, at everything that one robust step can reach.
 //!
-//! From one state, the next state depends on the action and the adversary's return z only. The law's features depend on z
-//! alone, and wealth and the holding on both, wealth linearly in the action. The prediction is a smooth function of z and
-//! wealth, so it is tabulated once, exactly, at a few returns (local cubics between them) times a few Chebyshev nodes in the
-//! action, where wealth matters, times the holdings at which the value is known. Every action is then priced without touching
-//! the surrogate again: a product a node and return.
+//! From one state, the next state depends on the action and the adversary's return z only. The law's features depend on
+//! z alone. Wealth and the holding depend on both, wealth linearly in the action. The prediction is a smooth function
+//! of z and wealth, so it is tabulated once. The table is exact at a few returns (local cubics between them), at a few
+//! Chebyshev nodes in the action if wealth matters, and at the holdings at which the value is known. Every action is
+//! then priced without evaluating the surrogate again: one product for each node and return.
 //!
-//! Where trading costs, wealth depends on what the trade keeps of it as well, by a few percent at most: nearly linearly, but
-//! where withdrawals leave little of it.
+//! If trading costs, wealth also depends on the share that the trade keeps, by a few percent at most. This dependence
+//! is nearly linear, except when withdrawals leave little wealth.
 //!
-//! Where money is to come, everything is relative to total wealth: a trade moves the share of it that is in hand, and the rest
-//! grows as the bank does.
+//! With contributions or withdrawals, everything is relative to total wealth: a trade moves the share of it that is in
+//! hand, and the rest grows as the bank does.
 
 use super::field::{Field, Payoffs};
 use super::next_value::NextValue;
@@ -30,26 +30,27 @@ pub struct GainField<'a> {
     next: &'a NextValue,
     utility: RelativeUtility,
     dynamics: Dynamics,
-    /// Of the period after.
+    /// The dynamics of the period after.
     after: Dynamics,
-    /// What total wealth grows to in one period once everything is sold, and the share of it that is in hand now.
+    /// Total wealth after one period in the bank once everything is sold, and the share of it that is in hand now.
     bank: f64,
     in_hand: f64,
-    /// No higher action is priced.
+    /// The highest action that is priced.
     highest: f64,
     returns: Vec<f64>,
     action_nodes: Chebyshev,
-    /// What the trades that are tabulated keep, the most and the least of those that are made, or nothing where one serves all.
-    /// Between them, and a little beyond for a side whose cost is paid both ways, predictions are read along a line.
+    /// The largest and the smallest share kept by a trade, at which trades are tabulated; `None` if one share serves
+    /// all. Between them, and a little beyond for a side whose cost is paid both ways, predictions are linear.
     kept_nodes: Option<[f64; 2]>,
     holdings: Holdings,
-    /// `table[(i * nodes + m) * holdings + j]`: the prediction at return i, trade m and holding j; empty where the gain is
+    /// `table[(i * nodes + m) * holdings + j]`: the prediction at return i, trade m and holding j; empty if the gain is
     /// constant. Trades run over the action nodes for each of the kept nodes.
     table: Vec<f64>,
 }
 
 impl<'a> GainField<'a> {
-    /// `returns` ascending and distinct, `utility` relative to the floor of `state`. Cost O(returns x nodes x design count).
+    /// Tabulates the field. `returns` are ascending and distinct, `utility` is relative to the floor of `state`. Cost
+    /// O(returns x nodes x design count).
     pub fn tabulate(
         problem: &Problem,
         step: usize,
@@ -90,18 +91,18 @@ impl<'a> GainField<'a> {
         }
     }
 
-    /// Total wealth from wealth in hand, each over what selling everything at once would grow it to: `s w + 1 - s`, s the share
-    /// in hand.
+    /// Returns total wealth from wealth in hand, each over its growth if everything is sold at once: `s w + 1 - s`, s
+    /// the share in hand.
     fn with_what_is_to_come(&self, relative: f64) -> f64 {
         self.in_hand * relative + (1.0 - self.in_hand)
     }
 
-    /// What the wealth that a floor stands for has paid of the holding: nothing at the horizon.
+    /// Returns the cost of selling the holding that the floor accounts for: none at the horizon.
     fn cost_of_selling(&self) -> f64 {
         if matches!(self.next, NextValue::Terminal) { 0.0 } else { self.dynamics.trading_cost }
     }
 
-    /// The share in hand of total wealth after the period.
+    /// Returns the share in hand of total wealth after the period.
     fn in_hand_after(&self, total: f64) -> f64 {
         (total - self.after.to_come) / total
     }
@@ -133,7 +134,7 @@ impl<'a> GainField<'a> {
         self.action_nodes.nodes().len() * self.kept_nodes.map_or(1, |nodes| nodes.len())
     }
 
-    /// The weights of the trades tabulated in what is read for `trade`.
+    /// Returns the weight of each tabulated trade in the prediction for `trade`.
     fn basis(&self, trade: Trade) -> Vec<f64> {
         let actions = self.action_nodes.basis(trade.action / self.highest);
         match self.kept_nodes {
@@ -158,7 +159,7 @@ impl Field for GainField<'_> {
         Box::new(self.rows(returns))
     }
 
-    /// The relative utility of selling everything after `log_return`.
+    /// Returns the relative utility of selling everything after `log_return`.
     fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
         let Dynamics { rate_per_step, .. } = self.dynamics;
         let sold = self.cost_of_selling() * trade.action * log_return.exp();
@@ -170,20 +171,20 @@ impl Field for GainField<'_> {
 /// A field restricted to fixed returns.
 struct FieldRows<'f> {
     field: &'f GainField<'f>,
-    /// `rows[(m * returns + k) * holdings + j]`: the prediction at trade m, return k and holding j; empty where the gain is
-    /// constant.
+    /// `rows[(m * returns + k) * holdings + j]`: the prediction at trade m, return k and holding j; empty if the gain
+    /// is constant.
     rows: Vec<f64>,
     /// `e^z / (1 + r)`.
     growths: Vec<f64>,
-    /// `(1 - c) e^z / (1 + r) - 1`: what a unit of allocation earns beyond the bank once it is sold.
+    /// `(1 - c) e^z / (1 + r) - 1`: the gain of a unit of allocation over the bank once it is sold.
     excesses: Vec<f64>,
 }
 
 impl Payoffs for FieldRows<'_> {
-    /// `u(w(a, z))`. Cost O(returns x nodes).
+    /// Returns `u(w(a, z))`. Cost O(returns x nodes).
     fn payoff(&self, trade: Trade) -> Vec<f64> {
         let GainField { next, utility, bank, .. } = self.field;
-        // S(x, a, z), all of it sold, with what is to come, over what selling at once would grow to.
+        // S(x, a, z) with everything sold, plus future contributions, over the growth of selling at once.
         let sold = self.excesses.iter().map(|excess| trade.kept * (1.0 + trade.action * excess));
         let relative: Vec<f64> = sold.map(|relative| self.field.with_what_is_to_come(relative)).collect();
         let gains = match next {
@@ -211,7 +212,8 @@ impl Payoffs for FieldRows<'_> {
 }
 
 impl FieldRows<'_> {
-    /// The gains where the holding matters, which may have drifted beyond the highest action; `totals` are of total wealth.
+    /// Returns the gains if the holding matters, which may have drifted beyond the highest action; `totals` are of
+    /// total wealth.
     fn gains_by_holding(&self, trade: Trade, totals: &[f64]) -> Vec<f64> {
         let GainField { next, holdings, after, .. } = self.field;
         let held: Vec<f64> = self.holdings(trade).collect();
@@ -227,7 +229,7 @@ impl FieldRows<'_> {
         gains
     }
 
-    /// The share held after each return.
+    /// Returns the share held after each return.
     fn holdings(&self, trade: Trade) -> impl Iterator<Item = f64> {
         let GainField { bank, in_hand, dynamics: Dynamics { contribution, .. }, .. } = self.field;
         let before = bank * in_hand * trade.kept;
@@ -238,7 +240,7 @@ impl FieldRows<'_> {
         })
     }
 
-    /// The tabulated predictions, along trades.
+    /// Interpolates the tabulated predictions along trades.
     fn interpolated(&self, trade: Trade) -> Vec<f64> {
         let count = self.growths.len();
         let mut predictions = vec![0.0; count];
@@ -248,7 +250,7 @@ impl FieldRows<'_> {
         predictions
     }
 
-    /// The tabulated predictions, along trades and at the share `held` after each return.
+    /// Interpolates the tabulated predictions along trades and at the share `held` after each return.
     fn interpolated_at(&self, trade: Trade, held: &[f64]) -> Vec<f64> {
         let (count, holdings) = (self.growths.len(), self.field.holdings);
         let basis = self.field.basis(trade);

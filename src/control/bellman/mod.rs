@@ -3,20 +3,22 @@
 //!   g = max_a  u^{-1}( min_{F in C} E_F[ u( w(a, Z) ) ] ),
 //!   w(a, z) = ln( ((1-a)(1+r) + a e^z) / (1+r) ) + g_next( G(y, a, z) ),
 //!
-//! u the utility relative to the all-bank floor, so that g is the floor gain ln(CE / floor), and G(y, a, z) the state with
-//! the wealth that the action earns and, where the framework learns, the law with z in it. Source: paper (3.2) to (3.4),
-//! with V taken at the adversary's z.
+//! u is the utility relative to the all-bank floor, so that g is the floor gain ln(CE / floor). G(y, a, z) is the state
+//! with the wealth that the action earns and, if the framework learns, the law with z in it. Source: paper (3.2) to
+//! (3.4), with V taken at the adversary's z.
 //!
-//! Where trading costs, w has beside it what the trade keeps, `ln((1 - c |a - h|) / (1 - c h))`, and the wealth earned counts
-//! as if all of it were sold. What an action is worth then has a kink at the holding h, so each side of it is searched by
-//! itself, as if its cost were paid both ways, which leaves no kink. The best action is the nearer end of the band between the
-//! two optima, or the holding inside it. Source: Davis and Norman (1990), Portfolio selection with transaction costs.
+//! If trading costs, w has the extra term `ln((1 - c |a - h|) / (1 - c h))`, the share kept by the trade, and the
+//! wealth earned counts as if all of it were sold. The worth of an action then has a kink at the holding h. So each
+//! side is searched by itself, as if its cost were paid both ways, which leaves no kink. The two optima bound the
+//! no-trade region. The best action is its nearer end, or the holding if inside. Source: Davis and Norman (1990),
+//! Portfolio selection with transaction costs.
 //!
-//! Where money comes and goes, wealth is total wealth, of which the share s is in hand and moves (`control/problem/dynamics.rs`):
+//! With contributions or withdrawals, wealth is total wealth, of which the share s is in hand and moves
+//! (`control/problem/dynamics.rs`):
 //!
 //!   w(a, z) = ln( s ((1-a)(1+r) + a e^z) / (1+r) + 1 - s ) + g_next( G(y, a, z) ).
 //!
-//! What differs between uncertainty sets is how an action is priced (`Pricing`); the search for the best one is the same.
+//! Uncertainty sets differ in how an action is priced (`Pricing`); the search for the best one is shared.
 
 pub mod controlled;
 pub mod field;
@@ -46,7 +48,7 @@ use crate::control::uncertainty::{Reach, UncertaintySet};
 use crate::numerics::interruption;
 use crate::numerics::minimise::maximise_concave_scalar;
 
-/// Doublings of an uncertified window, at most: sixteen times the first reach takes a return to e^-9.6.
+/// Largest number of doublings of an uncertified window: sixteen times the first reach takes a return to e^-9.6.
 const WINDOW_GROWTHS: usize = 4;
 
 /// Refined prices move the best action by less than the width of its bracket over this.
@@ -55,60 +57,63 @@ const MOVED_BY_REFINING: f64 = 8.0;
 /// The robust step at every state of one step.
 #[derive(Clone, Copy)]
 pub struct BellmanStep<'a> {
-    /// What is solved.
+    /// The problem to solve.
     pub problem: &'a Problem,
-    /// Periods observed before it.
+    /// Periods observed before this step.
     pub step: usize,
     /// The value of the step after.
     pub next: &'a NextValue,
 }
 
-/// Prices trades at one state: what each is worth under the law that is worst for it.
+/// Prices trades at one state, each under the law that is worst for it.
 trait Pricing {
-    /// Worst expected relative utility of a trade.
+    /// Returns the worst expected relative utility of a trade.
     fn value(&self, trade: Trade) -> f64;
 
-    /// The same, good enough to say between which actions the best one lies.
+    /// Returns the value to an accuracy that suffices to bracket the best action.
     fn rough_value(&self, trade: Trade) -> f64 {
         self.value(trade)
     }
 
-    /// How closely the best action is worth finding by the prices of now.
+    /// Returns the tolerance for the best action that the current prices justify.
     fn tolerance(&self) -> f64;
 
-    /// Prices more exactly around where the worst laws for `trades` put their mass. False where nothing is left to refine.
+    /// Prices more exactly around the destinations of mass in the worst laws for `trades`. Returns false if nothing is
+    /// left to refine.
     fn refine(&mut self, trades: &[Trade]) -> bool;
 
-    /// The worst expectation of a trade with its law.
+    /// Returns the worst expectation of a trade with its law.
     fn worst(&self, trade: Trade) -> WorstExpectation;
 }
 
-/// What the surrogates learn of one state.
+/// The results at one state from which the surrogates learn.
 pub struct DesignSolution {
     /// At the state's own holding.
     pub solution: RobustSolution,
-    /// Floor gains at the holdings asked for, or the solution's own alone where the holding does not matter.
+    /// Floor gains at the holdings asked for, or the solution's own alone if the holding does not matter.
     pub floor_gains: Vec<f64>,
-    /// Either end of the band, or the action where both are one, continued past the bounds of the interval, as shares of total
-    /// wealth.
+    /// Either end of the band, or the action if both are equal, continued past the bounds of the interval, as shares of
+    /// total wealth.
     pub policy_targets: Vec<f64>,
 }
 
 impl BellmanStep<'_> {
-    /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced, twice as many where trading costs.
+    /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced, twice as many if trading
+    /// costs.
     pub fn solve(&self, state: &State) -> RobustSolution {
         let set = self.problem.uncertainty_set(state);
         self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
-    /// The same were the uncertainty set of this step alone of another radius; the value of the step after stays.
+    /// Solves the step with another radius for the uncertainty set of this step alone; the value of the step after
+    /// stays.
     pub fn solve_within(&self, state: &State, radius: f64) -> RobustSolution {
         let set = self.problem.uncertainty_set_within(state, radius);
         self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
-    /// [`Self::solve`] with what the surrogates learn: the floor gains of the state with any of `holdings`, and the band. Its
-    /// radius may be known.
+    /// Solves the step as [`Self::solve`] does, and returns the targets of the surrogates: the floor gains of the state
+    /// with any of `holdings`, and the band. The radius may be given if it is known.
     pub fn solve_for_design(&self, state: &State, radius: Option<f64>, holdings: Holdings) -> DesignSolution {
         let actions = self.actions(state);
         let set = match radius {
@@ -127,11 +132,11 @@ impl BellmanStep<'_> {
                     Side::Selling => found.band.high,
                 };
                 let gain_at = |share: f64| gain(dynamics.trade(side, state.holding, share / unit));
-                // Where both sides are one, that is known.
+                // If both sides are one, the gain is known.
                 let own = if dynamics.trading_cost > 0.0 { gain_at(end * unit) } else { found.floor_gain };
                 policy_target(end * unit, actions.highest * unit, own, curvature, gain_at)
             };
-            // Of another holding the floor is another, and so is what the trade keeps.
+            // Another holding has another floor, and its trade keeps another share.
             let gain_of = |holding: f64| {
                 let Trade { action, kept } = dynamics.trade_into(found.band, holding);
                 let liquidated = dynamics.liquidation(holding) / dynamics.liquidation(state.holding);
@@ -147,7 +152,7 @@ impl BellmanStep<'_> {
         DesignSolution { solution: solution.at_least_the_bank(), floor_gains, policy_targets }
     }
 
-    /// What one action is worth, the best or not.
+    /// Returns the worth of one action, the best or not.
     pub fn price(&self, state: &State, action: f64) -> RobustSolution {
         let only = ActionInterval { lowest: action, highest: action };
         self.optimum(state, &self.problem.uncertainty_set(state), only, |_, _| ()).0
@@ -161,7 +166,7 @@ impl BellmanStep<'_> {
         RelativeUtility::new(self.problem.specification.problem.utility, self.problem.floor(self.step, state))
     }
 
-    /// The best of `actions`, and what `then` makes of it and of the prices around it.
+    /// Finds the best of `actions`, and applies `then` to it and to the prices around it.
     fn optimum<T>(
         &self,
         state: &State,
@@ -187,7 +192,7 @@ struct BestResponse {
     worst: WorstExpectation,
 }
 
-/// Finds the best of `actions` from a holding against the worst law of a set, and gives what `then` makes of it and of the
+/// Finds the best of `actions` from a holding against the worst law of a set, and applies `then` to it and to the
 /// prices around it. Windows of returns grow until the worst law provably stays inside.
 fn best_response<F: Field, T>(
     set: &UncertaintySet,
@@ -208,10 +213,10 @@ fn best_response<F: Field, T>(
         let band = best_band(pricing.as_mut(), actions, dynamics, holding);
         let trade = dynamics.trade_into(band, holding);
         let mut worst = pricing.worst(trade);
-        // Other holdings are brought to the ends of the band, and what they are worth is told as well.
+        // Other holdings trade to the ends of the band, whose worth is also reported.
         let ends = [band.low, band.high].into_iter().filter(|end| *end != trade.action);
         let mut ends = ends.map(|end| dynamics.trade_to(holding, end));
-        // Where a support bounds the returns, nothing lies beyond what was looked at.
+        // If a support bounds the returns, the window covers all of them.
         worst.certified = !set.has_window() || worst.certified && ends.all(|end| pricing.worst(end).certified);
         if worst.certified || growths == WINDOW_GROWTHS {
             return then(pricing.as_ref(), BestResponse { band, trade, worst });
@@ -220,8 +225,8 @@ fn best_response<F: Field, T>(
     }
 }
 
-/// Brackets the best action of each side, then polishes them as the prices are refined. What a side is worth is concave in the
-/// action.
+/// Brackets the best action of each side, then polishes them as the prices are refined. The worth of a side is concave
+/// in the action.
 fn best_band(pricing: &mut dyn Pricing, actions: ActionInterval, dynamics: Dynamics, holding: f64) -> Band {
     let bracket = |&side: &Side| {
         let bracket = actions.bracket(|action| pricing.rough_value(dynamics.trade(side, holding, action)));
@@ -247,24 +252,25 @@ fn best_band(pricing: &mut dyn Pricing, actions: ActionInterval, dynamics: Dynam
 }
 
 impl RobustSolution {
-    /// All-bank is feasible and no law can hurt it.
+    /// Raises the gain to at least 0, because all-bank is feasible and no law can hurt it.
     fn at_least_the_bank(self) -> Self {
         RobustSolution { floor_gain: not_below_zero(self.floor_gain), ..self }
     }
 }
 
-/// What is not a number stays so, and no zero is negative.
+/// Clamps to 0 from below. NaN stays NaN, and no zero is negative.
 fn not_below_zero(gain: f64) -> f64 {
     if gain <= 0.0 { 0.0 } else { gain }
 }
 
-/// What is not a number stays so.
+/// Clamps to `largest` from above. NaN stays NaN.
 fn not_above(largest: f64, gain: f64) -> f64 {
     if gain > largest { largest } else { gain }
 }
 
-/// The primal and the dual value as gains. Neither is above the `largest` gain, for no law of the set is better in every
-/// period than its best return; where wealth is so large that its utility no longer grows, both may be that.
+/// Converts the primal and the dual value to gains. Neither is above the `largest` gain, because no law of the set is
+/// better in every period than its best return. If wealth is so large that its utility no longer grows, both may be
+/// that.
 fn solution(best: BestResponse, utility: RelativeUtility, largest: f64) -> RobustSolution {
     let BestResponse { band, trade, worst } = best;
     let gain = |value: f64| not_above(largest, utility.inverse(value));

@@ -1,4 +1,4 @@
-//! The value of the step after, as one robust step sees it.
+//! The value of the step after, as one robust step evaluates it.
 
 use super::problem::Problem;
 use crate::control::problem::dynamics::Trade;
@@ -16,16 +16,16 @@ pub type ExactGains = dyn Fn(&State) -> Vec<f64> + Send + Sync;
 pub enum NextValue {
     /// The horizon: no gain over the wealth reached, of which nothing is sold.
     Terminal,
-    /// The same floor gains everywhere, at even holdings.
+    /// Constant floor gains for all states, at even holdings.
     Constant(Holdings, Vec<f64>),
     /// The clamped prediction of the step's value surrogate.
     Surrogate(Box<ValueSurrogate>),
-    /// The floor gains themselves, however they are known: what a surrogate is measured against.
+    /// The exact floor gains, from any source: the reference for measuring a surrogate.
     Exact(Holdings, Box<ExactGains>),
 }
 
 impl NextValue {
-    /// `after` is the solution of step `step`; `None` at the horizon.
+    /// Builds the value of `after`, the solution of step `step`; `None` at the horizon.
     pub fn new(specification: &Specification, step: usize, after: Option<&Solution>) -> Self {
         match after {
             None => NextValue::Terminal,
@@ -39,7 +39,7 @@ impl NextValue {
         }
     }
 
-    /// Where along the holding it is known.
+    /// Returns the holdings at which the value is known.
     pub fn holdings(&self, problem: &Problem) -> Holdings {
         match self {
             NextValue::Terminal => problem.holdings(1),
@@ -48,7 +48,7 @@ impl NextValue {
         }
     }
 
-    /// True where wealth moves it.
+    /// Returns true if the value depends on wealth.
     pub fn depends_on_wealth(&self, selection: &FeatureSelection) -> bool {
         match self {
             NextValue::Terminal | NextValue::Constant(..) => false,
@@ -57,9 +57,10 @@ impl NextValue {
         }
     }
 
-    /// Predictions at every state that follows from `state` at `step` through one of `returns` (ascending) after one of `trades`,
-    /// return by return, trade by trade, holding by holding; nothing where the value is constant. Without wealth in it, of one
-    /// trade alone. Cost O(returns x trades x design points x holdings).
+    /// Returns predictions at every state that follows from `state` at `step` through one of `returns` (ascending)
+    /// after one of `trades`. Their order is return by return, trade by trade, holding by holding; the table is empty
+    /// if the value is constant. If the value does not depend on wealth, one trade is enough. Cost O(returns x trades x
+    /// design points x holdings).
     pub fn tabulate(
         &self,
         problem: &Problem,
@@ -103,8 +104,8 @@ impl NextValue {
         table
     }
 
-    /// Turns predictions into floor gains, in place; `totals` is the total wealth of each state after selling all, of a
-    /// holding no higher than any at which the value is known.
+    /// Turns predictions into floor gains, in place. `totals` is the total wealth of each state after selling all, for
+    /// a holding no higher than the highest at which the value is known.
     pub fn gains(&self, predictions: &mut [f64], totals: impl Iterator<Item = f64>) {
         match self {
             NextValue::Terminal | NextValue::Constant(..) => {}

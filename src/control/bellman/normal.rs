@@ -1,6 +1,6 @@
 //! Prices of actions against a confidence region of normal laws: the worst mean and variance of its boundary.
 //!
-//! Where returns are learned, the estimates (m, v) of n returns become, with z in them,
+//! If returns are learned, the estimates (m, v) of n returns become, with z in them,
 //!
 //!   m' = m + (z - m)/(n+1),  v' = n v/(n+1) + n (z - m)^2/(n+1)^2.
 //!
@@ -13,7 +13,7 @@ use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
 use crate::control::problem::dynamics::Trade;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw, Quadrature, WorstNormal};
 
-/// The worst law of every action is itself found to 1e-6 of an angle: a finer action would be noise.
+/// The worst law of every action is itself computed to 1e-6 of an angle: a finer action would be noise.
 const ACTION_TOLERANCE: f64 = 1e-6;
 
 /// A region, with the field at the nodes of the laws that every action is tried against.
@@ -35,7 +35,7 @@ impl<'f> NormalPricing<'f> {
         self.quadrature.expectation(&self.field.at(&nodes).payoff(trade))
     }
 
-    /// Expected relative utility under the laws that every action is tried against.
+    /// Returns the expected relative utility under the laws that every action is tried against.
     fn tried(&self, trade: Trade) -> Vec<f64> {
         let payoff = self.rows.payoff(trade);
         payoff.chunks_exact(self.quadrature.count()).map(|payoff| self.quadrature.expectation(payoff)).collect()

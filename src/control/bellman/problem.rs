@@ -1,4 +1,5 @@
-//! The problem with everything that does not change from step to step: what a state is, to the step and to the surrogates.
+//! The problem with everything that does not change from step to step: its uncertainty sets, its dynamics and its
+//! features.
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -22,24 +23,25 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
 use crate::numerics::moments::CentralMoments;
 
-/// Of an estimated law. What decays may leave no other; a history that is accepted varies more, however long it is lived after.
+/// Smallest variance of an estimated law. With decaying weights no other may be left; an accepted history varies more,
+/// however long its session lasts.
 const SMALLEST_VARIANCE: f64 = 1e-18;
-/// Where the features do not depend on the ball.
+/// Radii for features that do not depend on the ball.
 const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
 
 /// The problem of a completed specification.
 pub struct Problem {
-    /// As completed.
+    /// The completed specification.
     pub specification: Specification,
     /// Radii of its uncertainty sets.
     pub sets: RadiusEstimator,
-    /// Their centres.
+    /// Centres of its uncertainty sets.
     pub centring: Centring,
-    /// What of a state the surrogates see.
+    /// The features of a state that the surrogates use.
     pub selection: FeatureSelection,
-    /// Of every period, and of the time after the last.
+    /// The dynamics of every period, and of the time after the last.
     periods: Vec<Dynamics>,
-    /// The uncertainty set of every state, where nothing is learned; computed once.
+    /// The uncertainty set of every state, if nothing is learned; computed once.
     frozen: OnceLock<Frozen>,
 }
 
@@ -49,12 +51,12 @@ struct Frozen {
 }
 
 impl Problem {
-    /// Of a completed specification.
+    /// Builds the problem of a completed specification.
     pub fn new(specification: &Specification) -> Self {
         Problem::with(specification, Kept::default())
     }
 
-    /// The same with what can be made again in `kept`.
+    /// Builds the problem with `kept` as the cache of recomputable results.
     pub fn with(specification: &Specification, kept: Kept) -> Self {
         let sets = RadiusEstimator::new(specification, kept);
         let selection = FeatureSelection::new(specification, sets.varies());
@@ -63,37 +65,39 @@ impl Problem {
         Problem { specification: specification.clone(), sets, centring, selection, periods, frozen: OnceLock::new() }
     }
 
-    /// So many holdings where trading costs; else the holding does not matter, and one is enough.
+    /// Returns `count` holdings if trading costs; otherwise the holding does not matter, and one is enough.
     pub fn holdings(&self, count: usize) -> Holdings {
         let problem = &self.specification.problem;
         Holdings::new(if problem.trading_cost > 0.0 { count } else { 1 }, problem.action_interval[1])
     }
 
-    /// A, the shares of wealth that may be held in the period after `step`.
+    /// Returns A, the shares of wealth that may be held in the period after `step`.
     pub fn actions(&self, step: usize, state: &State) -> ActionInterval {
         let [lowest, highest] = self.specification.problem.action_interval;
         ActionInterval { lowest, highest: self.dynamics(step).highest_action(state.wealth, highest) }
     }
 
-    /// S of the period after `step`, which is at most the horizon.
+    /// Returns S of the period after `step`, which is at most the horizon.
     pub fn dynamics(&self, step: usize) -> Dynamics {
         self.periods[step.min(self.periods.len() - 1)]
     }
 
-    /// What an action of 1 is of total wealth, before anything is sold: the surrogates know actions as shares of that.
+    /// Returns an action of 1 as a share of total wealth, before anything is sold: the surrogates know actions as
+    /// shares of that.
     pub fn unit_of_action(&self, step: usize, state: &State) -> f64 {
         self.dynamics(step).in_hand(state.wealth, 0.0)
     }
 
-    /// Terminal all-bank wealth from a state at `step`.
+    /// Returns the terminal all-bank wealth from a state at `step`.
     pub fn floor(&self, step: usize, state: &State) -> f64 {
         self.dynamics(step).floor(state.wealth, state.holding, self.specification.problem.horizon - step)
     }
 
-    /// Checks that the bank alone pays for everything that is withdrawn, from all that selling a first state leaves.
+    /// Checks that the bank alone pays for every withdrawal, starting from the wealth left after selling everything in
+    /// the first state.
     ///
     /// # Errors
-    /// It runs dry, under the name `wealth`.
+    /// The bank runs dry; the field is `wealth`.
     pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
         let liquidated = state.wealth * self.dynamics(0).liquidation(state.holding);
         let periods = &self.periods[..self.periods.len() - 1];
@@ -110,8 +114,8 @@ impl Problem {
         }
     }
 
-    /// Whether some law in a ball of this radius takes all that an allocation holds: all wealth, under power utility and without a least
-    /// return. A surrogate that is off by little may advise it; the step solved anew never does.
+    /// Returns true if some law in a ball of this radius wipes out an allocation: all wealth, under power utility and
+    /// without a least return. A slightly wrong surrogate may advise it; the step solved anew never does.
     pub fn is_ruined(&self, radius: f64, allocation: f64) -> bool {
         let problem = &self.specification.problem;
         let has_ball = problem.framework.has_ball() && radius > 0.0;
@@ -119,9 +123,9 @@ impl Problem {
         has_ball && is_power && problem.support_rule() == (Support::None {}) && allocation >= 1.0
     }
 
-    /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The
-    /// worst law of a ball is no better than its centre, and learning one of its own returns leaves the best as it is. Of
-    /// estimates that are learned further nothing better is known than the best return accepted.
+    /// Returns an upper bound on the floor gain of a state at `step`: the gain at the best return of its centre in
+    /// every period. The worst law of a ball is no better than its centre, and learning one of its own returns leaves
+    /// the best as it is. For estimates that are learned, the bound uses the best return accepted.
     pub fn largest_gain(&self, step: usize, state: &State) -> f64 {
         let problem = &self.specification.problem;
         let best = match (self.learns(), problem.framework.is_parametric()) {
@@ -133,7 +137,7 @@ impl Problem {
         largest_gain(problem, step, best) + (unsold / all).ln()
     }
 
-    /// The uncertainty set at a state: of the state's law where the framework learns.
+    /// Returns the uncertainty set at a state: around the state's law if the framework learns.
     pub fn uncertainty_set(&self, state: &State) -> Cow<'_, UncertaintySet> {
         match self.learns() {
             true => Cow::Owned(self.learned_set(&state.law, self.sets.radius(&state.law))),
@@ -141,7 +145,8 @@ impl Problem {
         }
     }
 
-    /// The same where the radius of the state is known already, in the same unit; with another, the set were it that.
+    /// Returns the uncertainty set with this radius, in the same unit: the known radius of the state, or a hypothetical
+    /// one.
     pub fn uncertainty_set_within(&self, state: &State, radius: f64) -> UncertaintySet {
         match self.learns() {
             true => self.learned_set(&state.law, radius),
@@ -149,12 +154,12 @@ impl Problem {
         }
     }
 
-    /// Radius of the uncertainty set at a state.
+    /// Returns the radius of the uncertainty set at a state.
     pub fn radius(&self, state: &State) -> f64 {
         if self.learns() { self.sets.radius(&state.law) } else { self.frozen().measure.radius }
     }
 
-    /// The least mean of e^Z, Z the return, among the laws of a state's ball.
+    /// Returns the least mean of e^Z, Z the return, among the laws of a state's ball.
     pub fn worst_mean(&self, state: &State) -> f64 {
         let law = &state.law;
         let lowest = self.lowest_return(|| extent(law, CentralMoments::of(law), None));
@@ -162,17 +167,17 @@ impl Problem {
         ExponentialMean::of(law).worst(radius, lowest).mean
     }
 
-    /// The radius of a state and what it is made of.
+    /// Returns the radius of a state and its parts.
     pub fn measure(&self, state: &State) -> Measure {
         if self.learns() { self.sets.measure(&state.law) } else { self.frozen().measure }
     }
 
-    /// Numbers read to measure a state, or `None` where what is read is yet to be made.
+    /// Returns how many numbers are read to measure a state, or `None` if these are yet to be computed.
     pub fn cost(&self, state: &State) -> Option<usize> {
         if self.learns() { self.sets.cost(state.law.sample_size()) } else { self.frozen.get().map(|_| 0) }
     }
 
-    /// Makes what measuring a state reads.
+    /// Computes the data that measuring a state reads.
     pub fn prepare(&self, state: &State) {
         match self.learns() {
             true => self.sets.prepare(state.law.sample_size()),
@@ -198,7 +203,7 @@ impl Problem {
         })
     }
 
-    /// The set of the framework around an empirical law.
+    /// Returns the set of the framework around an empirical law.
     fn learned_set(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
         let problem = &self.specification.problem;
         if !problem.framework.is_parametric() {
@@ -209,12 +214,12 @@ impl Problem {
         UncertaintySet::Region(ConfidenceRegion { estimate, radius })
     }
 
-    /// The features of a state, unscaled.
+    /// Returns the features of a state, unscaled.
     pub fn features(&self, step: usize, state: &State) -> Features {
         self.features_within(step, state, if self.selection.has_ball() { self.radius(state) } else { 0.0 })
     }
 
-    /// The same where the radius of the state is known already.
+    /// Returns the features if the radius of the state is known already.
     pub fn features_within(&self, step: usize, state: &State, radius: f64) -> Features {
         if !self.selection.has_ball() {
             let total = self.dynamics(step).total(state.wealth, 0.0);
@@ -223,23 +228,23 @@ impl Problem {
         self.features_knowing(step, state, self.sets.radii(&state.law, radius))
     }
 
-    /// The same where both radii of the state are known already.
+    /// Returns the features if both radii of the state are known already.
     fn features_knowing(&self, step: usize, state: &State, radii: Radii) -> Features {
         self.features_of(step, state.wealth, &self.summaries(&state.law, &[radii])[0])
     }
 
-    /// The same where the law is summed up already.
+    /// Returns the features if the law is summed up already.
     pub fn features_of(&self, step: usize, wealth: f64, law: &LawSummary) -> Features {
         self.selection.of(self.dynamics(step).total(wealth, 0.0), law)
     }
 
-    /// What the features are made of, of laws of one size: law by law, at each miscoverage.
+    /// Returns the summaries behind the features, of laws of one size: law by law, at each miscoverage.
     pub fn summaries_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<LawSummary>> {
         let radii = self.sets.radii_of(laws, alphas);
         laws.iter().zip(radii).map(|(law, radii)| self.summaries(law, &radii)).collect()
     }
 
-    /// The same of one law within each of `radii`.
+    /// Returns the summaries of one law within each of `radii`.
     fn summaries(&self, law: &EmpiricalDistribution, radii: &[Radii]) -> Vec<LawSummary> {
         let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law));
         let lowest = self.lowest_return(|| extent(law, moments, None));
@@ -247,7 +252,8 @@ impl Problem {
         radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(of_returns(radii.radius), lowest))).collect()
     }
 
-    /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one total wealth.
+    /// Returns the features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one
+    /// total wealth.
     pub fn features_with(&self, law: &EmpiricalDistribution, total: f64, returns: &[f64]) -> Vec<Features> {
         let before = CentralMoments::of(law);
         if !self.learns() {
@@ -273,13 +279,13 @@ impl Problem {
         LawSummary { moments, radii, robust_excess: mean / bank - 1.0, robust_variance: variance / (bank * bank) }
     }
 
-    /// Below which no return seen is moved.
+    /// Returns the least return to which a seen return may be moved.
     fn lowest_return(&self, law: impl FnOnce() -> Extent) -> f64 {
         self.specification.problem.support_rule().around(law).map_or(f64::NEG_INFINITY, |support| support.min)
     }
 }
 
-/// That of a law of these moments, with one more return where there is one.
+/// Returns the extent of a law of these moments, including one more return if there is one.
 fn extent(law: &EmpiricalDistribution, moments: CentralMoments, added: Option<f64>) -> Extent {
     let atoms = law.atoms();
     let seen = [atoms.first(), atoms.last()].map(|end| end.copied().or(added).unwrap_or_default());
@@ -287,12 +293,12 @@ fn extent(law: &EmpiricalDistribution, moments: CentralMoments, added: Option<f6
     Extent { ends, mean: moments.mean(), variance: moments.variance() }
 }
 
-/// The floor gain from `step` of the highest allocation where every period earns `best_return`:
+/// Returns the floor gain from `step` of the highest allocation if every period earns `best_return`:
 ///
 ///   (T - t) ln(1 + a ((e^z / (1 + r)) - 1)),   z the best return,
 ///
-/// a the highest allocation, and where money comes and goes 1, the most of total wealth that an action can be. Who holds
-/// something before trading has gained, beside it, what selling that would cost.
+/// a the highest allocation, or with contributions or withdrawals 1, the largest share of total wealth that an action
+/// can be. A holding before trading also gains the cost of selling it.
 pub fn largest_gain(problem: &ProblemSpecification, step: usize, best_return: f64) -> f64 {
     let bank = problem.rate_per_step.ln_1p();
     let excess = (best_return - bank).exp_m1().max(0.0);

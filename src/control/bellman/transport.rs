@@ -10,17 +10,17 @@ use crate::control::uncertainty::COINCIDENT;
 use crate::control::uncertainty::centre::Centre;
 use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
 
-/// The floor gain is flat in the action at its best: an action off by this costs less than rounding.
+/// The floor gain is flat at the best action: an action off by this costs less than rounding.
 const ACTION_TOLERANCE: f64 = 1e-7;
-/// Until the support is refined the action only has to say where the worst law puts its mass.
+/// Until the support is refined the action only has to locate the mass of the worst law.
 const PLACING_TOLERANCE: f64 = 1e-4;
-/// Parts into which each interval between exact returns is cut for the support, and again around destinations: local cubics
-/// are good to far less than a part, and twice eight parts place a destination to 1/256 of an interval.
+/// Parts into which each interval between exact returns is cut for the support, and again around destinations. Local
+/// cubics are good to far less than a part, and two cuts into eight parts locate a destination to 1/256 of an interval.
 const SUPPORT_PARTS: usize = 4;
 const REFINED_PARTS: usize = 8;
 const REFINEMENTS: usize = 2;
 
-/// The certificate looks so far past the window, in log-return: e^-40 of the wealth held is nothing.
+/// How far past the window the certificate looks, in log-return: e^-40 of the wealth held is nothing.
 const PROOF_REACH: f64 = 40.0;
 /// Width of its first interval, and the share of the distance to the window by which intervals widen.
 const PROOF_INTERVAL: f64 = 0.02;
@@ -28,7 +28,7 @@ const PROOF_GROWTH: f64 = 0.1;
 /// Rounding of the envelope, in relative utility.
 const PROOF_SLACK: f64 = 1e-12;
 
-/// A ball around `centre`, with the field at the support of now.
+/// A ball around `centre`, with the field at the current support.
 pub(super) struct TransportPricing<'f> {
     centre: &'f Centre,
     radius: f64,
@@ -36,7 +36,7 @@ pub(super) struct TransportPricing<'f> {
     grid: Grid,
     rows: Box<dyn Payoffs + 'f>,
     refined: bool,
-    /// The last multiplier found, over its action: those of actions near each other hardly differ.
+    /// The last multiplier found, over its action: those of similar actions hardly differ.
     steepness: Cell<f64>,
 }
 
@@ -47,7 +47,7 @@ struct Grid {
 }
 
 impl<'f> TransportPricing<'f> {
-    /// Without a radius the centre's atoms alone are the support.
+    /// Builds the pricing. Without a radius the centre's atoms alone are the support.
     pub fn new(centre: &'f Centre, radius: f64, field: &'f dyn Field) -> Self {
         let grid = grid(centre, radius, subdivided(field.returns(), SUPPORT_PARTS, |_| true));
         let rows = field.at(&grid.support);
@@ -58,20 +58,20 @@ impl<'f> TransportPricing<'f> {
         WassersteinBall { support: &self.grid.support, masses: &self.grid.masses, radius: self.radius }
     }
 
-    /// The multiplier that is to be expected.
+    /// Returns a warm start for the multiplier.
     fn guess(&self, trade: Trade) -> f64 {
         self.steepness.get() * trade.action
     }
 
-    /// The worst law; the centre itself where no law takes more than rounding, so that no moves are reported that
-    /// rounding made.
+    /// Returns the worst law; the centre itself if no law loses more than rounding, so that no moves made by rounding
+    /// are reported.
     fn worst_law(&self, payoff: &[f64], trade: Trade) -> WorstLaw {
         let worst = self.ball().worst_law_near(payoff, self.guess(trade));
         let centre = WassersteinBall { radius: 0.0, ..self.ball() }.worst_law(payoff);
         if centre.expectation - worst.expectation > LOSS_OF_ROUNDING { worst } else { centre }
     }
 
-    /// Support points that receive mass from elsewhere.
+    /// Marks the support points that receive mass from elsewhere.
     fn destinations(&self, trades: &[Trade]) -> Vec<bool> {
         let mut near = vec![false; self.grid.support.len()];
         let worst = |trade: &Trade| self.ball().worst_law_near(&self.rows.payoff(*trade), self.guess(*trade));
@@ -83,13 +83,14 @@ impl<'f> TransportPricing<'f> {
 
     /// Proves from the multiplier that no law with mass outside the window does worse.
     ///
-    /// Outside, the payoff is at least u0, the relative utility at zero gain of the step after, which increases with z. The
-    /// mass of atom j stays inside if, for every z outside,
+    /// Outside, the payoff is at least u0, the relative utility at zero gain of the step after, which increases with z.
+    /// The mass of atom j stays inside if, for every z outside,
     ///
     ///   u0(z) + gamma |z - z_j| >= E_j,   E the envelope inf_z' { v(z') + gamma |z' - z_j| } over the window.
     ///
-    /// Below the window, an interval [first - far, first - near] passes if u0(first - far) + gamma near >= max_j { E_j -
-    /// gamma (z_j - first) }, since |z - z_j| = (first - z) + (z_j - first); above it, the window's own edge decides.
+    /// Below the window, an interval [first - far, first - near] passes if u0(first - far) + gamma near >= max_j { E_j
+    /// - gamma (z_j - first) }, because |z - z_j| = (first - z) + (z_j - first). Above it, the window's own edge
+    /// decides.
     fn certified(&self, payoff: &[f64], worst: &WorstLaw, trade: Trade) -> bool {
         // A ball of radius 0 holds its centre alone, all of whose returns are in the window.
         if self.radius <= 0.0 {
@@ -138,7 +139,7 @@ impl Pricing for TransportPricing<'_> {
     }
 
     fn refine(&mut self, trades: &[Trade]) -> bool {
-        // No law can hurt all-bank: its mass need not be placed.
+        // No law can hurt all-bank: its mass need not be located.
         let is_bank = trades.iter().all(|trade| trade.action <= 0.0);
         if self.radius <= 0.0 || self.refined || is_bank {
             return false;
@@ -167,8 +168,8 @@ impl Pricing for TransportPricing<'_> {
     }
 }
 
-/// Merges the atoms into `points`, which give way where they all but coincide with an atom: mass that moves by a rounding
-/// would count as moved.
+/// Merges the atoms into `points`. A point that almost coincides with an atom is dropped, because mass that moves by a
+/// rounding would count as moved.
 fn grid(centre: &Centre, radius: f64, points: Vec<f64>) -> Grid {
     let Centre { atoms, masses } = centre;
     if radius <= 0.0 {
@@ -187,7 +188,7 @@ fn grid(centre: &Centre, radius: f64, points: Vec<f64>) -> Grid {
     Grid { support, masses }
 }
 
-/// `points` with the chosen intervals cut into equal parts.
+/// Returns `points` with the chosen intervals cut into equal parts.
 fn subdivided(points: &[f64], parts: usize, chosen: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut all = Vec::with_capacity(points.len() * parts);
     for (interval, pair) in points.windows(2).enumerate() {
