@@ -1,34 +1,35 @@
 //! The allocation advised for one period as a function of the radius, for one law at all radii at once.
 //!
-//! Against the ball of radius e around a law, an allocation a has the worth (Kantorovich duality, [`crate::control::bellman`])
+//! Against the ball of radius e around a law, the worth of an allocation a is (Kantorovich duality,
+//! [`crate::control::bellman`])
 //!
 //!   v(a, e)  =  max_(gamma >= 0)  sum_j p_j min_(b <= z <= z_j) [ f(z) + gamma (z_j - z) ]  -  gamma e,
 //!
-//! f(z) = U(1 - a + a e^z / (1 + r)) and b the lowest return allowed. f is convex below the return at which U'(w) a e^z is steepest
-//! and concave above. So all mass that moves goes to one place m, and comes from an interval (m, t): m is where f' = gamma, or b, and
-//! t is where the chord from m falls to gamma. Along the path on which m falls to b and then gamma to 0 the distance e grows from 0,
-//! and the derivative of the worth in a under the law moved,
+//! f(z) = U(1 - a + a e^z / (1 + r)) and b the lowest return allowed. f is convex below the return at which U'(w) a e^z
+//! is steepest and concave above. So all mass that moves goes to one point m, and comes from an interval (m, t). At m
+//! f' = gamma, or m = b; t is where the slope of the chord from m falls to gamma. Along the path on which m falls to b
+//! and then gamma to 0 the distance e grows from 0. The derivative of the worth in a under the moved law,
 //!
 //!   g  =  E[ U'(w) (e^Z / (1 + r) - 1) ],
 //!
-//! falls; a is advised at the radius where g is 0, and at every radius where it stays above. Sums over the atoms below each are made once for an allocation, so that a point of
-//! the path costs two binary searches.
+//! falls. a is advised at the radius where g is 0, and if g stays above 0, at every radius. The sums over the atoms
+//! below each atom are computed once for an allocation, so that a point of the path costs two binary searches.
 //!
-//! Checked by: `tests/solver/caution.rs` against the robust step, on problems drawn at random: of 1,500 all but 1 in 100 lie within
-//! half of the distance of two allocations, and all within one.
+//! Checked by: `tests/solver/caution.rs` against the robust step, on problems drawn at random: of 1,500 all but 1 in
+//! 100 lie within half of the distance of two allocations, and all within one.
 
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::support::{LIMIT, Support};
 use crate::control::uncertainty::centre::Centre;
 
-/// Allocations at which the radius is found.
+/// Number of allocations at which the radius is computed.
 const ALLOCATIONS: usize = 24;
-/// The first of them, of the highest.
+/// The first of them, as a share of the highest.
 const LEAST_ALLOCATION: f64 = 1e-4;
 /// Halvings of the path: to a millionth of it.
 const HALVINGS: usize = 20;
 
-/// Radii from the largest to 0, and the allocation advised at each; between them it is linear.
+/// The radii from the largest to 0 with the allocation advised at each; linear between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllocationCurve {
     /// Ascending.
@@ -37,23 +38,23 @@ pub struct AllocationCurve {
     radii: Vec<f64>,
 }
 
-/// An investor of one period who holds nothing before.
+/// An investor over one period with no holdings before.
 #[derive(Debug, Clone, Copy)]
 pub struct Investor {
     /// 1 + r.
     pub bank: f64,
-    /// In wealth over the bank's.
+    /// Utility of wealth over the bank's.
     pub utility: RelativeUtility,
-    /// The most that may be held.
+    /// The largest allocation allowed.
     pub highest: f64,
-    /// What the adversary may use.
+    /// The support that the adversary may use.
     pub support: Support,
 }
 
 /// A law with the sums that an allocation needs.
 struct Sums<'a> {
     atoms: &'a [f64],
-    /// Of the atoms before each: mass, mass times log-return, and g's terms.
+    /// Sums over the atoms before each: mass, mass times log-return, and g's terms.
     mass: Vec<f64>,
     moment: Vec<f64>,
     slopes: Vec<f64>,
@@ -64,7 +65,7 @@ struct Sums<'a> {
 }
 
 impl AllocationCurve {
-    /// Of a law. Cost: 24 allocations times its atoms.
+    /// Computes the curve of a law. Cost: 24 allocations times its atoms.
     pub fn of(centre: &Centre, investor: Investor) -> Self {
         let growths: Vec<f64> = centre.atoms.iter().map(|z| z.exp() / investor.bank).collect();
         let lowest = investor.support.around(|| centre.extent()).map_or(-LIMIT, |support| support.min);
@@ -94,11 +95,11 @@ impl AllocationCurve {
         AllocationCurve { allocations, radii }
     }
 
-    /// The allocation advised in a ball of this radius.
+    /// Returns the allocation advised in a ball of this radius.
     pub fn at(&self, radius: f64) -> f64 {
         let above = self.radii.partition_point(|other| *other >= radius);
         match above {
-            // A radius beyond all of them leaves nothing.
+            // At a radius beyond all of them nothing is held.
             0 => 0.0,
             all if all == self.radii.len() => self.allocations[all - 1],
             _ => {
@@ -135,14 +136,15 @@ impl<'a> Sums<'a> {
         self.slopes[self.atoms.len()]
     }
 
-    /// f, f' and U'(w) (e^z / (1 + r) - 1) at a return.
+    /// Returns f, f' and U'(w) (e^z / (1 + r) - 1) at a return.
     fn at(&self, log_return: f64) -> [f64; 3] {
         let growth = log_return.exp() / self.investor.bank;
         let (utility, marginal) = self.investor.utility.at(1.0 + self.allocation * (growth - 1.0));
         [utility, marginal * self.allocation * growth, marginal * (growth - 1.0)]
     }
 
-    /// The radius at which g is 0, g being above 0 without one; infinite where even the lowest return allowed beats the bank.
+    /// Returns the radius at which g is 0, given that g is above 0 without a ball. It is infinite if even the lowest
+    /// return allowed beats the bank.
     fn radius(&self) -> f64 {
         let highest = self.atoms[self.atoms.len() - 1];
         let steepest = self.investor.utility.steepest(1.0 - self.allocation) / self.allocation * self.investor.bank;
@@ -166,7 +168,7 @@ impl<'a> Sums<'a> {
         distance + (further - distance) * slope / (slope - below)
     }
 
-    /// Distance and g where all that is worth moving to `place` at this price of distance is moved.
+    /// Returns the distance and g after moving to `place` all mass that pays to move at this price of distance.
     fn moved(&self, place: f64, [utility, _, slope]: [f64; 3], price: f64) -> [f64; 2] {
         let first = self.atoms.partition_point(|atom| *atom <= place);
         let is_moved = |index: usize| self.utilities[index] - utility > price * (self.atoms[index] - place);

@@ -1,18 +1,19 @@
-//! The levels of caution: which share of the radius has the least worst regret.
+//! The levels of caution: the share of the radius with the least worst regret.
 //!
-//! Three worlds stand for what the record leaves open. In world k the returns are those of the record, all shifted so that their mean
-//! beyond the bank is 0, half, or the whole of
+//! Three worlds represent what the record leaves open. In world k the returns are those of the record, all shifted so
+//! that their mean beyond the bank is 0, half, or the whole of
 //!
 //!   q = max(premium seen, 0) + its standard error.
 //!
-//! Records are drawn from each world in circular blocks of a year, the advice for one period is solved on each at every share s of
-//! the radius, and is scored in its world: L_k(s) is the mean loss of log certainty equivalent beside the best allocation there.
-//! Regret is R_k(s) = L_k(s) - min L_k, and a level has the share of least max_k w_k R_k(s): `balanced` weighs all worlds alike, `bold`
-//! the world of the whole premium twice, `cautious` the one without. The rule is Savage's (1951, The theory of statistical decision,
-//! Journal of the American Statistical Association 46).
+//! Records are drawn from each world in circular blocks of a year. On each the advice for one period is solved at every
+//! share s of the radius, and is scored in its world. L_k(s) is the mean loss of log certainty equivalent against the
+//! best allocation there. Regret is R_k(s) = L_k(s) - min L_k, and a level has the share of least max_k w_k R_k(s).
+//! `balanced` weighs all worlds alike, `bold` the world of the whole premium twice, `cautious` the one without premium
+//! twice. The rule is Savage's (1951, The theory of statistical decision, Journal of the American Statistical
+//! Association 46).
 //!
-//! One draw of blocks serves the three worlds: a shift changes no radius. Checked by: `tests/solver/caution.rs` against plain
-//! simulation with the robust step of `POST /advise`.
+//! One draw of blocks serves the three worlds, because a shift changes no radius. Checked by: `tests/solver/caution.rs`
+//! against plain simulation with the robust step of `POST /advise`.
 
 mod curve;
 
@@ -33,9 +34,10 @@ use crate::numerics::block_bootstrap::circular_blocks;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::streams::stream;
 
-/// Records drawn of a world, and of how many returns altogether where that is less; of the longest at least so many.
+/// Records drawn of a world. For long records the number is capped by the returns in all, but is at least the last
+/// constant.
 const RECORDS: usize = 600;
-/// Groups of records that are left out in turn, which tells how far a level is off by its simulation.
+/// Groups of records that are left out in turn, which gives the simulation error of a level.
 const GROUPS: usize = 12;
 const RETURNS: usize = 360_000;
 const LEAST_RECORDS: usize = 60;
@@ -43,21 +45,21 @@ const LEAST_RECORDS: usize = 60;
 const BLOCK: usize = 12;
 /// Shares of the radius: hundredths.
 const SCALES: usize = 100;
-/// Allocations at which the worth in a world is known; between them it is linear.
+/// Allocations at which the worth in a world is computed; it is linear between them.
 const WORTHS: usize = 400;
-/// Records of one part of the work, at most, and of how many returns: shorter questions are solved between two parts.
+/// Largest number of records of one part of the work, and of returns: shorter requests are solved between two parts.
 const TOGETHER: usize = 25;
 const TOGETHER_RETURNS: usize = 6000;
 /// Parts of the premium in the three worlds.
 const WORLDS: [f64; 3] = [0.0, 0.5, 1.0];
 
 impl Specification {
-    /// A completed specification with what is found from its record: the correction of simulated radii, and its levels, where its
-    /// caution is one of them. Cost: that of [`RadiusEstimator::found_correction`], 600 radii and 43,200 sums over the returns, fewer
-    /// for long records: 0.25 s at 240 returns.
+    /// Returns a completed specification with the results found from its record: the correction of simulated radii, and
+    /// its levels if its caution is one of them. Cost: that of [`RadiusEstimator::found_correction`], 600 radii and
+    /// 43,200 sums over the returns, fewer for long records: 0.25 s at 240 returns.
     #[must_use]
     pub fn resolved(mut self, kept: &Kept) -> Self {
-        // What was found before is found anew, by the whole radius.
+        // Earlier results are computed again, by the whole radius.
         self.problem.levels = None;
         let found = RadiusEstimator::new(&self, kept.clone()).found_correction();
         if let Some(RadiusRule::Bridge { correction, .. }) = &mut self.problem.radius {
@@ -68,7 +70,7 @@ impl Specification {
         self
     }
 
-    /// The levels of a completed specification of which they can be found, from `kept` where they were found before.
+    /// Returns the levels of a completed specification that has levels, from `kept` if they are cached there.
     pub fn levels(&self, kept: &Kept) -> CautionLevels {
         let base = ProblemSpecification {
             horizon: 1,
@@ -77,13 +79,13 @@ impl Specification {
             ..self.problem.clone()
         };
         let base = Specification::of(base, self.seed);
-        // Numbers are written with all their digits. What cannot be written has no name to be kept under.
+        // Numbers are written with all their digits. A specification that cannot be written has no cache key.
         let Ok(written) = serde_json::to_vec(&base) else { return base.found(kept) };
         let key = Key::Levels(Sha256::digest(written).into());
         if let Some(levels) = kept.get::<CautionLevels>(&key) {
             return levels.as_ref().clone();
         }
-        // Not while others wait for it: finding passes checkpoints, and asks for bridges that are kept.
+        // Computed outside the cache's lock: finding passes checkpoints, and itself asks for cached bridges.
         let found = base.found(kept);
         kept.get_or_make(&key, size_of::<CautionLevels>(), || found).as_ref().clone()
     }
@@ -102,7 +104,7 @@ struct Worlds {
     premium_seen: f64,
     standard_error: f64,
     premiums: [f64; 3],
-    /// Of log-returns.
+    /// Shifts of the log-returns.
     shifts: [f64; 3],
     investor: Investor,
 }
@@ -110,7 +112,7 @@ struct Worlds {
 /// Mean loss in one world at every share of the radius.
 type Losses = Vec<f64>;
 
-/// Those in the three worlds, over all records and over all but each of [`GROUPS`] of them.
+/// Losses in the three worlds, over all records and with each of [`GROUPS`] groups left out.
 struct Simulated {
     all: [Losses; 3],
     without: Vec<[Losses; 3]>,
@@ -220,15 +222,15 @@ impl<'a> Regrets<'a> {
         self.losses[world][scale] - self.least[world]
     }
 
-    /// The share of least worst regret.
+    /// Returns the share of least worst regret.
     fn least_worst(&self, weights: [f64; 3]) -> usize {
         let worst = |scale: &usize| (0..3).map(|world| weights[world] * self.at(world, *scale)).fold(0.0, f64::max);
         (0..=SCALES).min_by(|one, other| worst(one).total_cmp(&worst(other))).unwrap_or(SCALES)
     }
 }
 
-/// The standard error of an estimate, from what it is without each group of what it is made of. Source: Efron and Tibshirani (1993),
-/// An introduction to the bootstrap, section 11.
+/// Returns the standard error of an estimate from its values with each group left out. Source: Efron and Tibshirani
+/// (1993), An introduction to the bootstrap, section 11.
 fn jackknife_error(without: &[f64]) -> f64 {
     let count = without.len() as f64;
     let mean = without.iter().sum::<f64>() / count;
@@ -236,9 +238,9 @@ fn jackknife_error(without: &[f64]) -> f64 {
     ((count - 1.0) / count * squares).sqrt()
 }
 
-/// What allocations are worth in a world, in log certainty equivalent over the bank.
+/// The worth of allocations in a world, in log certainty equivalent over the bank.
 struct Worth {
-    /// Evenly from nothing to the most that may be held.
+    /// At even allocations from 0 to the largest allowed.
     worths: Vec<f64>,
     best: f64,
     highest: f64,
@@ -258,7 +260,7 @@ impl Worth {
         Worth { worths, best, highest }
     }
 
-    /// Beside the best allocation.
+    /// Returns the loss against the best allocation.
     fn lost(&self, allocation: f64) -> f64 {
         let place = (allocation / self.highest * WORTHS as f64).clamp(0.0, WORTHS as f64);
         let below = (place as usize).min(WORTHS - 1);
