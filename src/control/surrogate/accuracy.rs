@@ -1,11 +1,12 @@
-//! How far off a fitted value surrogate is at states it has not learned from, and how many design points make it as accurate
-//! as is asked for.
+//! The error of a fitted value surrogate at states outside its design, and the number of design points for the accuracy
+//! asked for.
 //!
-//! Errors of a surrogate have heavy tails, and leaving one design point out says little of them: the error at fresh states of the
-//! design's own law was between a fifth and five times what it said, over the counts, levels, costs and utilities of the tests. So
-//! some fresh states are solved. Half of the chance to be one goes by the variance predicted, which is where errors lie, and what
-//! is found is weighed by its inverse (importance sampling; Owen, Monte Carlo theory, methods and examples, chapter 9): no
-//! state weighs more than twice what it would, and the estimate has no bias.
+//! Errors of a surrogate have heavy tails, and leave-one-out errors predict them poorly. The error at fresh states of
+//! the design's own law was between a fifth and five times the leave-one-out error, over the counts, levels, costs and
+//! utilities of the tests. So some fresh states are solved. Half of a state's chance to be drawn follows the predicted
+//! variance, because the errors are large there. Each squared error is weighted by the inverse of that chance
+//! (importance sampling; Owen, Monte Carlo theory, methods and examples, chapter 9). No state weighs more than twice
+//! its weight under equal chances, and the estimate has no bias.
 
 use rand::RngExt;
 
@@ -16,32 +17,33 @@ use crate::control::request::specification::{DesignSpecification, Specification}
 use crate::control::solved_step::{ExpectedError, StepDiagnostics};
 use crate::numerics::streams::stream;
 
-/// Fresh states that are solved to judge a fit.
+/// Number of fresh states that are solved to judge a fit.
 pub const CHECKS: usize = 100;
 /// Design points of a step to begin with.
 const LEAST: usize = 100;
-/// Errors fall about as the inverse of the number of design points, and aiming below the aim spares a round.
+/// Margin below the aim, which spares a round: errors fall about as the inverse of the number of design points.
 const MARGIN: f64 = 1.15;
-/// Of the number of design points from one round to the next.
+/// Bounds of the growth of the number of design points from one round to the next.
 const GROWTH: [f64; 2] = [1.25, 2.0];
-/// Of what every step may err by, the least that one is asked for where others erred by more.
+/// The least aim of a step if others erred by more, as a share of an even split.
 const LEAST_SHARE: f64 = 0.5;
 const BASIS_POINTS: f64 = 1e4;
 
-/// What one step may err by, and how many design points to begin with.
+/// The largest error allowed at one step, and the number of design points to begin with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aim {
-    /// By its surrogate alone, in basis points.
+    /// The error of its surrogate alone, in basis points.
     pub own: f64,
-    /// What the step after errs by, in basis points.
+    /// The error of the step after, in basis points.
     pub later: f64,
     /// Design points to begin with.
     pub first: usize,
 }
 
 impl Aim {
-    /// Of a step where `erring` steps are left that have surrogates, itself among them, and `after` is how well the next was
-    /// solved. `None` where a number of points is asked for. What later steps did not use is shared among the earlier.
+    /// Computes the aim of a step. `erring` is how many steps with surrogates are left, itself among them, and `after`
+    /// the diagnostics of the next. `None` if a number of points is asked for. Error allowance that later steps did not
+    /// use is shared among the earlier.
     pub fn of(
         design: &DesignSpecification,
         step: usize,
@@ -58,33 +60,34 @@ impl Aim {
         Some(Aim { own, later: next.total, first: first.max(LEAST) })
     }
 
-    /// Whether an error is no more than what is aimed at.
+    /// Returns true if an error is no more than the aim.
     pub fn is_met_by(&self, own: f64) -> bool {
         own <= self.own
     }
 
-    /// How many design points to go on with, where `count` of them erred by `own`.
+    /// Returns the next number of design points, if `count` of them erred by `own`.
     pub fn next(&self, count: usize, own: f64) -> usize {
         let [least, most] = GROWTH;
         (count as f64 * (MARGIN * own / self.own).clamp(least, most)).ceil() as usize
     }
 
-    /// With the errors of the steps after.
+    /// Returns the error with those of the steps after.
     pub fn expected_error(&self, own: f64) -> ExpectedError {
         ExpectedError { own, total: own.hypot(self.later) }
     }
 }
 
-/// Which fresh states are solved, and how much each counts.
+/// The fresh states to solve, with their weights.
 pub struct Checks {
-    /// By number, ascending, with the weight of its squared error; the mean square is the sum of both multiplied.
+    /// By number, ascending, with the weight of its squared error; the mean square is the sum of weight times squared
+    /// error.
     pub weighted: Vec<(usize, f64)>,
 }
 
 impl Checks {
-    /// Of the states with these predicted deviations: [`CHECKS`] draws, evenly along the chances added up, so that one state may be
-    /// drawn more than once. Beyond the `limit` nothing is served by the surrogate, and nothing off.
-    /// Streams: ("accuracy", step, round).
+    /// Draws among the states with these predicted deviations: [`CHECKS`] draws, evenly along the cumulative chances,
+    /// so that one state may be drawn more than once. Beyond the `limit` the surrogate is not used, and so has no
+    /// error. Streams: ("accuracy", step, round).
     pub fn of(deviations: &[f64], limit: f64, seed: u64, step: usize, round: usize) -> Self {
         let states = deviations.len() as f64;
         let within = || deviations.iter().filter(|deviation| **deviation <= limit);
@@ -113,7 +116,8 @@ impl Checks {
         Checks { weighted }
     }
 
-    /// The root mean square of what `served` is off by, in basis points, from the states solved in the order of the checks.
+    /// Returns the root mean square error of `served`, in basis points, from the states solved in the order of the
+    /// checks.
     pub fn error<'a>(
         &self,
         served: &ValueSurrogate,
@@ -154,7 +158,7 @@ mod tests {
             .collect();
         let mean = found.iter().sum::<f64>() / 400.0;
         let deviation = (found.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / 400.0).sqrt();
-        // Of 100 states drawn alike the mean square would deviate by sqrt(E e^4 - (E e^2)^2) / 10 = 8.7.
+        // With 100 states drawn uniformly the mean square would deviate by sqrt(E e^4 - (E e^2)^2) / 10 = 8.7.
         assert!(deviation < 2.0, "{deviation} around {truth}");
         // Four standard errors of 400 rounds.
         assert!((mean - truth).abs() < 4.0 * deviation.max(1e-9) / 20.0, "{mean} against {truth}");
@@ -178,7 +182,7 @@ mod tests {
         let next = Aim::of(&design, 8, 8, Some(&diagnostics)).unwrap();
         assert!((next.own - (0.24_f64 / 8.0).sqrt()).abs() < 1e-12, "{next:?}");
         assert_eq!(next.first, (400.0 * MARGIN * 0.1 / next.own).ceil() as usize);
-        // A step that could not keep to it leaves half of an even share to each.
+        // A step that missed its aim leaves half of an even share to each.
         diagnostics.expected_error = Some(ExpectedError { own: 2.0, total: 2.0 });
         let least = Aim::of(&design, 8, 8, Some(&diagnostics)).unwrap();
         assert!((least.own - 0.25 / 3.0).abs() < 1e-12 && least.first == 400, "{least:?}");

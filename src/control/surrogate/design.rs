@@ -1,9 +1,9 @@
 //! The design: simulated states, step by step, under randomised actions and the sampling law.
 //!
-//! Every state is drawn anew from its streams when asked for, so a design of any size costs no memory. Where the law
-//! is part of the state, three times as many candidates as design points are simulated; a quarter of the design is taken as
-//! drawn and the rest from where the candidates lie farthest apart, so that its edges are inside. Where the points drawn
-//! say that a surrogate errs, candidates count as farther apart than they are.
+//! Every state is drawn anew from its streams when needed, so a design of any size costs no memory. If the law is part
+//! of the state, three times as many candidates as design points are simulated. A quarter of the design is used as
+//! drawn. The rest are the candidates that lie farthest apart, so that the design includes its edges. Candidates count
+//! as farther apart if the points drawn show that a surrogate errs there.
 
 use rand::RngExt;
 
@@ -22,17 +22,17 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
 
-/// States that set the guard, at most: 5 of them lie beyond a guard that 99.5 % pass.
+/// Largest number of states that set the guard: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;
-/// Of a small design so many for each design point: their features would cost more than solving it.
+/// Largest number of guards for each design point: in a small design more features would cost more than solving it.
 const GUARDS_PER_POINT: usize = 10;
 
-/// The states that a training may be asked to solve.
+/// The states that a training may have to solve.
 pub struct Design {
     problem: ProblemSpecification,
     /// The law of the history.
     history: EmpiricalDistribution,
-    /// Of every period, and of the time after the last.
+    /// The dynamics of every period, and of the time after the last.
     periods: Vec<Dynamics>,
     law: ContinuousLaw,
     seed: u64,
@@ -40,15 +40,15 @@ pub struct Design {
     /// Initial wealths.
     start: Interval,
     resampled: bool,
-    /// `ladder[i][t]`: wealths where the state is wealth alone; empty where the law is part of it.
+    /// `ladder[i][t]`: wealths if the state is wealth alone; empty if the law is part of it.
     ladder: Vec<Vec<f64>>,
-    /// True where all states of a step are one: no learning and no wealth in the state.
+    /// True if all states of a step are the same: no learning and no wealth in the state.
     constant: bool,
     start_is_single: bool,
 }
 
 impl Design {
-    /// The design of a completed specification.
+    /// Builds the design of a completed specification.
     pub fn new(specification: &Specification) -> Self {
         let problem = &specification.problem;
         let design = &specification.design;
@@ -73,13 +73,13 @@ impl Design {
         }
     }
 
-    /// Number of distinct design points of a step: 1 where they are all the same state.
+    /// Returns the number of distinct design points of a step: 1 if they are all the same state.
     pub fn count(&self, step: usize) -> usize {
         if self.constant || (step == 0 && self.start_is_single) { 1 } else { self.count }
     }
 
-    /// The states of a step by kind. Guards are independent draws of the design's law, to judge the surrogates by; none where the
-    /// state is wealth alone.
+    /// Returns the number of states of a step by kind. Guards are independent draws of the design's law, to judge the
+    /// surrogates by; there are none if the state is wealth alone.
     pub fn counts(&self, step: usize) -> Counts {
         let design = self.count(step);
         let chosen = design > 1 && self.ladder.is_empty();
@@ -87,7 +87,7 @@ impl Design {
         Counts::new(design, chosen, guards)
     }
 
-    /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
+    /// Returns state `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
     /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O(history) a step.
     pub fn state(&self, step: usize, index: usize) -> State {
         let problem = &self.problem;
@@ -115,15 +115,16 @@ impl Design {
         self.holding_half(wealth.max(self.periods[step].least_wealth()), law)
     }
 
-    /// The band and the value are found for every holding from any one, best from one in the middle.
+    /// Returns a state whose holding is one half: the band and the value are computed for every holding from any one,
+    /// best from one in the middle.
     fn holding_half(&self, wealth: f64, law: EmpiricalDistribution) -> State {
         State { wealth, holding: 0.5, law }
     }
 }
 
-/// Wealths of a design whose state is wealth alone: evenly in log total wealth, over what holding any allocation can reach
-/// within [`REACHED_DEVIATIONS`] of the centre. A simulated design would leave its edges, which the robust step visits,
-/// to extrapolation.
+/// Returns the wealths of a design whose state is wealth alone. They are even in log total wealth, over the range that
+/// any allocation can reach within [`REACHED_DEVIATIONS`] of the centre. A simulated design would leave its edges,
+/// which the robust step visits, to extrapolation.
 fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize) -> Vec<Vec<f64>> {
     let centre = Centre::frozen(problem);
     let (mean, mut variance) = (centre.mean(), centre.variance());
@@ -133,9 +134,9 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
     }
     let periods = Dynamics::of(problem);
     let comes_and_goes = !problem.contributions.are_none();
-    // Of total wealth an action can be more than of wealth in hand.
+    // An action can be a larger share of total wealth than of wealth in hand.
     let highest = if comes_and_goes { 1.0 } else { problem.action_interval[1] };
-    // The log growth of what is held from the start, least and most.
+    // The log growth of wealth held from the start, least and most.
     let growth = |step: usize, highest: f64| {
         let elapsed = step as f64;
         let spread = REACHED_DEVIATIONS * highest * (elapsed * variance).sqrt();
@@ -149,7 +150,7 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
         let [least, most] = [start.min, start.max].map(|wealth| periods[0].total(wealth, 0.0).ln());
         let (mut low, mut high) = (least + low, most + high);
         if comes_and_goes {
-            // Money that is still to come cannot be lost, nor does it grow but by the bank.
+            // Future contributions cannot be lost, and grow only as the bank does.
             let totals = in_hand.map(|wealth| periods[step].total(wealth, 0.0).max(f64::MIN_POSITIVE).ln());
             (low, high) = (low.max(totals[0]), high.min(totals[1]));
             let [now, then] = [step, step + 1].map(|step| growth(step, problem.action_interval[1]));
@@ -168,5 +169,5 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
     (0..count).map(|point| (0..problem.horizon).map(|step| ladder(point, step)).collect()).collect()
 }
 
-/// Standard deviations of log wealth that the design covers where the state is wealth alone.
+/// Standard deviations of log wealth that the design covers if the state is wealth alone.
 const REACHED_DEVIATIONS: f64 = 5.0;

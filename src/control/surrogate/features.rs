@@ -1,4 +1,4 @@
-//! From a state to the inputs of a surrogate.
+//! The features of a state, from which the inputs of a surrogate are made.
 
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::RelativeUtility;
@@ -8,14 +8,14 @@ use crate::numerics::moments::CentralMoments;
 
 /// Standard deviations below this count as this: the log stays finite.
 const SMALLEST_DEVIATION: f64 = 1e-8;
-/// Mean and variance say everything of a normal law, and of its confidence region at one sample size.
+/// Mean and variance fully describe a normal law, and its confidence region at one sample size.
 const NORMAL_MOMENTS: usize = 2;
 /// Radii below this count as this.
 const SMALLEST_RADIUS: f64 = 1e-12;
 /// A worst law whose variance is below this share of the centre's counts as having it: the ratio stays finite.
 const SMALLEST_VARIANCE_LEFT: f64 = 0.01;
 
-/// Which features a specification has, in order: total wealth first, then the law, then its uncertainty set.
+/// The features of a specification, in order: total wealth first, then the law, then its uncertainty set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeatureSelection {
     map: FeatureMap,
@@ -32,29 +32,30 @@ pub struct FeatureSelection {
 pub struct Features(pub(super) Vec<f64>);
 
 impl Features {
-    /// The features of a law after those of a physical state.
+    /// Returns the features of a law after those of a physical state.
     pub fn after(self, mut described: Vec<f64>) -> Features {
         described.extend(self.0);
         Features(described)
     }
 }
 
-/// What of an empirical law and its ball the features are made of.
+/// The quantities of an empirical law and its ball from which the features are made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawSummary {
-    /// Of the empirical law.
+    /// Moments of the empirical law.
     pub moments: CentralMoments,
-    /// Of its uncertainty set.
+    /// Radii of its uncertainty set.
     pub radii: Radii,
-    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball around the law of the returns seen: the first unit of allocation earns this
-    /// against the worst law, and where that law is the centre its sign decides whether anything is held at the last step.
+    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball around the law of the returns seen: the gain of the first unit of
+    /// allocation against the worst law. If that law is the centre its sign decides whether anything is held at the
+    /// last step.
     pub robust_excess: f64,
     /// The variance of `e^Z / (1 + r)` under that law.
     pub robust_variance: f64,
 }
 
 impl FeatureSelection {
-    /// `radius_varies`: whether laws of one sample size have different radii.
+    /// Selects the features. `radius_varies` is true if laws of one sample size have different radii.
     pub fn new(specification: &Specification, radius_varies: bool) -> Self {
         let problem = &specification.problem;
         let learns = problem.framework.learns();
@@ -72,17 +73,17 @@ impl FeatureSelection {
         }
     }
 
-    /// True where wealth is the first feature.
+    /// Returns true if wealth is the first feature.
     pub fn has_wealth(&self) -> bool {
         self.wealth
     }
 
-    /// True where the features depend on the ball and not on its centre alone.
+    /// Returns true if the features depend on the ball and not on its centre alone.
     pub fn has_ball(&self) -> bool {
         self.ball
     }
 
-    /// Names, in order.
+    /// Returns the names of the features, in order.
     pub fn names(&self) -> Vec<String> {
         let standardized = self.map == FeatureMap::Standardized;
         let mut names = Vec::new();
@@ -109,18 +110,18 @@ impl FeatureSelection {
         names
     }
 
-    /// The wealth feature.
+    /// Returns the wealth feature.
     pub fn wealth(&self, total: f64) -> f64 {
         if self.map == FeatureMap::Standardized { total.ln() } else { total }
     }
 
-    /// All features of a state, unscaled. The last two are Merton's ratio against the worst law of the ball,
+    /// Returns all features of a state, unscaled. The last two are Merton's ratio against the worst law of the ball,
     ///
     ///   asinh(robust_excess / (rho v)),   rho the relative risk aversion at the initial total wealth,
     ///
     /// v the law's own variance in the first and `robust_variance` in the second: to second order the allocation of an
-    /// investor who thinks of one period alone. The robust allocation and its value change most where the ratio passes 0
-    /// and 1; asinh draws its ends, which matter less, together.
+    /// investor with one period alone. The robust allocation and its value change most where the ratio passes 0 and 1;
+    /// asinh compresses its ends, which matter less.
     pub fn of(&self, total: f64, law: &LawSummary) -> Features {
         let LawSummary { moments, radii, robust_excess, robust_variance } = law;
         let mut features = Vec::with_capacity(self.moments + 5);

@@ -18,13 +18,13 @@ pub struct Surrogate {
 }
 
 impl Surrogate {
-    /// `own` is one of the two surrogates of the step.
+    /// Builds one of the two surrogates of the step, `own`.
     pub fn new(step: &StepSurrogates, own: &StoredSurrogate) -> Self {
         let mean = GpMean::new(&step.matrix(), &own.weights, &own.hyperparameters);
         Surrogate { mean, offset: own.offset, scale: own.scale }
     }
 
-    /// The prediction of every function at a scaled input. Cost O(N (d + functions)).
+    /// Returns the prediction of every function at a scaled input. Cost O(N (d + functions)).
     pub fn at(&self, input: &[f64]) -> Vec<f64> {
         self.unscaled(self.mean.means(input))
     }
@@ -37,19 +37,19 @@ impl Surrogate {
 
 /// The value surrogate of one step.
 pub struct ValueSurrogate {
-    /// From features to inputs.
+    /// The scaling from features to inputs.
     pub scaling: Scaling,
-    /// Of the target, not yet clamped.
+    /// The surrogate of the target, not yet clamped.
     pub surrogate: Surrogate,
-    /// Predictions are clamped to it.
+    /// Upper clamp of the predicted floor gains.
     pub largest_gain: f64,
-    /// From targets to floor gains.
+    /// The map from targets to floor gains.
     pub target: TargetMap,
     holdings: Holdings,
 }
 
 impl ValueSurrogate {
-    /// Of a stored step.
+    /// Builds the value surrogate of a stored step.
     pub fn new(specification: &Specification, step: usize, stored: &StepSurrogates) -> Self {
         ValueSurrogate {
             scaling: stored.scaling.clone(),
@@ -60,18 +60,19 @@ impl ValueSurrogate {
         }
     }
 
-    /// The holdings whose values are predicted.
+    /// Returns the holdings whose values are predicted.
     pub fn holdings(&self) -> Holdings {
         self.holdings
     }
 
-    /// The predicted targets at `features`, holding by holding. Cost O(N (d + holdings)).
+    /// Returns the predicted targets at `features`, holding by holding. Cost O(N (d + holdings)).
     pub fn prediction(&self, features: &Features) -> Vec<f64> {
         self.surrogate.at(&self.scaling.apply(features))
     }
 
-    /// Predictions that differ from `features` in the first feature alone, wealth, which must be an input: wealth by wealth,
-    /// holding by holding. Cost O(N) each: what the law is away from the design points is computed once.
+    /// Returns predictions that differ from `features` in the first feature alone, wealth, which must be an input:
+    /// wealth by wealth, holding by holding. Cost O(N) each, because the distance in the law to the design points is
+    /// computed once.
     pub fn predictions(&self, features: &Features, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
         let mean = &self.surrogate.mean;
         let mut input = self.scaling.apply(features);
@@ -87,20 +88,21 @@ impl ValueSurrogate {
         wealths.flat_map(at).collect()
     }
 
-    /// The deviation of the floor gain that a deviation of the target makes, around `prediction` at total wealth; the
-    /// largest gain where it leads out of the target's range.
+    /// Converts a deviation of the target to one of the floor gain, around `prediction` at total wealth. Returns the
+    /// largest gain if it leads out of the target's range.
     pub fn gain_spread(&self, prediction: f64, deviation: f64, total: f64) -> f64 {
         let gain = |target| self.target.gain(target, total);
         let spread = 0.5 * (gain(prediction + deviation) - gain(prediction - deviation)).abs();
         if spread.is_finite() { spread } else { self.largest_gain }
     }
 
-    /// By how much the predicted floor gain exceeds the largest that was solved; 0 where it does not.
+    /// Returns the excess of the predicted floor gain over the largest one solved; 0 if there is none.
     pub fn beyond_solved(&self, prediction: f64, total: f64) -> f64 {
         (self.target.gain(prediction, total) - self.largest_gain).max(0.0)
     }
 
-    /// The floor gain of a predicted target at total wealth, clamped to what is true (0) and seen (the largest).
+    /// Returns the floor gain of a predicted target at total wealth, clamped to its true lower bound 0 and the largest
+    /// one solved.
     pub fn clamped_gain(&self, prediction: f64, total: f64) -> f64 {
         self.target.gain(prediction, total).clamp(0.0, self.largest_gain)
     }

@@ -17,70 +17,73 @@ use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::gp_fit::{self, Bounds, FitError};
 use crate::numerics::summary::quantile;
 
-/// Share of the states of the design's own law that lie within the guard. The limit is itself the quantile of few states beyond:
-/// over six seeds 98.8 to 99.6 % of fresh states pass, where a share of 0.99 let 97.7 to 99.4 % pass, with errors as small.
+/// Share of the states of the design's own law that lie within the guard. The limit is itself the quantile of few
+/// states beyond. Over six seeds 98.8 to 99.6 % of fresh states pass; with a share of 0.99, 97.7 to 99.4 % passed, with
+/// errors as small.
 const GUARDED_SHARE: f64 = 0.995;
 
-/// Weight that an expected error of the root mean square adds to a candidate. At 1,000 points of the paper's problem with
-/// alpha 0.5, 2 to 6 leave 0.10 basis points of error at the last step where weights by the floor gain left 0.15.
+/// Weight that a candidate gains if its expected error equals the root mean square. At 1,000 points of the paper's
+/// problem with alpha 0.5, weights of 2 to 6 leave 0.10 basis points of error at the last step; weights by the floor
+/// gain left 0.15.
 const WEIGHT_OF_ERROR: f64 = 3.0;
-/// Share of the signal variance that the smoothing of errors takes for noise: single errors are noisy, their size is not.
+/// Share of the signal variance that counts as noise when errors are smoothed: single errors are noisy, their size is
+/// not.
 const NOISE_OF_ERRORS: f64 = 0.3;
 
-/// Guards whose deviations are computed together: a block that stays in the second-level cache beside the factor's.
+/// Guards whose deviations are computed together: a block that stays in the second-level cache with the factor's.
 const GUARDS_AT_A_TIME: usize = 64;
 
-/// A state of the design with the solution of the robust step there: y^i and what the surrogates learn of it.
+/// A state of the design with the solution of the robust step there: y^i and the targets of the surrogates.
 pub struct DesignPoint {
     /// x.
     pub wealth: f64,
     /// y-check.
     pub features: Features,
-    /// The best action of who holds nothing yet.
+    /// The best action without holdings.
     pub action: f64,
     /// Log certainty equivalent over the all-bank floor, at that holding.
     pub floor_gain: f64,
-    /// The same at every holding where the value is to be known, one where the holding does not matter.
+    /// The floor gain at every holding at which the value is needed; one if the holding does not matter.
     pub floor_gains: Vec<f64>,
     /// The action, or either end of the band, continued past the bounds of the interval.
     pub policy_targets: Vec<f64>,
-    /// Of the robust step, in log certainty equivalent.
+    /// The duality gap of the robust step, in log certainty equivalent.
     pub duality_gap: f64,
-    /// Of the robust step.
+    /// True if the robust step was certified.
     pub certified: bool,
 }
 
 /// Hyperparameters from which the search for both surrogates starts.
 pub struct StartingScales {
-    /// Of the value surrogate.
+    /// Hyperparameters of the value surrogate.
     pub value: Hyperparameters,
-    /// Of the policy surrogate.
+    /// Hyperparameters of the policy surrogate.
     pub policy: Hyperparameters,
 }
 
-/// What a fit needs to know of its step.
+/// The context that a fit needs.
 pub struct Fitting<'a> {
-    /// As completed.
+    /// The completed specification.
     pub specification: &'a Specification,
     /// Names of all features.
     pub names: &'a [String],
     /// The step being fitted.
     pub step: usize,
-    /// Of the candidates.
+    /// The scaling of the candidates.
     pub scaling: &'a Scaling,
-    /// Told of progress, asked whether to stop.
+    /// The stop signal and the callback for progress.
     pub watch: &'a Watch<'a>,
 }
 
 /// Both surrogates of a design, with the figures that describe them.
 pub struct Fit {
-    /// As they are kept.
+    /// The surrogates in the form stored.
     pub stored: StepSurrogates,
-    /// Of the value target, predicted at each state that set the guard, in units of the value's `scale`.
+    /// Deviations of the value target, predicted at each state that set the guard, in units of the value's `scale`.
     pub deviations: Vec<f64>,
-    /// Of the value.
+    /// Diagnostics of the value surrogate.
     pub value: SurrogateDiagnostics,
-    /// Of the policy.
+    /// Diagnostics of the policy surrogate.
     pub policy: SurrogateDiagnostics,
 }
 
@@ -119,7 +122,7 @@ enum PriorMean {
 }
 
 impl Fitting<'_> {
-    /// The hyperparameters of surrogates fitted before, if they are of the same inputs.
+    /// Returns the hyperparameters of surrogates fitted before, if they have the same inputs.
     pub fn start_from(&self, before: &StepSurrogates) -> Option<StartingScales> {
         (before.scaling.active == self.scaling.active).then(|| StartingScales {
             value: before.value.hyperparameters.clone(),
@@ -127,7 +130,7 @@ impl Fitting<'_> {
         })
     }
 
-    /// A first fit to few design points.
+    /// Fits coarsely to few design points.
     ///
     /// # Errors
     /// A covariance matrix that stays singular.
@@ -140,9 +143,9 @@ impl Fitting<'_> {
         })
     }
 
-    /// The weight of each candidate's distance to the design: 1 where no error of the value is expected, 4 where the expected
-    /// error equals the root mean square. The expected error is that of the design points solved so far, each predicted from
-    /// the others, smoothed over the inputs.
+    /// Returns the weight of each candidate's distance to the design: 1 if no error of the value is expected, 4 if the
+    /// expected error equals the root mean square. The expected error is that of the design points solved so far, each
+    /// predicted from the others, smoothed over the inputs.
     ///
     /// # Errors
     /// A covariance matrix that stays singular.
@@ -168,9 +171,9 @@ impl Fitting<'_> {
         Ok(inputs.par_iter().map(weight).collect())
     }
 
-    /// Both surrogates, by maximum likelihood, and the deviations of the value that the guard is set by. `guards` are features
-    /// of independent states of the design's own law: the share `GUARDED_SHARE` of them passes. Where there are none, the
-    /// design points take their place, each predicted from the others.
+    /// Fits both surrogates by maximum likelihood, and computes the deviations of the value that set the guard.
+    /// `guards` are features of independent states of the design's own law: the share `GUARDED_SHARE` of them passes.
+    /// If there are none, the design points are used instead, each predicted from the others.
     ///
     /// # Errors
     /// A covariance matrix that stays singular; the stop signal.
@@ -215,7 +218,7 @@ impl Fitting<'_> {
         self.scaling.matrix(&rows)
     }
 
-    /// The value's targets, then the policy's.
+    /// Returns the value's targets, then the policy's.
     fn targets(&self, solved: &[DesignPoint]) -> [Targets; 2] {
         let map = TargetMap::new(self.specification, self.step);
         let problem = &self.specification.problem;
@@ -279,7 +282,7 @@ impl Fitting<'_> {
     }
 }
 
-/// What `of` says of every design point, turned around: a function of the design points for each of its entries.
+/// Transposes the rows that `of` gives for the design points: one function of the design points for each entry.
 fn by_function(solved: &[DesignPoint], of: impl Fn(&DesignPoint) -> Vec<f64>) -> Vec<Vec<f64>> {
     let rows: Vec<Vec<f64>> = solved.iter().map(of).collect();
     let functions = rows.first().map_or(0, Vec::len);

@@ -1,6 +1,7 @@
-//! From the states of a step to its surrogates: some are solved as drawn, the rest of the design where candidates lie farthest
-//! apart, and both surrogates are fitted to all of them (paper, section 3.1, steps 2 to 5). Where an accuracy is asked for in the
-//! place of a number of points, the design begins small, and grows until fresh states say that it is reached.
+//! Fits the surrogates of a step from its states. Some states are solved as drawn, the rest of the design are the
+//! candidates that lie farthest apart, and both surrogates are fitted to all of them (paper, section 3.1, steps 2 to
+//! 5). If an accuracy is asked for instead of a number of points, the design begins small, and grows until fresh states
+//! show that it is reached.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,108 +20,109 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::{StepDiagnostics, StepSolution};
 use crate::numerics::farthest::farthest_points;
 
-/// States whose features are found together, for what they have in common, at most.
+/// Largest number of states whose features are computed together, to share their common work.
 const MOST_TOGETHER: usize = 256;
-/// Bytes that these take on a thread, at most, unless one alone takes more.
+/// Largest number of bytes of these states on a thread, unless one alone takes more.
 const BYTES_TOGETHER: usize = 8 << 20;
 /// Bytes of a value of a law in such a state.
 pub const LAW_BYTES: usize = 40;
-/// Sets of fresh states that must each say that a design is accurate enough; the larger error is claimed. A design that stopped at
-/// the first set that was kind to it claimed too little, by a factor of 1.3 in the geometric mean. A design that has all the points
-/// it may have stops whatever they say, and claims the mean square of both.
+/// Sets of fresh states that must each confirm that a design is accurate enough; the larger error is reported. A design
+/// that stopped at the first favourable set reported too small an error, by a factor of 1.3 in the geometric mean. A
+/// design that has all the points it may have stops in any case, and reports the root mean square of both.
 const SETS: usize = 2;
-/// Progress is reported about this often a step.
+/// Progress is reported about this often in a step.
 const REPORTS_PER_STEP: usize = 100;
 
 /// States of a step that surrogates may learn from, by number.
 pub trait Candidates: Sync {
-    /// What the surrogates see of some states, unscaled.
+    /// Returns the features of some states, unscaled.
     fn features(&self, some: Range<usize>) -> Vec<Features>;
 
-    /// The robust step there.
+    /// Solves the robust step at a state.
     ///
     /// # Errors
     /// The stop signal; a solution that is not finite.
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError>;
 }
 
-/// States whose features are found together, where laws have so many values and their radii so many simulated paths.
+/// Returns how many states have their features computed together, if laws have `values` values and their radii `paths`
+/// simulated paths.
 pub fn together(values: usize, paths: usize) -> usize {
     (BYTES_TOGETHER / (LAW_BYTES * values + size_of::<f64>() * paths).max(1)).clamp(1, MOST_TOGETHER)
 }
 
 /// Candidates simulated for each design point.
 pub const CANDIDATES_PER_POINT: usize = 3;
-/// One design point in this many is taken as drawn.
+/// One design point in this many is used as drawn.
 const AS_DRAWN: usize = 4;
 
-/// How many states there are of each kind.
+/// The number of states of each kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Counts {
-    /// Design points, N; at most, where an accuracy is asked for.
+    /// Design points, N; the largest number if an accuracy is asked for.
     pub design: usize,
-    /// Whether they are chosen among candidates; else they are all there are.
+    /// True if they are chosen among candidates; otherwise they are all the candidates.
     pub chosen: bool,
     /// Fresh states that set the guard.
     pub guards: Range<usize>,
 }
 
 impl Counts {
-    /// With so many fresh states, which come after the candidates.
+    /// Counts the states with `guards` fresh states, which come after the candidates.
     pub fn new(design: usize, chosen: bool, guards: usize) -> Self {
         let counts = Counts { design, chosen, guards: 0..0 };
         let first = counts.candidates(design);
         Counts { guards: first..first + guards, ..counts }
     }
 
-    /// Of `design` points so many are the first candidates as they are.
+    /// Returns how many of `design` points are the first candidates as drawn.
     pub fn as_drawn(&self, design: usize) -> usize {
         if self.chosen { design.div_ceil(AS_DRAWN) } else { design }
     }
 
-    /// Candidates for `design` points.
+    /// Returns the number of candidates for `design` points.
     pub fn candidates(&self, design: usize) -> usize {
         if self.chosen { CANDIDATES_PER_POINT * design } else { design }
     }
 
-    /// The fresh states of a round are its own.
+    /// Returns the fresh states of a round; each round has its own.
     fn guards(&self, round: usize) -> Range<usize> {
         let start = self.guards.start + round * self.guards.len();
         start..start + self.guards.len()
     }
 }
 
-/// How the surrogates of one step are learned.
+/// The fitting of the surrogates of one step.
 pub struct Learning<'a> {
-    /// As completed.
+    /// The completed specification.
     pub specification: &'a Specification,
     /// Names of all features.
     pub names: &'a [String],
     /// The step.
     pub step: usize,
-    /// Of its states.
+    /// Counts of its states.
     pub counts: Counts,
-    /// What it may err by; `None` where all design points are solved.
+    /// The error allowed; `None` if all design points are solved.
     pub aim: Option<Aim>,
-    /// Told of progress, asked whether to stop.
+    /// The stop signal and the callback for progress.
     pub watch: &'a Watch<'a>,
 }
 
-/// What is known of a step as its design grows.
+/// The data of a step as its design grows.
 #[derive(Default)]
 struct Known {
-    /// Of the candidates so far.
+    /// Features of the candidates so far.
     features: Vec<Features>,
     /// Candidates that are design points.
     chosen: Vec<usize>,
-    /// Those, and the states that earlier fits were judged by.
+    /// The solved candidates, and the states that earlier fits were judged by.
     solved: Vec<DesignPoint>,
 }
 
-/// What is judged of a fit.
+/// The parts of a fit that are judged.
 struct Found {
     served: ValueSurrogate,
-    /// Predicted at the fresh states, and the most at which the surrogate serves.
+    /// Deviations predicted at the fresh states, and the largest at which the surrogate is used.
     deviations: Vec<f64>,
     limit: f64,
     /// Points solved before.
@@ -128,7 +130,8 @@ struct Found {
 }
 
 impl Learning<'_> {
-    /// Solves the design, and fits both surrogates to it; the search for their scales starts from those of the step after.
+    /// Solves the design, and fits both surrogates to it; the search for their scales is warm-started from those of the
+    /// step after.
     ///
     /// # Errors
     /// [`TrainError::Stopped`] soon after the stop signal; a robust step that is not finite; a covariance matrix that stays
@@ -162,7 +165,8 @@ impl Learning<'_> {
         }
     }
 
-    /// The error that is claimed of a fit, by sets of fresh states until one says that it is too large, and what is solved of them.
+    /// Returns the error reported for a fit, and the fresh states solved for it. It goes through sets of fresh states
+    /// until one gives too large an error.
     fn judge(
         &self,
         states: &impl Candidates,
@@ -196,8 +200,8 @@ impl Learning<'_> {
         Ok((own, solved))
     }
 
-    /// Solves as many more design points as are wanted, and fits both surrogates to all. `before` are surrogates whose scales may
-    /// be near, `guards` the fresh states to tell deviations at.
+    /// Solves as many more design points as are wanted, and fits both surrogates to all. `before` are surrogates for a
+    /// warm start of the scales, `guards` the fresh states at which deviations are predicted.
     fn round(
         &self,
         states: &impl Candidates,
@@ -224,7 +228,7 @@ impl Learning<'_> {
         if solved.len() < wanted {
             let mut inputs: Vec<Vec<f64>> = features.iter().map(|features| scaling.apply(features)).collect();
             let weights = fitting.weights(solved, &start.value, &inputs)?;
-            // What earlier fits were judged by is no candidate, and yet known.
+            // The states that earlier fits were judged by are no candidates, but count as solved.
             let known = inputs.len()..inputs.len() + solved.len();
             inputs.extend(solved.iter().map(|point| scaling.apply(&point.features)));
             let given: Vec<usize> = chosen.iter().copied().chain(known).collect();
@@ -248,7 +252,7 @@ impl Learning<'_> {
         Ok(found?.concat())
     }
 
-    /// Solves the robust step at states by number, with their features, where so many of `total` are solved already.
+    /// Solves the robust step at states by number, with their features, if `before` of `total` are solved already.
     fn solve(
         &self,
         states: &impl Candidates,
@@ -276,7 +280,7 @@ impl Learning<'_> {
     }
 }
 
-/// How well a step was solved at its design points, before anything is fitted.
+/// Returns how well a step was solved at its design points, before anything is fitted.
 pub fn diagnostics(step: usize, solved: &[DesignPoint]) -> StepDiagnostics {
     let share = |holds: &dyn Fn(&DesignPoint) -> bool| {
         solved.iter().filter(|point| holds(point)).count() as f64 / solved.len() as f64

@@ -1,20 +1,22 @@
-//! What the policy surrogate regresses: the action, continued past the bounds of the interval.
+//! The regression target of the policy surrogate: the action, continued past the bounds of the interval.
 //!
-//! Actions stick to a bound over whole regions of states, and a surrogate of them would be wrong on either side of the edge
-//! of the region. Continued, they cross the bound without a kink, and a prediction is moved into the interval afterwards.
+//! Actions stick to a bound over whole regions of states, and a surrogate of them would be wrong on either side of the
+//! region's edge. Continued, they cross the bound without a kink, and a prediction is clamped to the interval
+//! afterwards.
 
-/// Step of the one-sided derivatives at a bound, in action: wide enough to see past the error of the value surrogate, but
-/// where the interval itself is no wider than four of them.
+/// Step of the one-sided derivatives at a bound, in action: wide enough to exceed the error of the value surrogate. It
+/// is smaller if the interval is narrower than four such steps.
 const DERIVATIVE_STEP: f64 = 5e-2;
-/// The curvature there is taken to lie within this factor of relative risk aversion times variance.
+/// The curvature there is clamped to within this factor of relative risk aversion times variance.
 const CURVATURE_RANGE: f64 = 4.0;
 /// How far past a bound the target may go, in action: far enough for the surrogate to see a slope.
 const LARGEST_EXTENSION: f64 = 2.0;
 
-/// An action at a bound, or so near that the value of the step after may have put it there by its own error, moved past
-/// the bound by the Newton step that the one-sided derivatives there suggest: the optimum of the parabola that touches the
-/// robust gain at the bound, so that the target crosses the bound without a kink. `gain` is the robust gain of `action`,
-/// `reference` is the curvature expected: relative risk aversion times variance.
+/// Returns the target of an action, moved past the bound if the action is at a bound. An action so near a bound that an
+/// error of the next step's value may have put it there counts as at it. The move is the Newton step of the one-sided
+/// derivatives, to the optimum of the parabola that touches the robust gain at the bound. So the target crosses the
+/// bound without a kink. `gain` is the robust gain of `action`, `reference` the expected curvature: relative risk
+/// aversion times variance.
 pub fn policy_target(action: f64, highest: f64, gain: f64, reference: f64, gain_at: impl Fn(f64) -> f64) -> f64 {
     let step = DERIVATIVE_STEP.min(highest / 4.0);
     if step <= 0.0 {
@@ -35,7 +37,7 @@ pub fn policy_target(action: f64, highest: f64, gain: f64, reference: f64, gain_
     }
     let curvature = (2.0 * near - far - gain) / (step * step);
     let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
-    // Far beyond the bound the target levels off, smoothly, for what is never wanted needs no resolution.
+    // Far beyond the bound the target levels off smoothly, because an action that is never optimal needs no resolution.
     bound + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).tanh()
 }
 
@@ -43,7 +45,7 @@ pub fn policy_target(action: f64, highest: f64, gain: f64, reference: f64, gain_
 mod tests {
     use super::*;
 
-    /// A gain of curvature -1.6 with its optimum at `best`.
+    /// Returns a gain of curvature -1.6 with its optimum at `best`.
     fn parabola(best: f64) -> impl Fn(f64) -> f64 {
         move |action: f64| 0.3 - 0.8 * (action - best).powi(2)
     }
@@ -72,7 +74,7 @@ mod tests {
             let found = target(0.0, best);
             assert!((-LARGEST_EXTENSION..-1.5).contains(&found) || found == -LARGEST_EXTENSION, "{best}: {found}");
         }
-        // A curvature that the value's error makes is held to a factor of the one expected.
+        // A curvature that comes from the value's error is clamped to a factor of the expected one.
         assert!(policy_target(0.0, 1.0, 0.0, 1.6, |action| -action) >= -LARGEST_EXTENSION);
     }
 }

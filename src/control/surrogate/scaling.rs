@@ -1,4 +1,4 @@
-//! From features to the inputs of a surrogate.
+//! The scaling of features to the inputs of a surrogate.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -14,14 +14,14 @@ const SMALLEST_SPREAD: f64 = 1e-9;
 pub struct Scaling {
     /// Indices, among all features, of those that vary.
     pub active: Vec<usize>,
-    /// Means of those, in their own units.
+    /// Means of these features, in their own units.
     pub centre: Vec<f64>,
-    /// Standard deviations of those, in their own units.
+    /// Standard deviations of these features, in their own units.
     pub spread: Vec<f64>,
 }
 
 impl Scaling {
-    /// Mean and standard deviation over `rows`, the features of one state each.
+    /// Computes mean and standard deviation over `rows`, the features of one state each.
     pub fn of(rows: &[Features]) -> Self {
         let mut scaling = Scaling { active: Vec::new(), centre: Vec::new(), spread: Vec::new() };
         let count = rows.len() as f64;
@@ -37,13 +37,13 @@ impl Scaling {
         scaling
     }
 
-    /// The surrogate's inputs: the active features in units of their spread.
+    /// Returns the surrogate's inputs: the active features in units of their spread.
     pub fn apply(&self, features: &Features) -> Vec<f64> {
         let scaled = self.active.iter().zip(self.centre.iter().zip(&self.spread));
         scaled.map(|(&feature, (centre, spread))| (features.0[feature] - centre) / spread).collect()
     }
 
-    /// One scaled row a design point.
+    /// Returns one scaled row for each design point.
     pub fn matrix(&self, rows: &[Features]) -> DMatrix<f64> {
         let flat: Vec<f64> = rows.iter().flat_map(|row| self.apply(row)).collect();
         DMatrix::from_row_slice(rows.len(), self.active.len(), &flat)

@@ -14,9 +14,9 @@ use crate::numerics::gp::Hyperparameters;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredSurrogate {
-    /// For scaled inputs and targets.
+    /// Hyperparameters for scaled inputs and targets.
     pub hyperparameters: Hyperparameters,
-    /// K^-1 times the scaled targets, function by function, one a design point.
+    /// K^-1 times the scaled targets, function by function, one entry for each design point.
     pub weights: Vec<Vec<f64>>,
     /// In the target's unit.
     pub offset: f64,
@@ -28,44 +28,46 @@ pub struct StoredSurrogate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepSurrogates {
-    /// From features to inputs.
+    /// The scaling from features to inputs.
     pub scaling: Scaling,
-    /// Scaled inputs, one column a feature, one entry a design point.
+    /// Scaled inputs, one column for each feature, one entry for each design point.
     pub inputs: Vec<Vec<f64>>,
-    /// Of the value target: one function, or where trading costs one for each of the [`Holdings`].
+    /// The surrogate of the value target: one function, or one for each of the [`Holdings`] if trading costs.
     pub value: StoredSurrogate,
-    /// Of the policy target, an action: one function, or where trading costs the lower and the upper end of the band.
+    /// The surrogate of the policy target, an action: one function, or the lower and the upper end of the band if
+    /// trading costs.
     pub policy: StoredSurrogate,
     /// Largest floor gain on the design: predictions are clamped to it.
     pub largest_gain: f64,
-    /// States whose predicted standard deviation of the value target exceeds this, in units of the value's `scale`, lie
-    /// outside the design: the 99.5 % quantile of the deviations at fresh states of the design's own law where the law is part of
-    /// the state, of the leave-one-out deviations at the design points where it is not.
+    /// The guard: states whose predicted standard deviation of the value target exceeds this, in units of the value's
+    /// `scale`, lie outside the design. It is the 99.5 % quantile of the deviations at fresh states of the design's own
+    /// law, if the law is part of the state. Otherwise it is that quantile of the leave-one-out deviations at the
+    /// design points.
     pub deviation_limit: f64,
 }
 
-/// The solution where all states of a step are one, but for the holding.
+/// The solution of a step with a single state, up to the holding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SingleSolution {
-    /// Log certainty equivalents over the all-bank floor: one, or where trading costs one for each of the [`Holdings`].
+    /// Log certainty equivalents over the all-bank floor: one, or one for each of the [`Holdings`] if trading costs.
     pub floor_gains: Vec<f64>,
-    /// The lowest and the highest share of wealth that is kept as it is.
+    /// The no-trade region: the lowest and the highest share of wealth that is kept as it is.
     pub band: Band,
 }
 
-/// What a step keeps.
+/// The stored solution of a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Solution {
-    /// Where all states are one.
+    /// The solution of a step whose states are all the same.
     Single(SingleSolution),
-    /// Where they differ.
+    /// The surrogates of a step whose states differ.
     Surrogates(Box<StepSurrogates>),
 }
 
 impl Solution {
-    /// Where states differ.
+    /// Returns the surrogates, if the states differ.
     pub fn surrogates(&self) -> Option<&StepSurrogates> {
         match self {
             Solution::Single(_) => None,
@@ -75,12 +77,12 @@ impl Solution {
 }
 
 impl StepSurrogates {
-    /// Design points, N.
+    /// Returns N, the number of design points.
     pub fn count(&self) -> usize {
         self.inputs.first().map_or(0, Vec::len)
     }
 
-    /// The inputs as a matrix, one row a design point.
+    /// Returns the inputs as a matrix, one row for each design point.
     pub fn matrix(&self) -> DMatrix<f64> {
         let rows = self.count();
         DMatrix::from_iterator(rows, self.inputs.len(), self.inputs.iter().flatten().copied())

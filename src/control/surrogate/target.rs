@@ -1,20 +1,20 @@
-//! What the value surrogate regresses, and the way back to the floor gain.
+//! The regression target of the value surrogate, and its map back to the floor gain.
 
 use crate::control::problem::utility::{certainty_equivalent, utility};
 use crate::control::request::specification::{Specification, SurrogateTarget, UtilitySpecification};
 
-/// How the value target of a step maps to and from the floor gain.
+/// The map between the floor gain and the value target of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct TargetMap {
     target: SurrogateTarget,
     utility: UtilitySpecification,
     wealth_matters: bool,
-    /// What the bank makes of a unit of wealth until the horizon.
+    /// Growth of a unit of wealth in the bank until the horizon.
     bank: f64,
 }
 
 impl TargetMap {
-    /// Of a completed specification at `step`.
+    /// Builds the map of a completed specification at `step`.
     pub fn new(specification: &Specification, step: usize) -> Self {
         let problem = &specification.problem;
         TargetMap {
@@ -25,17 +25,18 @@ impl TargetMap {
         }
     }
 
-    /// Terminal all-bank wealth in whose units the value is taken: of unit wealth where wealth does not matter.
+    /// Returns the terminal all-bank wealth that is the unit of the value; it uses unit wealth if wealth does not
+    /// matter.
     fn floor(&self, total: f64) -> f64 {
         (if self.wealth_matters { total } else { 1.0 }) * self.bank
     }
 
-    /// True where the value itself is regressed.
+    /// Returns true if the value itself is regressed.
     pub fn is_value(&self) -> bool {
         self.target == SurrogateTarget::Value
     }
 
-    /// The regression target of a floor gain, at a state whose total wealth is `total` once everything is sold.
+    /// Returns the regression target of a floor gain, at a state whose total wealth is `total` once everything is sold.
     pub fn target(&self, gain: f64, total: f64) -> f64 {
         match self.target {
             SurrogateTarget::FloorGain => gain,
@@ -43,7 +44,7 @@ impl TargetMap {
         }
     }
 
-    /// The floor gain behind a predicted target, not clamped.
+    /// Returns the floor gain behind a predicted target, not clamped.
     pub fn gain(&self, target: f64, total: f64) -> f64 {
         match self.target {
             SurrogateTarget::FloorGain => target,
