@@ -9,7 +9,7 @@ use crate::control::request::support::{Extent, Interval};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::volatility::rescaled;
 
-/// Less than this of a law is lost in rounding; what decayed to it is left out.
+/// Smallest mass of an atom: less is lost in rounding, so an atom that decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
 
 /// The Gauss-Hermite rule of five nodes for a standard normal error, exact for polynomials up to the ninth order: nodes 0 and
@@ -27,28 +27,28 @@ const HERMITE: [(f64, f64); 5] = [
 pub struct Centre {
     /// Log-returns, ascending.
     pub atoms: Vec<f64>,
-    /// Of the atoms, in their order.
+    /// Masses of the atoms, in their order.
     pub masses: Vec<f64>,
 }
 
-/// How the law of the returns seen becomes the centre of the ball: every return seen is spread over some nodes around it, and atoms
-/// that are assumed stand beside.
+/// The map from the law of the returns seen to the centre of the ball. Every return seen is spread over some nodes
+/// around it, and assumed atoms are added.
 ///
 ///   centre = ( sum_j w_j sum_k m_k delta_(z_j + h x_k) + sum_i v_i delta_(y_i) ) / ( sum_j w_j + sum_i v_i )
 ///
-/// with x and m the nodes and masses of the Gauss-Hermite rule and h the bandwidth. What lies beyond the returns accepted is put at
-/// their bounds. Checked by: `tests/solver/centre.rs` against draws.
+/// with x and m the nodes and masses of the Gauss-Hermite rule and h the bandwidth. Atoms beyond the returns accepted
+/// are clamped to their bounds. Checked by: `tests/solver/centre.rs` against draws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Centring {
     /// Steps h x_k away from a return, ascending, and m_k.
     nodes: Vec<(f64, f64)>,
-    /// Log-returns y_i and v_i, in returns.
+    /// Log-returns y_i, and their weights v_i in numbers of returns.
     assumed: Vec<(f64, f64)>,
-    /// The returns accepted.
+    /// The interval of accepted returns.
     accepted: Interval,
 }
 
-/// A history, oldest first, as the centre of a problem takes it.
+/// Returns a history, oldest first, as the centre of a problem uses it.
 pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
     match problem.centre {
         CentreSpecification::VolatilityScaled { half_life } => {
@@ -59,7 +59,7 @@ pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
 }
 
 impl Centring {
-    /// Of a problem, which has been completed.
+    /// Builds the map of a completed problem.
     pub fn of(problem: &ProblemSpecification) -> Self {
         let (mut nodes, mut assumed) = (vec![(0.0, 1.0)], Vec::new());
         match &problem.centre {
@@ -85,7 +85,7 @@ impl Centring {
         Centring { nodes, assumed, accepted: Interval { min, max } }
     }
 
-    /// A return seen as the centre has it: log-returns and their masses, which sum to 1.
+    /// Returns the atoms of the centre for one return seen: log-returns and their masses, which sum to 1.
     pub fn spread(&self, log_return: f64) -> impl Iterator<Item = (f64, f64)> {
         let Interval { min, max } = self.accepted;
         self.nodes.iter().map(move |&(step, mass)| {
@@ -93,22 +93,22 @@ impl Centring {
         })
     }
 
-    /// What stands in the centre beside the returns seen: log-returns, and what they weigh in returns.
+    /// Returns the assumed atoms of the centre: log-returns, and their weights in numbers of returns.
     pub fn assumed(&self) -> &[(f64, f64)] {
         &self.assumed
     }
 
-    /// Whether the centre is the law of the returns seen.
+    /// Returns true if the centre is the law of the returns seen.
     pub fn is_empirical(&self) -> bool {
         self.nodes.len() == 1 && self.assumed.is_empty()
     }
 
-    /// Atoms of the centre of so many returns, at most.
+    /// Returns the largest number of atoms of the centre of so many returns.
     pub fn atom_count(&self, returns: usize) -> usize {
         returns.saturating_mul(self.nodes.len()).saturating_add(self.assumed.len())
     }
 
-    /// The centre where these returns were seen.
+    /// Returns the centre after the returns of `law`.
     pub fn centre(&self, law: &EmpiricalDistribution) -> Centre {
         let assumed: f64 = self.assumed.iter().map(|(_, weight)| weight).sum();
         let total = law.total_weight() + assumed;
@@ -123,7 +123,8 @@ impl Centring {
         Centre::gathered(masses.filter(|(_, mass)| *mass > NO_MASS))
     }
 
-    /// No return of the centre is above this, though `periods` more are learned of which none is above it before its turn.
+    /// Returns an upper bound on the returns of the centre while `periods` more returns are learned, each of them at
+    /// most the bound before it.
     pub fn highest(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
         let seen = law.atoms().last().copied().unwrap_or(self.accepted.max);
         let step = self.nodes.last().map_or(0.0, |node| node.0);
@@ -133,9 +134,9 @@ impl Centring {
 }
 
 impl Centre {
-    /// Where nothing is learned: the known law by its quadrature, or the centre of the history. What of a known law
-    /// lies beyond the returns accepted is put at their bounds, as the simulated returns of the same law are: an exponential
-    /// of a heavy tail has no mean.
+    /// Returns the centre if nothing is learned: the known law by its quadrature, or the centre of the history. Returns
+    /// of a known law beyond those accepted are clamped to their bounds, as the simulated returns of the same law are,
+    /// because an exponential of a heavy tail has no mean.
     pub fn frozen(problem: &ProblemSpecification) -> Self {
         if problem.framework == Framework::KnownLaw {
             let law = problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
@@ -145,7 +146,7 @@ impl Centre {
         Centring::of(problem).centre(&problem.learning.law(&record(&problem.history, problem)))
     }
 
-    /// The masses of equal neighbours added up.
+    /// Adds up the masses of equal adjacent atoms.
     fn gathered(ascending: impl Iterator<Item = (f64, f64)>) -> Self {
         let (mut atoms, mut masses): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         for (atom, mass) in ascending {
@@ -160,27 +161,27 @@ impl Centre {
         Centre { atoms, masses }
     }
 
-    /// The lowest atom.
+    /// Returns the lowest atom.
     pub fn lowest(&self) -> f64 {
         self.atoms.first().copied().unwrap_or_default()
     }
 
-    /// The highest atom.
+    /// Returns the highest atom.
     pub fn highest(&self) -> f64 {
         self.atoms.last().copied().unwrap_or_default()
     }
 
-    /// What a support around it is found from.
+    /// Returns the extent from which a support around the centre is computed.
     pub fn extent(&self) -> Extent {
         Extent { ends: [self.lowest(), self.highest()], mean: self.mean(), variance: self.variance() }
     }
 
-    /// Per step, as the variance.
+    /// Returns the mean, per step as the variance.
     pub fn mean(&self) -> f64 {
         self.atoms.iter().zip(&self.masses).map(|(atom, mass)| atom * mass).sum()
     }
 
-    /// Per step.
+    /// Returns the variance, per step.
     pub fn variance(&self) -> f64 {
         let mean = self.mean();
         self.atoms.iter().zip(&self.masses).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum()

@@ -1,4 +1,5 @@
-//! The correction of simulated radii: that of the history becomes exact, and what paths have in common goes out of all others.
+//! The correction of simulated radii: that of the history becomes exact, and the paths' common error is removed from
+//! all others.
 
 use super::radius::RadiusEstimator;
 use crate::control::request::radius_rule::RadiusRule;
@@ -6,8 +7,9 @@ use crate::control::request::rules::RADIUS_CORRECTION;
 use crate::numerics::gap_places::Statistic;
 
 impl RadiusEstimator {
-    /// By what simulated quantiles are to be multiplied so that that of the history is exact, where no calibration makes good what
-    /// they are off. Cost: that of the law of the statistic, 25 ms at 240 returns and 0.13 s at 1,024.
+    /// Returns the factor on simulated quantiles that makes the one of the history exact. `None` under a calibration,
+    /// which already removes their error. Cost: that of the law of the statistic, 25 ms at 240 returns and 0.13 s at
+    /// 1,024.
     ///
     /// Checked by: `a_corrected_radius_is_exact_and_stays_near_as_returns_are_learned`.
     pub fn found_correction(&self) -> Option<f64> {
@@ -19,7 +21,8 @@ impl RadiusEstimator {
         }
     }
 
-    /// What simulated quantiles of one size are off, paths have in common, and so do quantiles of laws alike.
+    /// Returns the correction. Paths have the error of simulated quantiles of one size in common, and so do quantiles
+    /// of similar laws.
     fn correction(&self, alpha: f64, paths: usize) -> f64 {
         let bridges = self.bridges(self.learned.sample_size(), paths);
         let simulated = bridges.bridge_quantile(&self.learned, Statistic::Now, alpha);
@@ -27,7 +30,7 @@ impl RadiusEstimator {
         if simulated > 0.0 { (exact() / simulated).clamp(RADIUS_CORRECTION.0, RADIUS_CORRECTION.1) } else { 1.0 }
     }
 
-    /// The correction at any miscoverage, of a rule that was corrected at its own.
+    /// Returns the correction at any miscoverage, for a rule that was corrected at its own.
     pub(super) fn correction_at(&self, alpha: f64, paths: usize) -> f64 {
         match self.rule {
             RadiusRule::Bridge { alpha: own, correction: Some(known), .. } if alpha == own => known,
@@ -55,7 +58,7 @@ mod tests {
         let mut generator = stream(4, "radius", 0, 0);
         let mut apart = Vec::new();
         for count in [24, 60, 120, 240, 600, 1100] {
-            // Returns of a fat tail, as a record has; five years more are learned.
+            // Returns with a fat tail, as a record has; five more years are learned.
             let mut draw = || {
                 let [normal, spread]: [f64; 2] = std::array::from_fn(|_| generator.sample(StandardNormal));
                 0.04 * normal * (0.5 * spread).exp()
@@ -85,8 +88,8 @@ mod tests {
             }
         }
         apart.sort_by(f64::total_cmp);
-        // Not corrected, they would be off by a standard error of 1.3 %: a median of 0.9 %, and 3 % at most in thirty. A record of two
-        // years that learns five more is another law.
+        // Uncorrected, they would be off by a standard error of 1.3 %: a median of 0.9 %, and 3 % at most in thirty. A
+        // record of two years that learns five more has a different law.
         println!("{apart:?}");
         assert!(apart[apart.len() / 2] < 0.004 && apart[apart.len() - 1] < 0.02, "{apart:?}");
     }

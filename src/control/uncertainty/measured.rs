@@ -1,19 +1,19 @@
-//! Laws of the states of a design, summed up once for several trainings: they follow from the history, the seed and the number
-//! of steps, whatever the level, and radii of one law at several levels follow from the same simulated paths.
+//! Laws of the states of a design, summed up once for several trainings. They follow from the history, the seed and the
+//! number of steps, at any level, and radii of one law at several levels follow from the same simulated paths.
 
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// A step and some states of it.
+/// A step and some of its states.
 pub type Part = (usize, Range<usize>);
 
-/// Something at each level of a state, state by state, once it is found.
+/// A value at each level of a state, state by state, once it is computed.
 type AtLevels<T> = Arc<OnceLock<Vec<Vec<T>>>>;
 
-/// What trainings of one history, horizon, design and seed sum up in common; the default is for a training by itself.
+/// The shared summaries of trainings with one history, horizon, design and seed; the default is for a single training.
 pub struct Measured<T> {
-    /// Their levels.
+    /// Levels of the trainings.
     alphas: Vec<f64>,
     known: Mutex<HashMap<Part, AtLevels<T>>>,
 }
@@ -25,13 +25,14 @@ impl<T> Default for Measured<T> {
 }
 
 impl<T: Copy> Measured<T> {
-    /// For trainings at these levels.
+    /// Shares the summaries among trainings at these levels.
     pub fn at(alphas: Vec<f64>) -> Self {
         Measured { alphas, known: Mutex::default() }
     }
 
-    /// What `measure` finds at level `alpha` of the states of a part, state by state; the same to the last bit whoever else
-    /// asks. Trainings at one of several levels find those of all.
+    /// Returns the result of `measure` at level `alpha` for the states of a part, state by state. The result is the
+    /// same to the last bit for any set of sharing trainings. A training at one of several levels computes those of
+    /// all.
     pub fn level(&self, alpha: f64, part: Part, measure: impl FnOnce(&[f64]) -> Vec<Vec<T>>) -> Vec<T> {
         let level = self.alphas.iter().position(|other| *other == alpha).filter(|_| self.alphas.len() > 1);
         let Some(level) = level else { return measure(&[alpha]).concat() };

@@ -2,7 +2,7 @@
 //!
 //!   C = { F : W1(F, centre) <= radius }        paper (2.5)
 //!
-//! or, where returns are taken as normal, the joint confidence region of mean and variance.
+//! or, if returns are assumed normal, the joint confidence region of mean and variance.
 
 pub mod centre;
 mod correction;
@@ -13,22 +13,22 @@ use self::centre::Centre;
 use crate::control::request::support::{Interval, Support};
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 
-/// Log-returns closer than this are one.
+/// Log-returns closer than this count as equal.
 pub const COINCIDENT: f64 = 1e-12;
 /// Exact returns across the atoms of a centre: intervals of a sixteenth, between which local cubics are good to 3e-7.
 const CORE_RETURNS: usize = 16;
-/// Atoms may all but coincide: exact returns lie no closer than a hundredth of a percent.
+/// Least distance of exact returns, a hundredth of a percent, because atoms may almost coincide.
 const SMALLEST_SPACING: f64 = 1e-4;
-/// Spacing of exact returns around an estimated mean, in estimated standard deviations, and how far that goes.
+/// Spacing of exact returns around an estimated mean, in estimated standard deviations, and the range of that spacing.
 const CORE_SPACING: f64 = 0.25;
 const CORE_REACH: f64 = 5.0;
-/// Ratio by which the spacing grows outside: what the field does there is smoother, and weighs less.
+/// Ratio by which the spacing grows outside, where the field is smoother and weighs less.
 const TAIL_RATIO: f64 = 1.4;
 
 /// The laws that the investor is robust against in one state.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UncertaintySet {
-    /// One law, taken as true.
+    /// One law, assumed to be true.
     Point(Centre),
     /// The laws within a Wasserstein distance of the centre.
     Ball {
@@ -36,7 +36,7 @@ pub enum UncertaintySet {
         centre: Centre,
         /// In log-return, positive.
         radius: f64,
-        /// Log-returns that laws may give mass to; all where there is none.
+        /// Log-returns that laws may give mass to; `None` allows all.
         support: Option<Interval>,
     },
     /// The normal laws that the estimates do not reject.
@@ -51,17 +51,17 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Enough for monthly returns; the certificate of the step says where it is not.
+    /// Enough for monthly returns; the certificate of the step shows if it is not.
     pub const FIRST: Reach = Reach { below: 0.6, above: 0.3 };
 
-    /// Twice as far both ways.
+    /// Returns twice the reach both ways.
     pub fn doubled(self) -> Self {
         Reach { below: 2.0 * self.below, above: 2.0 * self.above }
     }
 }
 
 impl UncertaintySet {
-    /// The ball around `centre` on the support that the rule has there; the centre alone without a radius.
+    /// Returns the ball around `centre` on the support that the rule has there; the centre alone without a radius.
     pub fn around(centre: Centre, radius: f64, support: Support) -> Self {
         if radius > 0.0 {
             let support = support.around(|| centre.extent());
@@ -71,7 +71,7 @@ impl UncertaintySet {
         }
     }
 
-    /// The set of the same centre with another radius, in the same unit.
+    /// Returns the set of the same centre with another radius, in the same unit.
     pub fn with_radius(self, radius: f64, support: Support) -> Self {
         match self {
             UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => {
@@ -81,7 +81,7 @@ impl UncertaintySet {
         }
     }
 
-    /// Variance of the law in the middle, per step.
+    /// Returns the variance of the law in the middle, per step.
     pub fn variance(&self) -> f64 {
         match self {
             UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => centre.variance(),
@@ -89,7 +89,7 @@ impl UncertaintySet {
         }
     }
 
-    /// The best log-return of the law in the middle; of a normal law, the log of the mean of e^Z.
+    /// Returns the best log-return of the law in the middle; of a normal law, the log of the mean of e^Z.
     pub fn best_return(&self) -> f64 {
         match self {
             UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => centre.highest(),
@@ -97,13 +97,13 @@ impl UncertaintySet {
         }
     }
 
-    /// True where the window of returns is a choice: a ball on the whole line.
+    /// Returns true if the window of returns is a choice: for a ball on the whole line.
     pub fn has_window(&self) -> bool {
         matches!(self, UncertaintySet::Ball { support: None, .. })
     }
 
-    /// Returns at which the value of the next state must be exact, ascending and distinct: evenly across what is likely,
-    /// then with growing gaps as far as the adversary goes.
+    /// Returns the returns at which the value of the next state must be exact, ascending and distinct: evenly over the
+    /// likely range, then with growing gaps as far as the adversary goes.
     pub fn exact_returns(&self, reach: Reach) -> Vec<f64> {
         match self {
             UncertaintySet::Point(centre) => core_returns(centre.lowest(), centre.highest()).0,
@@ -113,13 +113,13 @@ impl UncertaintySet {
     }
 }
 
-/// Evenly from the lowest to the highest atom, and the spacing.
+/// Returns even points from the lowest to the highest atom, and their spacing.
 fn core_returns(lowest: f64, highest: f64) -> (Vec<f64>, f64) {
     let gap = ((highest - lowest) / CORE_RETURNS as f64).max(SMALLEST_SPACING);
     ((0..=CORE_RETURNS).map(|index| lowest + index as f64 * gap).collect(), gap)
 }
 
-/// The returns after `start`, as long as `next` has one for the return before and the gap, which grows.
+/// Returns the returns after `start`, as long as `next` gives one for the return before and the gap, which grows.
 fn tail(start: f64, mut gap: f64, next: impl Fn(f64, f64) -> Option<f64>) -> Vec<f64> {
     let mut returns = Vec::new();
     let mut at = start;
@@ -150,7 +150,7 @@ fn ball_returns(centre: &Centre, support: Option<Interval>, reach: Reach) -> Vec
     returns
 }
 
-/// As far as any law of the region has nodes.
+/// Returns exact returns as far as any law of the region has nodes.
 fn region_returns(region: &ConfidenceRegion) -> Vec<f64> {
     let NormalLaw { mean, variance } = region.estimate;
     let gap = CORE_SPACING * variance.sqrt();

@@ -17,36 +17,36 @@ use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::gap_places::Statistic;
 
-/// Where the oldest return of the last law weighs at least this share of the newest, weights are taken to decay no more than
-/// rounding does: times lie within 1/8000 of i/n, and |B| is read off the bridges of n.
+/// If the oldest return of the last law weighs at least this share of the newest, the decay of weights is treated as
+/// rounding: times lie within 1/8000 of i/n, and |B| is read from the bridges of n.
 const ALL_BUT_EQUAL: f64 = 0.999;
 
-/// Returns at which the radius one return later is found of those at which a value must be exact, at least.
+/// Least number of exact returns at which the radius one return later is computed.
 const LEAST_THINNED: usize = 9;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
-    /// That of the specification, `bridge` in the place of `calibrated`; a radius of 0 where the framework has no uncertainty
-    /// (known law, plug-in).
+    /// The rule of the specification, with `bridge` instead of `calibrated`; a radius of 0 if the framework has no
+    /// uncertainty (known law, plug-in).
     pub(super) rule: RadiusRule,
-    /// Under `calibrated`.
+    /// The calibration, under `calibrated`.
     pub(super) calibration: Option<Calibration>,
     seed: u64,
     /// Sample size at the last step.
     last_size: usize,
-    /// Whether weights decay, more than a little.
+    /// True if weights decay by more than a little.
     decays: bool,
-    /// What the balls are centred on.
+    /// The rule for the centres of the balls.
     centre: CentreSpecification,
-    /// What the history teaches. Most laws of a design share its values.
+    /// The law of the history. Most laws of a design share its values.
     pub(super) learned: EmpiricalDistribution,
-    /// The law of its bridge statistic, once that was asked.
+    /// The law of its bridge statistic, once it is needed.
     pub(super) exact: OnceLock<BridgeLaw>,
-    /// Where the common random numbers are kept.
+    /// The cache of the common random numbers.
     kept: Kept,
 }
 
-/// The factor on the radius that the history asks for, found when a radius is first asked for.
+/// The factor on the radius that the history implies, computed when a radius is first needed.
 pub(super) struct Calibration {
     /// Oldest first.
     history: Vec<f64>,
@@ -57,23 +57,24 @@ pub(super) struct Calibration {
 /// The radius of a law, and the quantile behind it under the rules of the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measure {
-    /// In log-return; of a confidence region, in estimated standard deviations.
+    /// In log-return; for a confidence region, in estimated standard deviations.
     pub radius: f64,
-    /// Absent under other rules than `bridge` and `calibrated`.
+    /// Absent under rules other than `bridge` and `calibrated`.
     pub quantile: Option<f64>,
 }
 
-/// The radius of a law and what it tends to be one return later.
+/// The radius of a law and its expected value one return later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Radii {
-    /// In log-return; of a confidence region, in estimated standard deviations.
+    /// In log-return; for a confidence region, in estimated standard deviations.
     pub radius: f64,
-    /// Of the mean statistic over the laws with one value of this law twice; the radius itself where no step comes after.
+    /// Radius of the mean statistic over the laws with one value of this law twice; the radius itself if no step comes
+    /// after.
     pub radius_ahead: f64,
 }
 
 impl RadiusEstimator {
-    /// Of a completed specification; bridges are kept in `kept`.
+    /// Builds the estimator of a completed specification; `kept` is the cache of bridges.
     pub fn new(specification: &Specification, kept: Kept) -> Self {
         let rule = match specification.problem.framework {
             Framework::KnownLaw | Framework::PlugIn => RadiusRule::Fixed { radius: 0.0 },
@@ -95,23 +96,23 @@ impl RadiusEstimator {
         RadiusEstimator { rule, calibration, seed, last_size, decays, centre, learned, exact: OnceLock::new(), kept }
     }
 
-    /// True where laws of one sample size have different radii.
+    /// Returns true if laws of one sample size have different radii.
     pub fn varies(&self) -> bool {
         matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
     }
 
-    /// The sample size whose bridges serve laws of n returns: all large ones share those of [`GRADED_FROM`], and so do all whose
-    /// weights decay.
+    /// Returns the sample size whose bridges serve laws of n returns: all large ones share those of [`GRADED_FROM`],
+    /// and so do all whose weights decay.
     fn bridged(&self, sample_size: usize) -> usize {
         if self.decays { GRADED_FROM } else { sample_size.min(GRADED_FROM) }
     }
 
-    /// The name of those bridges.
+    /// Returns the cache key of those bridges.
     fn key(&self, sample_size: usize, paths: usize) -> Key {
         Key::Bridges { sample_size: self.bridged(sample_size), paths, seed: self.seed }
     }
 
-    /// Those bridges.
+    /// Returns those bridges, simulated if they are not cached.
     pub(super) fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
         let simulate = || match self.bridged(sample_size) {
             size @ ..GRADED_FROM => AbsoluteBridges::simulate(size, paths, self.seed),
@@ -121,7 +122,7 @@ impl RadiusEstimator {
         self.kept.get_or_make(&self.key(sample_size, paths), bytes, simulate)
     }
 
-    /// Bytes of the largest bridges that a law of `sample_size` values asks for while it learns `steps` more.
+    /// Returns the bytes of the largest bridges that a law of `sample_size` values needs while it learns `steps` more.
     pub fn heaviest(&self, sample_size: usize, steps: usize) -> usize {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
@@ -132,18 +133,19 @@ impl RadiusEstimator {
         }
     }
 
-    /// Whether laws of this size are told what their radius tends to be one return later. Of laws that decay all are, since no size
-    /// is the last of a session that goes on by the first step.
+    /// Returns true if the radius of laws of this size is also estimated one return later. Decaying laws always look
+    /// one step ahead, because a rolling session has no last step.
     fn looks_ahead(&self, sample_size: usize) -> bool {
         self.decays || sample_size < self.last_size
     }
 
-    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where it looks ahead.
+    /// Returns the sizes whose bridges measuring laws of `sample_size` reads: its own, and the next if it looks ahead.
     fn sizes(&self, sample_size: usize) -> impl Iterator<Item = usize> {
         [sample_size, sample_size + 1].into_iter().take(if self.looks_ahead(sample_size) { 2 } else { 1 })
     }
 
-    /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
+    /// Returns how many numbers are read to measure a law of this size, or `None` if its bridges are yet to be
+    /// simulated.
     pub fn cost(&self, sample_size: usize) -> Option<usize> {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
@@ -155,7 +157,7 @@ impl RadiusEstimator {
         }
     }
 
-    /// Simulates what measuring laws of this size takes, where that is yet to be done.
+    /// Simulates what measuring laws of this size needs, if that is yet to be done.
     pub fn prepare(&self, sample_size: usize) {
         if let RadiusRule::Bridge { alpha, paths, scale, .. } = self.rule {
             self.factor(scale, alpha, paths);
@@ -163,7 +165,8 @@ impl RadiusEstimator {
         }
     }
 
-    /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
+    /// Returns the radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of
+    /// `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale, .. } => {
@@ -175,7 +178,7 @@ impl RadiusEstimator {
         }
     }
 
-    /// The rule with what a calibration finds: it gives every law the same radius, and looks at no history.
+    /// Returns the rule with the result of a calibration: it gives every law the same radius, without the history.
     pub fn found_rule(&self) -> RadiusRule {
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale, correction } => {
@@ -185,7 +188,7 @@ impl RadiusEstimator {
         }
     }
 
-    /// `scale`, times what the calibration finds.
+    /// Returns `scale` times the factor of the calibration.
     fn calibrated(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
         let Some(Calibration { history, retention, factor }) = self.calibration.as_ref().filter(|_| scale > 0.0) else {
             return scale;
@@ -194,12 +197,12 @@ impl RadiusEstimator {
         scale * factor.get_or_init(find)
     }
 
-    /// The same times the correction: every radius by the bridge takes it.
+    /// Returns the calibrated scale times the correction, which applies to every radius by the bridge.
     fn factor(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
         self.calibrated(scale, alpha, paths) * self.correction_at(alpha, paths)
     }
 
-    /// The radius of `law` and what it is made of.
+    /// Returns the radius of `law` and its parts.
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
         let size = law.effective_size();
         match self.rule {
@@ -212,7 +215,7 @@ impl RadiusEstimator {
         }
     }
 
-    /// The radius of `law`, which is known, and what it tends to be one return later.
+    /// Returns the known radius of `law` and its expected value one return later.
     pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
@@ -231,8 +234,8 @@ impl RadiusEstimator {
         Radii { radius: known, radius_ahead }
     }
 
-    /// The radii of laws of one size, each at every one of `alphas` in the place of the rule's own, as [`Self::radius`] and
-    /// [`Self::radii`] give them one by one, to 5e-6 of themselves.
+    /// Returns the radii of laws of one size, each at every one of `alphas` instead of the rule's own. They equal those
+    /// of [`Self::radius`] and [`Self::radii`] one by one, to 5e-6 of themselves.
     ///
     /// Checked by: `laws_measured_together_are_measured_as_one_by_one`.
     pub fn radii_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<Radii>> {
@@ -261,15 +264,15 @@ impl RadiusEstimator {
         now.into_iter().enumerate().map(of_law).collect()
     }
 
-    /// The miscoverage of the rule, where laws of one size have different radii by it, which differ between levels in their
-    /// quantiles alone.
+    /// Returns the miscoverage of the rule, if it gives laws of one size different radii that differ between levels in
+    /// their quantiles alone.
     pub fn alpha(&self) -> Option<f64> {
         self.rule.alpha().filter(|_| self.varies() && self.calibration.is_none())
     }
 
-    /// The same for `law` with one more value, for every value in ascending `values`. What a radius loses until one return
-    /// later is found at some of them and read along cubics between: it moves less than the radius does by a factor of the
-    /// sample size.
+    /// Returns the radii of `law` with one more value, for every value in ascending `values`. The change of a radius
+    /// until one return later is computed at some of them and interpolated by cubics: it varies less than the radius
+    /// does by a factor of the sample size.
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
         let [next_size, size_after] = law.effective_sizes_ahead();
@@ -305,7 +308,7 @@ impl RadiusEstimator {
         }
     }
 
-    /// The radius under the rules that look at the effective sample size alone.
+    /// Returns the radius under the rules that use the effective sample size alone.
     fn radius_of_size(&self, size: f64) -> f64 {
         let of_returns = match self.rule {
             RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. } => 0.0,
@@ -321,13 +324,14 @@ impl RadiusEstimator {
         scale * quantile / effective_size.sqrt() * self.centre.share_seen(effective_size)
     }
 
-    /// The radius of the ball around the law of `size` returns seen, of which `radius` is the share of a ball around the centre.
+    /// Converts `radius` of a ball around the centre to the radius of the ball around the law of `size` returns seen,
+    /// of which the former is the share seen.
     pub fn of_returns(&self, radius: f64, size: f64) -> f64 {
         radius / self.centre.share_seen(size)
     }
 }
 
-/// Some of so many indices, the last among them: at least [`LEAST_THINNED`], or all.
+/// Returns some of so many indices, the last among them: at least [`LEAST_THINNED`], or all.
 fn thinned(count: usize) -> Vec<usize> {
     let last = count.saturating_sub(1);
     let every = (last / LEAST_THINNED).max(1);
@@ -354,7 +358,8 @@ mod tests {
 
     #[test]
     fn every_rule_of_the_sample_size_has_its_formula() {
-        // By hand, at n = 5: sqrt(ln(2 / 0.1) / (3 * 5)), 0.4 / sqrt(5), 0.25, sqrt(-2 ln(0.1) / 5), and none where the law is taken as true.
+        // By hand, at n = 5: sqrt(ln(2 / 0.1) / (3 * 5)), 0.4 / sqrt(5), 0.25, sqrt(-2 ln(0.1) / 5), and none if the
+        // law is assumed to be true.
         let rules = [
             ("adaptive", json!({ "rule": "concentration", "alpha": 0.1, "C": 2.0, "c": 3.0 }), 0.446_895_4),
             ("adaptive", json!({ "rule": "root_n", "kappa": 0.4 }), 0.178_885_4),
@@ -388,14 +393,14 @@ mod tests {
         };
         pairs.extend(of(&bridge).into_iter().zip(of(&calibrated)));
         for (plain, scaled) in pairs {
-            // To rounding.
+            // Equal up to rounding.
             assert!((scaled / plain / factor - 1.0).abs() < 1e-12, "{plain} {scaled} {factor}");
         }
     }
 
     #[test]
     fn twice_the_paths_are_twice_the_numbers_read_once_they_are_there() {
-        // Bridges are ready for all of a process: of these numbers of paths no other test asks for any.
+        // Bridges are shared by the whole process; no other test uses these numbers of paths.
         let costs = [370, 740].map(|paths| {
             let sets = estimator("adaptive", json!({ "rule": "bridge", "alpha": 0.1, "paths": paths }));
             assert_eq!(sets.cost(4), None);
