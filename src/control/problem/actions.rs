@@ -1,11 +1,12 @@
-//! The set A of actions: what share of wealth may be held in the risky asset; and the band, in which a policy leaves it.
+//! The set A of actions: the share of wealth that may be held in the risky asset; and the band, the policy's no-trade
+//! region.
 
 use serde::{Deserialize, Serialize};
 
-/// Equal parts of the interval that are tried before a search between the best one's neighbours: robust values are concave
-/// in the action but for the error of the surrogate, whose dents are narrower than an eighth.
+/// Equal parts of the interval that are tried before a search on both sides of the best one. Robust values are concave
+/// in the action except for the error of the surrogate, whose dents are narrower than an eighth.
 const COARSE_ACTIONS: usize = 8;
-/// Falls in a row after which no action further on is tried.
+/// Number of falls in a row after which no further action is tried.
 const FALLS: usize = 2;
 
 /// A closed interval of shares of wealth.
@@ -17,7 +18,7 @@ pub struct ActionInterval {
     pub highest: f64,
 }
 
-/// The policy at one state: a holding within is kept, one outside is brought to the nearer end. Where trading costs nothing
+/// The policy at one state: a holding inside is kept, one outside trades to the nearer end. If trading costs nothing
 /// both ends are the action.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 2]", into = "[f64; 2]")]
@@ -29,13 +30,14 @@ pub struct Band {
 }
 
 impl Band {
-    /// From its ends, or the one action that is both; an upper end below the lower one is moved up to it.
+    /// Builds the band from its ends, or from one action that is both; an upper end below the lower one is moved up to
+    /// it.
     pub fn of(ends: &[f64]) -> Self {
         let [low, high] = [ends.first(), ends.last()].map(|end| end.copied().unwrap_or_default());
         Band { low, high: high.max(low) }
     }
 
-    /// Where a holding is brought to.
+    /// Returns the point of the band to which a holding trades.
     pub fn nearest(self, holding: f64) -> f64 {
         holding.max(self.low).min(self.high)
     }
@@ -54,8 +56,8 @@ impl From<Band> for [f64; 2] {
 }
 
 impl ActionInterval {
-    /// The neighbours of the best of the actions that cut the interval into equal parts. Values rise to the best and fall from
-    /// there, but for dents: one fall is not the end of the search, and two in a row are.
+    /// Returns the two actions on either side of the best of the actions that cut the interval into equal parts. Values
+    /// rise to the best and fall from there, except for dents: one fall does not end the search, two in a row do.
     pub fn bracket(self, value: impl Fn(f64) -> f64) -> (f64, f64) {
         let ActionInterval { lowest, highest } = self;
         let part = (highest - lowest) / COARSE_ACTIONS as f64;
@@ -76,7 +78,7 @@ impl ActionInterval {
 mod tests {
     use super::*;
 
-    /// Wherever the best action of [0.2, 1] lies, and where the value after it dips once below a dent.
+    /// Tries best actions all over [0.2, 1], also with a dent in which the value dips once.
     #[test]
     fn a_bracket_holds_the_best_action() {
         let actions = ActionInterval { lowest: 0.2, highest: 1.0 };

@@ -1,25 +1,28 @@
-//! What becomes of money in a period: the paper's S, with the share held, the cost of changing it, and what is added.
+//! The change of wealth in a period: the paper's S, with the share held, the cost of changing it, and the contribution.
 //!
-//! Who holds the share h and wants a pays `c |a - h|` of wealth x; the return z then moves both, and C is added to the bank:
+//! Changing the share held from h to a costs `c |a - h|` of wealth x; the return z then moves both, and C is added to
+//! the bank:
 //!
 //!   x' = x (1 - c |a - h|) ((1-a)(1+r) + a e^z) + C,     h' = x (1 - c |a - h|) a e^z / x'.
 //!
-//! What is still to come has the present value P, by the bank: `P = (C + P') / (1 + r)`, P' that of the period after and 0 after
-//! the last. With it, total wealth x + P moves as wealth does that nothing is added to, by the share b of it:
+//! Future contributions have the present value P at the bank's rate: `P = (C + P') / (1 + r)`, P' that of the period
+//! after and 0 after the last. Total wealth x + P then moves as wealth without contributions does, with the share b
+//! held:
 //!
-//!   x' + P' = (x + P) ((1 - b)(1+r) + b e^z),   b = a x / (x + P),     where trading costs nothing.
+//!   x' + P' = (x + P) ((1 - b)(1+r) + b e^z),   b = a x / (x + P),     if trading costs nothing.
 //!
-//! The safe policy sells all now: `(x (1 - c h) + P) (1+r)^n` at the horizon is the floor. Where P is negative, and on the way
-//! to what is added late, withdrawals must be paid whatever the asset does: the reserve `D = max(0, (D' - C) / (1 + r))` stays
-//! in the bank, and bounds the actions by `1 - D / (x (1 - c))`.
+//! The safe policy sells all now: `(x (1 - c h) + P) (1+r)^n` at the horizon is the floor. Withdrawals must be paid for
+//! any return of the asset, if P is negative and also before late contributions. So the reserve
+//! `D = max(0, (D' - C) / (1 + r))` stays in the bank, and bounds the actions by `1 - D / (x (1 - c))`.
 //!
-//! The simulator, live sessions and the books of a backtest call these functions; the tables of the robust step hold the same
-//! formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/solver/bellman.rs` compares.
+//! The simulator, live sessions and the accounts of a backtest call these functions. The tables of the robust step hold
+//! the same formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/solver/bellman.rs`
+//! compares.
 
 use crate::control::problem::actions::Band;
 use crate::control::request::specification::ProblemSpecification;
 
-/// Part of what must stay in the bank that a wealth to start from has more at least: at the reserve itself nothing is left to
+/// Least margin of a starting wealth over the reserve, as a share of it. At the reserve itself nothing is left to
 /// decide, and total wealth may be rounding.
 const SPARE: f64 = 0.01;
 
@@ -28,36 +31,36 @@ const SPARE: f64 = 0.01;
 pub struct Dynamics {
     /// r, per step.
     pub rate_per_step: f64,
-    /// c, of the wealth that is moved between bank and asset.
+    /// c, per unit of wealth moved between bank and asset.
     pub trading_cost: f64,
-    /// C, money added at the end of the period; negative where it is withdrawn.
+    /// C, money added at the end of the period; negative if it is withdrawn.
     pub contribution: f64,
     /// P, the present value of this contribution and all later ones, by the bank.
     pub to_come: f64,
-    /// D, what must stay in the bank through the period for it to pay every withdrawal to come.
+    /// D, the wealth that must stay in the bank through the period to pay every future withdrawal.
     pub reserve: f64,
 }
 
-/// A holding brought to an action.
+/// The trade from a holding to an action.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trade {
     /// Share of wealth held afterwards.
     pub action: f64,
-    /// Wealth left, over what selling everything leaves: 1 without a cost.
+    /// Wealth left, over the wealth left by selling everything: 1 without a cost.
     pub kept: f64,
 }
 
-/// Which way a holding is changed.
+/// The direction of a trade.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// `c (a - h)` is paid. Of an action below the holding this is negative, so that what an action is worth has no kink.
+    /// `c (a - h)` is paid. It is negative for an action below the holding, so that the worth of an action has no kink.
     Buying,
     /// `c (h - a)` is paid.
     Selling,
 }
 
 impl Dynamics {
-    /// Of every period of a problem, and of the time after the last, when nothing is to come.
+    /// Returns the dynamics of every period of a problem, and of the time after the last, without future contributions.
     pub fn of(problem: &ProblemSpecification) -> Vec<Self> {
         let mut after = Dynamics::plain(problem.rate_per_step, problem.trading_cost);
         let mut periods = vec![after];
@@ -72,73 +75,78 @@ impl Dynamics {
         periods
     }
 
-    /// Of a period to whose wealth nothing is ever added.
+    /// Returns the dynamics of a period without any contributions.
     pub fn plain(rate_per_step: f64, trading_cost: f64) -> Self {
         Dynamics { rate_per_step, trading_cost, contribution: 0.0, to_come: 0.0, reserve: 0.0 }
     }
 
-    /// What a unit of wealth after trading grows to: `(1-a)(1+r) + a e^z`.
+    /// Returns the growth of a unit of wealth after trading: `(1-a)(1+r) + a e^z`.
     pub fn growth(self, action: f64, log_return: f64) -> f64 {
         (1.0 - action) * (1.0 + self.rate_per_step) + action * log_return.exp()
     }
 
-    /// Wealth after the share `traded` of it was bought and sold, per unit of wealth before: `1 - c |a - h|`.
+    /// Returns the wealth after the share `traded` of it was bought and sold, per unit of wealth before:
+    /// `1 - c |a - h|`.
     pub fn left(self, traded: f64) -> f64 {
         1.0 - self.trading_cost * traded
     }
 
-    /// Wealth after selling everything, per unit of wealth: `1 - c h`.
+    /// Returns the wealth after selling everything, per unit of wealth: `1 - c h`.
     pub fn liquidation(self, holding: f64) -> f64 {
         1.0 - self.trading_cost * holding
     }
 
-    /// S(x, a, z): wealth and the share of it held, after the holding was brought to `action` and held through `log_return`.
+    /// Returns S(x, a, z): wealth and the share of it held, after trading from the holding to `action` and holding it
+    /// through `log_return`.
     pub fn next(self, wealth: f64, holding: f64, action: f64, log_return: f64) -> (f64, f64) {
         self.next_after(wealth, f64::abs(action - holding), action, log_return)
     }
 
-    /// The same after the share `traded` of wealth was bought and sold, which of several assets is more than their total moved.
+    /// Returns S after the share `traded` of wealth was bought and sold. With several assets this exceeds the change of
+    /// their total.
     pub fn next_after(self, wealth: f64, traded: f64, action: f64, log_return: f64) -> (f64, f64) {
         let growth = self.growth(action, log_return);
         let grown = wealth * self.left(traded) * growth;
         let (next, share) = (grown + self.contribution, action * log_return.exp() / growth);
-        // Of what cannot pay for a withdrawal nothing is left, and of what hardly can the asset is sold as well.
+        // If wealth cannot pay for a withdrawal nothing is left; if it hardly can, the asset is sold as well.
         (next, if next > 0.0 { (share * (grown / next)).min(1.0) } else { share })
     }
 
-    /// Total wealth: what selling everything leaves, and what is to come, `x (1 - c h) + P`.
+    /// Returns total wealth: the wealth after selling everything, plus future contributions, `x (1 - c h) + P`.
     pub fn total(self, wealth: f64, holding: f64) -> f64 {
         wealth * self.liquidation(holding) + self.to_come
     }
 
-    /// The share of total wealth that selling everything leaves, `x (1 - c h) / (x (1 - c h) + P)`: 1 where nothing is to come.
+    /// Returns the share of total wealth that is in hand after selling everything, `x (1 - c h) / (x (1 - c h) + P)`: 1
+    /// without future contributions.
     pub fn in_hand(self, wealth: f64, holding: f64) -> f64 {
         wealth * self.liquidation(holding) / self.total(wealth, holding)
     }
 
-    /// Terminal wealth of selling everything and staying in the bank for `steps` steps.
+    /// Returns the terminal wealth of selling everything and staying in the bank for `steps` steps.
     pub fn floor(self, wealth: f64, holding: f64, steps: usize) -> f64 {
         self.total(wealth, holding) * (1.0 + self.rate_per_step).powf(steps as f64)
     }
 
-    /// Wealth that pays for every withdrawal to come, with a hundredth to spare, whatever of it is held and must be sold.
+    /// Returns the wealth that pays for every future withdrawal, with a hundredth to spare, even if all of it is held
+    /// and must be sold.
     pub fn least_wealth(self) -> f64 {
         (1.0 + SPARE) * self.reserve / self.liquidation(1.0)
     }
 
-    /// The highest action up to `highest` that leaves the reserve in the bank, whatever of the holding must be traded:
+    /// Returns the highest action up to `highest` that leaves the reserve in the bank after any trade of the holding:
     /// `1 - D / (x (1 - c))`, and at least 0.
     pub fn highest_action(self, wealth: f64, highest: f64) -> f64 {
         let free = 1.0 - self.reserve / (wealth * self.liquidation(1.0));
         highest.min(free).max(0.0)
     }
 
-    /// The ways in which a holding is worth changing: one where that costs nothing.
+    /// Returns the directions in which a trade may pay: one if trading costs nothing.
     pub fn sides(self) -> &'static [Side] {
         if self.trading_cost > 0.0 { &[Side::Buying, Side::Selling] } else { &[Side::Buying] }
     }
 
-    /// Bringing `holding` to `action`, at the cost of one side.
+    /// Returns the trade from `holding` to `action`, at the cost of one side.
     pub fn trade(self, side: Side, holding: f64, action: f64) -> Trade {
         let change = match side {
             Side::Buying => action - holding,
@@ -147,12 +155,12 @@ impl Dynamics {
         Trade { action, kept: (1.0 - self.trading_cost * change) / self.liquidation(holding) }
     }
 
-    /// Bringing `holding` to `action`, at what it costs.
+    /// Returns the trade from `holding` to `action`, at its true cost.
     pub fn trade_to(self, holding: f64, action: f64) -> Trade {
         self.trade(if action < holding { Side::Selling } else { Side::Buying }, holding, action)
     }
 
-    /// Bringing `holding` to the nearer end of a band; nothing inside it.
+    /// Returns the trade from `holding` to the nearer end of a band; none inside it.
     pub fn trade_into(self, band: Band, holding: f64) -> Trade {
         self.trade_to(holding, band.nearest(holding))
     }
@@ -179,8 +187,8 @@ mod tests {
         assert!((costly().floor(100.0, 0.3, 2) - 99.4 * 1.01 * 1.01).abs() < 1e-12);
     }
 
-    /// The same with 5 added at the end, and 21 withdrawn a year later: 5 / 1.01 - 21 / 1.01^2 = -15.6357... is to come, and
-    /// as much must stay in the bank. The 99.4 that selling leaves pay for both.
+    /// The same period with 5 added at the end, and 21 withdrawn a year later: 5 / 1.01 - 21 / 1.01^2 = -15.6357... is
+    /// to come, and the same amount must stay in the bank. The 99.4 left by selling pay for both.
     #[test]
     fn what_is_added_and_withdrawn_agrees_with_pencil_and_paper() {
         let problem = ProblemSpecification {
@@ -197,13 +205,13 @@ mod tests {
         assert!((periods[1].reserve - 21.0 / 1.01).abs() < 1e-14 && periods[2] == Dynamics::plain(0.01, 0.02));
         let floor = (99.4 * 1.01 + 5.0) * 1.01 - 21.0;
         assert!((periods[0].floor(100.0, 0.3, 2) - floor).abs() < 1e-12);
-        // Of 98, after the dearest trade, the reserve is kept.
+        // Of 98, after the most expensive trade, the reserve is kept.
         let free = periods[0].highest_action(100.0, 1.0);
         assert!((98.0 * (1.0 - free) + to_come).abs() < 1e-12, "{free}");
         assert!(check_bank(&periods, 15.6).unwrap_err().contains("the end of period 2"));
         assert!(check_bank(&periods[1..], 20.7).unwrap_err().contains("the end of period 1"));
         assert_eq!((check_bank(&periods, 15.7), check_bank(&periods[1..], 20.8)), (Ok(()), Ok(())));
-        // Of what cannot pay, and of what can only with the asset itself.
+        // Wealth that cannot pay, and wealth that can only by selling the asset itself.
         assert!(periods[1].next(40.0, 1.0, 1.0, -0.8).0 < 0.0 && periods[1].next(40.0, 1.0, 1.0, -0.8).1 == 1.0);
         assert_eq!(periods[1].next(40.0, 0.9, 0.9, 0.0).1, 1.0);
     }

@@ -1,16 +1,17 @@
-//! Shares of wealth held before trading, at which the value is known where trading costs.
+//! Shares of wealth held before trading, at which the value is known if trading costs.
 //!
-//! The value of a state depends on the share h that is held before trading only through what reaching the band costs: up to
-//! the highest action it is smooth along h but for a bend of the second derivative at either end of the band. It is kept at
-//! even holdings and read between them by the cubic through the four nearest. The error at a bend is below a twentieth of the
-//! jump of the second derivative, 2 c over the width of the band, times the square of the distance. Beyond the highest action,
-//! where a holding may have drifted, what is too much must be sold, and a formula continues it.
+//! The value of a state depends on the share h held before trading only through the cost of reaching the band. Up to
+//! the highest action it is smooth along h, except that the second derivative jumps at either end of the band. It is
+//! stored at even holdings and interpolated by the cubic through the four nearest. The error at an end of the band is
+//! below a twentieth of the jump of the second derivative, 2 c over the width of the band, times the square of the
+//! distance. Beyond the highest action, where a holding may have drifted, the excess must be sold, and a formula
+//! continues the value.
 
 use crate::control::problem::dynamics::Dynamics;
 
-/// Holdings at which the value of a design point is found, where trading costs.
+/// Number of holdings at which the value of a design point is computed, if trading costs.
 pub const HOLDINGS: usize = 17;
-/// The same where one law is all there is, and hundreds of steps may follow each other.
+/// Number of holdings if there is a single law, and hundreds of steps may follow each other.
 pub const HOLDINGS_OF_ONE_LAW: usize = 257;
 
 /// Even holdings from 0 to the highest action, at which a function of the holding is given.
@@ -21,38 +22,41 @@ pub struct Holdings {
 }
 
 impl Holdings {
-    /// Up to the highest action, of `count` values: one for a function that does not depend on the holding, else at least four.
+    /// Takes `count` even holdings up to the highest action: one for a function that does not depend on the holding,
+    /// otherwise at least four.
     pub fn new(count: usize, highest: f64) -> Self {
         Holdings { count, highest }
     }
 
-    /// How many.
+    /// Returns the number of holdings.
     pub fn count(self) -> usize {
         self.count
     }
 
-    /// True where the function depends on the holding.
+    /// Returns true if the function depends on the holding.
     pub fn matter(self) -> bool {
         self.count > 1
     }
 
-    /// The holdings, ascending.
+    /// Returns the holdings, ascending.
     pub fn nodes(self) -> impl Iterator<Item = f64> {
         let last = self.count.saturating_sub(1).max(1) as f64;
         (0..self.count).map(move |index| self.highest * index as f64 / last)
     }
 
-    /// The holding at which the function is read instead of `holding`, which may have drifted beyond the highest action.
+    /// Returns the holding at which the function is evaluated for `holding`, which may have drifted beyond the highest
+    /// action.
     pub fn within(self, holding: f64) -> f64 {
         holding.max(0.0).min(self.highest)
     }
 
-    /// What the floor gain of a holding beyond the highest action is more than that of the highest: what is beyond must be sold,
+    /// Returns the excess of the floor gain of a holding beyond the highest action over that of the highest: the rest
+    /// must be sold,
     ///
     ///   ln(s (1 - c (h - a)) (1 - c a) / (1 - c h) + 1 - s),   a the highest action,
     ///
-    /// s the share of total wealth `in_hand`; good to c^2 where the band ends below a. 0 within, and where the holding does not
-    /// matter.
+    /// s the share of total wealth `in_hand`; good to c^2 if the band ends below a. It is 0 up to the highest action,
+    /// and if the holding does not matter.
     pub fn beyond(self, dynamics: Dynamics, holding: f64, in_hand: f64) -> f64 {
         let highest = self.highest;
         if !self.matter() || holding <= highest {
@@ -63,7 +67,7 @@ impl Holdings {
         (in_hand * kept + (1.0 - in_hand)).ln()
     }
 
-    /// The first of the four values to read at `holding`, and the weights of the cubic through them.
+    /// Returns the index of the first of the four values used at `holding`, and the weights of the cubic through them.
     pub fn cubic(self, holding: f64) -> (usize, [f64; 4]) {
         let position = self.within(holding) / self.highest * (self.count - 1) as f64;
         let first = (position as usize).saturating_sub(1).min(self.count - 4);
@@ -72,7 +76,7 @@ impl Holdings {
         (first, [-t1 * t2 * t3 / 6.0, 0.5 * t * t2 * t3, -0.5 * t * t1 * t3, t * t1 * t2 / 6.0])
     }
 
-    /// The function at `holding`, from its values; of one beyond the highest action that of the highest.
+    /// Returns the function at `holding`, from its values; beyond the highest action, the function at the highest.
     pub fn at(self, values: &[f64], holding: f64) -> f64 {
         if let [only] = values {
             return *only;
@@ -81,7 +85,7 @@ impl Holdings {
         weights.iter().zip(&values[first..]).map(|(weight, value)| weight * value).sum()
     }
 
-    /// The floor gain at `holding`, from its values.
+    /// Returns the floor gain at `holding`, from its values.
     pub fn gain(self, values: &[f64], dynamics: Dynamics, holding: f64, in_hand: f64) -> f64 {
         self.at(values, holding).max(0.0) + self.beyond(dynamics, holding, in_hand)
     }
@@ -95,7 +99,8 @@ mod tests {
         Dynamics::plain(0.0, 0.02)
     }
 
-    /// Of 100, 70 are held and 50 may be: 20 are sold for 19.6. Selling all 70 would leave 98.6, all 50 of a hundred 99.
+    /// Of 100, 70 are held and 50 are allowed: 20 are sold for 19.6. Selling all 70 would leave 98.6, all 50 of a
+    /// hundred 99.
     #[test]
     fn beyond_the_highest_action_the_rest_is_sold() {
         let (of_highest, holdings) = (0.03, Holdings::new(5, 0.5));
@@ -103,7 +108,7 @@ mod tests {
         let expected = of_highest + (99.6_f64 / 100.0 * 99.0 / 98.6).ln();
         let gain = |holding, in_hand| holdings.gain(&values, costly(), holding, in_hand);
         assert!((gain(0.7, 1.0) - expected).abs() < 1e-15 && (gain(0.5, 1.0) - of_highest).abs() < 1e-15);
-        // As much again is to come: 198.6 after selling all, 99.6 / 100 of 99 and 100 after selling 20.
+        // With the same amount still to come: 198.6 after selling all, 99.6 / 100 of 99 and 100 after selling 20.
         let with_more = of_highest + ((99.6_f64 / 100.0 * 99.0 + 100.0) / 198.6).ln();
         assert!((gain(0.7, 98.6 / 198.6) - with_more).abs() < 1e-15);
     }
@@ -121,7 +126,7 @@ mod tests {
         }
     }
 
-    /// The bend of the value at an end of the band: half a parabola of second derivative 1.
+    /// The value at an end of the band behaves as half a parabola of second derivative 1.
     #[test]
     fn a_bend_is_read_to_a_twentieth_of_its_jump_times_the_square_of_the_distance() {
         let (count, mut worst) = (17, 0.0_f64);

@@ -1,5 +1,5 @@
-//! The investor as a controlled problem: wealth alone, with the share held where trading costs, and with money that comes and
-//! goes.
+//! The investor as a controlled problem: wealth alone, with the share held if trading costs, and with contributions and
+//! withdrawals.
 
 use super::actions::ActionInterval;
 use super::controlled::Controlled;
@@ -23,7 +23,7 @@ pub struct Position {
 }
 
 impl Investor {
-    /// Of a completed specification.
+    /// Builds the investor of a completed specification.
     pub fn new(problem: &ProblemSpecification) -> Self {
         Investor { problem: problem.clone(), periods: Dynamics::of(problem) }
     }
@@ -42,7 +42,7 @@ impl Controlled for Investor {
         Position { wealth, holding }
     }
 
-    /// Total wealth where it matters, and the share held where trading costs.
+    /// Returns total wealth if it matters, and the share held if trading costs.
     fn describe(&self, step: usize, state: &Position) -> Vec<f64> {
         let mut described = Vec::new();
         if self.problem.depends_on_wealth() {
@@ -55,7 +55,7 @@ impl Controlled for Investor {
     }
 
     fn baseline(&self, step: usize, state: &Position) -> f64 {
-        // At the horizon nothing is sold any more.
+        // At the horizon nothing more is sold.
         let holding = if step == self.problem.horizon { 0.0 } else { state.holding };
         self.periods[step].floor(state.wealth, holding, self.problem.horizon - step)
     }
@@ -68,7 +68,7 @@ impl Controlled for Investor {
         from * RelativeUtility::new(self.problem.utility, from).inverse(utility).exp()
     }
 
-    /// ln(worth / baseline).
+    /// Returns ln(worth / baseline).
     fn gain(&self, worth: f64, baseline: f64) -> f64 {
         (worth / baseline).ln()
     }

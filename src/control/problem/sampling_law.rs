@@ -1,4 +1,4 @@
-//! The laws that returns are drawn from.
+//! The laws from which returns are drawn.
 
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::sampling_law::{MixtureComponent, SamplingLaw};
@@ -6,7 +6,7 @@ use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::Interval;
 use crate::numerics::law::ContinuousLaw;
 
-/// The law behind a problem's name for it.
+/// Returns the law that a problem specifies.
 pub fn continuous_law(law: &SamplingLaw, problem: &ProblemSpecification) -> ContinuousLaw {
     let ProblemSpecification { history, learning, .. } = problem;
     match law {
@@ -22,7 +22,7 @@ pub fn continuous_law(law: &SamplingLaw, problem: &ProblemSpecification) -> Cont
     }
 }
 
-/// A return the rest of the project accepts: within the support and the limit on log-returns.
+/// Clamps a return to the accepted range: the support and the limit on log-returns.
 pub fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
     let limit = LOG_RETURN;
     let Interval { min, max } = problem.support_rule().given().unwrap_or(Interval { min: -limit, max: limit });

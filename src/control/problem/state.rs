@@ -6,23 +6,23 @@ use crate::control::request::learning::Learning;
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 
-/// What became of a period.
+/// The realised values of a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Realised {
-    /// Share of wealth held in the risky asset through it.
+    /// Share of wealth held in the risky asset through the period.
     pub action: f64,
-    /// z; where it is not known the asset counts as unmoved, and nothing is learned.
+    /// z; if it is not known the asset counts as unmoved, and nothing is learned.
     pub log_return: Option<f64>,
-    /// What the bank paid, where it was not the rate of the problem.
+    /// The rate that the bank paid, if it was not the rate of the problem.
     pub rate: Option<f64>,
-    /// What was added at its end, where that was not the contribution of the problem.
+    /// The money added at its end, if that was not the contribution of the problem.
     pub flow: Option<f64>,
-    /// Share of wealth bought and sold for it, where that is not what the holding was changed by: of several assets.
+    /// Share of wealth bought and sold for it, if it differs from the change of the holding, as with several assets.
     pub traded: Option<f64>,
 }
 
 impl Realised {
-    /// A period as the problem has it.
+    /// Returns a period with the rate, the contribution and the trade of the problem.
     pub fn of(action: f64, log_return: f64) -> Self {
         Realised { action, log_return: Some(log_return), rate: None, flow: None, traded: None }
     }
@@ -33,14 +33,15 @@ impl Realised {
 pub struct State {
     /// x, positive.
     pub wealth: f64,
-    /// h, the share of wealth in the risky asset before trading. It matters where trading costs.
+    /// h, the share of wealth in the risky asset before trading. It matters if trading costs.
     pub holding: f64,
-    /// F^, of the returns seen.
+    /// F^, the law of the returns seen.
     pub law: EmpiricalDistribution,
 }
 
 impl State {
-    /// The state of an investor with `wealth`, all of it in the bank, who has seen `history`, oldest first, and learns so.
+    /// Builds the state of an investor with `wealth`, all of it in the bank, after `history`, oldest first, learned by
+    /// `learning`.
     ///
     /// # Errors
     /// A history or a wealth that breaks its rule, under the names `history` and `wealth`.
@@ -50,17 +51,17 @@ impl State {
         Ok(State { wealth, holding: 0.0, law: learning.law(history) })
     }
 
-    /// The same with the share `holding` of wealth in the risky asset.
+    /// Returns the state with the share `holding` of wealth in the risky asset.
     ///
     /// # Errors
-    /// A holding that is no share.
+    /// A holding that is not a valid share.
     pub fn with_holding(self, holding: f64) -> Result<Self, FieldError> {
         rules::share("holding", holding)?;
         Ok(State { holding, ..self })
     }
 
-    /// G(y, a, z): next wealth and holding after a period of `dynamics` that became `realised`, and the law with the return
-    /// learned.
+    /// Returns G(y, a, z): next wealth and holding after a period of `dynamics` with the values `realised`, and the law
+    /// with the return learned.
     pub fn next_state(&self, dynamics: Dynamics, realised: &Realised) -> State {
         let Realised { action, log_return, rate, flow, traded } = *realised;
         let rate_per_step = rate.unwrap_or(dynamics.rate_per_step);

@@ -1,18 +1,19 @@
 //! Utilities, in units of the all-bank floor.
 //!
-//! A utility enters the Bellman step only up to a positive affine map, so it is taken relative to the terminal
-//! wealth L of all-bank: with `w = ln(x_T / L)`, `u(0) = 0` and `u'(0) = 1`. Rounding is then relative to the gain
-//! the investor cares about, at any wealth and risk aversion.
+//! A utility enters the Bellman step only up to a positive affine map, so it is normalised at the terminal wealth L of
+//! all-bank: with `w = ln(x_T / L)`, `u(0) = 0` and `u'(0) = 1`. Rounding is then relative to the gain that matters to
+//! the investor, at any wealth and risk aversion.
 
 use crate::control::request::specification::UtilitySpecification;
 use crate::numerics::dispatch::dispatched;
 use crate::numerics::elementary::{exp_m1, ln};
 
-/// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
+/// Largest exponent used: exp(600) is finite, and a loss that deep is never chosen.
 const LARGEST_EXPONENT: f64 = 600.0;
 
-/// Whole risk aversions up to this are multiplied out above this wealth: `U(W) = (W - 1) (W^-1 + ... + W^(1-eta)) / (eta - 1)`, which
-/// is `(1 - W^(1-eta)) / (eta - 1)` without what cancels near 1.
+/// Largest whole risk aversion, and smallest wealth, for which powers are multiplied out:
+/// `U(W) = (W - 1) (W^-1 + ... + W^(1-eta)) / (eta - 1)`. This is `(1 - W^(1-eta)) / (eta - 1)` without the
+/// cancellation near 1.
 const MOST_MULTIPLIED: f64 = 16.0;
 const LEAST_MULTIPLIED: f64 = 1e-12;
 
@@ -21,12 +22,12 @@ const LEAST_MULTIPLIED: f64 = 1e-12;
 pub enum RelativeUtility {
     /// `u(w) = (1 - exp(-k (e^w - 1))) / k`, k the risk aversion times the floor.
     Exponential {
-        /// Without unit.
+        /// Dimensionless.
         k: f64,
     },
     /// `u(w) = (e^((1 - eta) w) - 1) / (1 - eta)`, eta the risk aversion.
     Power {
-        /// Without unit, above 1.
+        /// Dimensionless, above 1.
         eta: f64,
     },
     /// `u(w) = w`.
@@ -34,7 +35,7 @@ pub enum RelativeUtility {
 }
 
 impl RelativeUtility {
-    /// The utility seen from a floor of terminal wealth `floor`.
+    /// Builds the utility relative to a floor of terminal wealth `floor`.
     pub fn new(utility: UtilitySpecification, floor: f64) -> Self {
         match utility {
             UtilitySpecification::Exponential { risk_aversion, .. } => {
@@ -45,7 +46,7 @@ impl RelativeUtility {
         }
     }
 
-    /// u(w).
+    /// Returns u(w).
     pub fn value(self, log_gain: f64) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => -(-k * log_gain.exp_m1()).min(LARGEST_EXPONENT).exp_m1() / k,
@@ -54,7 +55,7 @@ impl RelativeUtility {
         }
     }
 
-    /// u(ln(relative_j) + gains_j) for all j, in place of `relative`: wealth over all-bank wealth, positive.
+    /// Returns u(ln(relative_j) + gains_j) for all j, in the vector `relative`: wealth over all-bank wealth, positive.
     pub fn values(self, mut relative: Vec<f64>, gains: &[f64]) -> Vec<f64> {
         dispatched!(match self {
             RelativeUtility::Exponential { k } => {
@@ -80,7 +81,7 @@ impl RelativeUtility {
         relative
     }
 
-    /// The utility and its derivative at relative wealth W = e^w, above 0: U(W) = u(ln W) and U'(W).
+    /// Returns the utility and its derivative at relative wealth W = e^w, above 0: U(W) = u(ln W) and U'(W).
     pub fn at(self, wealth: f64) -> (f64, f64) {
         match self {
             RelativeUtility::Exponential { k } => {
@@ -106,7 +107,7 @@ impl RelativeUtility {
         }
     }
 
-    /// How much a path that ends at this log gain weighs in a mean utility: `W U'(W)`, W relative wealth.
+    /// Returns the weight in a mean utility of a path that ends at this log gain: `W U'(W)`, W relative wealth.
     pub fn weight(self, log_gain: f64) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => (log_gain - k * log_gain.exp_m1()).min(LARGEST_EXPONENT).exp(),
@@ -115,7 +116,7 @@ impl RelativeUtility {
         }
     }
 
-    /// `-W U''(W) / U'(W)`.
+    /// Returns `-W U''(W) / U'(W)`.
     pub fn relative_aversion(self, wealth: f64) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => k * wealth,
@@ -124,7 +125,7 @@ impl RelativeUtility {
         }
     }
 
-    /// The y at which `U'(b + y) y` is largest, b `fixed`; it rises up to there and falls from there on.
+    /// Returns the y at which `U'(b + y) y` is largest, b `fixed`; it rises up to there and falls from there on.
     pub fn steepest(self, fixed: f64) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => 1.0 / k,
@@ -133,7 +134,7 @@ impl RelativeUtility {
         }
     }
 
-    /// What `U'(b + y) y` tends to as y falls to 0, b `fixed`: 0 wherever something is left.
+    /// Returns the limit of `U'(b + y) y` as y falls to 0, b `fixed`: 0 if b is positive.
     pub fn steepness_of_ruin(self, fixed: f64) -> f64 {
         match self {
             RelativeUtility::Log if fixed <= 0.0 => 1.0,
@@ -142,8 +143,8 @@ impl RelativeUtility {
         }
     }
 
-    /// The log gain whose utility is `value`: the log certainty equivalent over the floor; minus infinity where no wealth above 0 has
-    /// so low a utility.
+    /// Returns the log gain whose utility is `value`: the log certainty equivalent over the floor. It is minus infinity
+    /// if no wealth above 0 has so low a utility.
     pub fn inverse(self, value: f64) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => (-(-k * value).ln_1p() / k).max(-1.0).ln_1p(),
@@ -152,7 +153,7 @@ impl RelativeUtility {
         }
     }
 
-    /// The derivative of [`Self::inverse`] at `value`: log gain per unit of utility.
+    /// Returns the derivative of [`Self::inverse`] at `value`: log gain per unit of utility.
     pub fn inverse_slope(self, value: f64) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => 1.0 / ((1.0 - k * value) * (1.0 - (-k * value).ln_1p() / k)),
@@ -161,7 +162,7 @@ impl RelativeUtility {
         }
     }
 
-    /// Relative risk aversion at the floor, `-u''(0) + 1` in log wealth.
+    /// Returns the relative risk aversion at the floor, `-u''(0) + 1` in log wealth.
     pub fn relative_risk_aversion(self) -> f64 {
         match self {
             RelativeUtility::Exponential { k } => k,
@@ -171,7 +172,7 @@ impl RelativeUtility {
     }
 }
 
-/// U(x), as the request defines it.
+/// Returns U(x), as the request defines it.
 pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
     match utility {
         UtilitySpecification::Exponential { risk_aversion, .. } => -(-risk_aversion * wealth).exp_m1() / risk_aversion,
@@ -182,7 +183,7 @@ pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
     }
 }
 
-/// U'(x).
+/// Returns U'(x).
 pub fn marginal_utility(utility: UtilitySpecification, wealth: f64) -> f64 {
     match utility {
         UtilitySpecification::Exponential { risk_aversion, .. } => (-risk_aversion * wealth).exp(),
@@ -191,11 +192,11 @@ pub fn marginal_utility(utility: UtilitySpecification, wealth: f64) -> f64 {
     }
 }
 
-/// U^{-1}(v): the certainty equivalent of the value v.
+/// Returns U^{-1}(v): the certainty equivalent of the value v.
 pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
     match utility {
         UtilitySpecification::Exponential { risk_aversion, .. } => -(-risk_aversion * value).ln_1p() / risk_aversion,
-        // Of unit wealth these are the relative ones.
+        // At unit wealth these are the relative utilities.
         _ => RelativeUtility::new(utility, 1.0).inverse(value).exp(),
     }
 }
@@ -257,7 +258,7 @@ mod tests {
             let relative = RelativeUtility::new(kind, floor);
             for gain in [-1.5, -0.1, 0.0, 0.02, 0.7_f64] {
                 let direct = (utility(kind, floor * gain.exp()) - utility(kind, floor)) / slope;
-                // Power utility cancels from 0.5 to 1e-5: eleven digits are left, of which the test asks eight.
+                // Power utility cancels from 0.5 to 1e-5: eleven digits are left, of which the test checks eight.
                 assert!((relative.value(gain) - direct).abs() < 1e-8 * (1.0 + direct.abs()), "{kind:?} {gain}");
                 assert!((relative.inverse(relative.value(gain)) - gain).abs() < 1e-12);
                 let back = certainty_equivalent(kind, utility(kind, floor * gain.exp()));
