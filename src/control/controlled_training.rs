@@ -1,4 +1,5 @@
-//! Backward induction for any controlled problem: the method of `training`, without what only the investor's problem allows.
+//! Backward induction for any controlled problem: the method of `training`, without the parts that only the investor's
+//! problem allows.
 
 use std::ops::Range;
 
@@ -26,21 +27,23 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
 
-/// A controlled problem with the value of every step but the first, which is solved where it is asked.
+/// A controlled problem with the value of every step but the first, which is solved on request.
 pub struct ControlledPolicy<'a, P> {
     problem: &'a P,
     laws: Problem,
-    /// Of steps 1, 2 and so on.
+    /// Values of steps 1, 2 and so on.
     values: Vec<ControlledValue>,
 }
 
 impl<'a, P: Controlled> ControlledPolicy<'a, P> {
-    /// Trains from `start` on the current rayon pool. The specification says what is known of the noise (framework, horizon,
-    /// history, radius, support, known law), the design and the surrogates; what it says of an investor is not read.
+    /// Trains from `start` on the current rayon pool. The specification gives the information on the noise (framework,
+    /// horizon, history, radius, support, known law), the design and the surrogates; its fields about an investor are
+    /// ignored.
     ///
     /// # Errors
-    /// A specification that breaks a rule, no support for a problem without a floor, a design of resampled laws; a robust step that is not finite; a covariance matrix that stays singular;
-    /// [`TrainError::Stopped`] soon after the stop signal.
+    /// A specification that breaks a rule, no support for a problem without a floor, a design of resampled laws; a
+    /// robust step that is not finite; a covariance matrix that stays singular; [`TrainError::Stopped`] soon after the
+    /// stop signal.
     pub fn train(
         problem: &'a P,
         start: &P::State,
@@ -91,7 +94,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         Ok(ControlledPolicy { problem, laws, values })
     }
 
-    /// Solves the robust step at a state with what is known of the noise by then, against the value of the step after.
+    /// Solves the robust step at a state with the law of the noise known by then, against the value of the step after.
     /// `step` must be below the horizon.
     pub fn solve(&self, step: usize, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
         ControlledStep { problem: self.problem, laws: &self.laws, step, next: self.values.get(step) }.solve(state, law)
@@ -107,7 +110,7 @@ struct Simulated<'a, P: Controlled> {
 }
 
 impl<P: Controlled> Simulated<'_, P> {
-    /// Streams: ("controlled", t, index) for each step.
+    /// Simulates a state and its law. Streams: ("controlled", t, index) for each step.
     fn state(&self, index: usize) -> (P::State, EmpiricalDistribution) {
         let (ControlledStep { problem, laws, .. }, mut state) = (&self.bellman, self.start.clone());
         let mut seen = Vec::with_capacity(self.bellman.step);

@@ -2,26 +2,27 @@
 
 use thiserror::Error;
 
-/// A request field that breaks a rule: which, what it held, what it must be.
+/// A request field that breaks a rule: its path, its value and the rule.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{field} is {value}: {rule}")]
 pub struct FieldError {
     /// Dotted path in the request, as in `problem.history[3]`.
     pub field: String,
-    /// The offending value, rendered as JSON where it is one, shortened where it is long.
+    /// The offending value, rendered as JSON if it is JSON, shortened if it is long.
     pub value: String,
-    /// What the value must be, as a sentence without its subject: "must lie in (0, 1)".
+    /// The rule for the value, as a sentence without its subject: "must lie in (0, 1)".
     pub rule: String,
 }
 
 impl FieldError {
-    /// A field named as in the request, its value, and the rule as a sentence without its subject.
+    /// Builds the error from a field named as in the request, its value, and the rule as a sentence without its
+    /// subject.
     pub fn new(field: impl Into<String>, value: impl std::fmt::Display, rule: impl Into<String>) -> Self {
         FieldError { field: field.into(), value: value.to_string(), rule: rule.into() }
     }
 }
 
-/// Why a training could not go on.
+/// The reason that ended a training.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TrainError {
     /// The request breaks a rule.
@@ -37,7 +38,7 @@ pub enum TrainError {
         step: usize,
         /// `value` or `policy`.
         surrogate: &'static str,
-        /// The last one tried, in squared units of the scaled target.
+        /// The last jitter tried, in squared units of the scaled target.
         jitter: f64,
     },
     /// A robust step has no finite solution.
@@ -56,10 +57,10 @@ pub enum TrainError {
     },
 }
 
-/// Why stored or imported policy bytes are not a policy.
+/// The reason that stored or imported policy bytes are not a policy.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PolicyError {
-    /// The bytes are not a document of the format; what the parser said.
+    /// The bytes are not a document of the format; holds the parser's message.
     #[error("the policy is not valid JSON of its format: {0}")]
     Format(String),
     /// A part of the document breaks a rule.

@@ -1,8 +1,8 @@
-//! How much memory a job or a policy takes, before it is begun.
+//! The memory that a job or a policy takes, estimated before it begins.
 //!
-//! Upper estimates from the sizes in a request alone. Every large thing of a training is in one of a few classes, and
-//! the constants below are what one thing of each takes, found by counting what the allocator was asked for
-//! (`tests/estimates.rs` holds the estimates to it).
+//! Upper estimates from the sizes in a request alone. Every large object of a training is in one of a few classes. The
+//! constants below are the bytes of one object of each class, measured by counting allocator requests
+//! (`tests/estimates.rs` checks the estimates).
 
 use super::assets::advising::FACTOR_PATHS;
 use super::bellman::problem::Problem;
@@ -24,36 +24,37 @@ use crate::numerics::grown_bridges;
 
 /// Bytes of a double.
 const NUMBER: usize = 8;
-/// Square matrices of the order of the design that stand at once while both surrogates are fitted side by side: the kernel,
-/// its inverse, the room to invert in and to factor in, each twice.
+/// Square matrices of the order of the design that exist at once while both surrogates are fitted side by side: the
+/// kernel, its inverse, and the workspaces to invert and to factor, each twice.
 const FIT_MATRICES: usize = 8;
-/// A candidate or a guard, with features, scaled inputs and their headers, without the numbers.
+/// Bytes of a candidate or a guard, with features, scaled inputs and their headers, without the numbers.
 const CANDIDATE_BYTES: usize = 160;
-/// A number of a finished policy: itself, its digits as JSON, and the copies of those that the store is given.
+/// Bytes of a number of a finished policy: itself, its digits as JSON, and the copies of those for the store.
 const POLICY_NUMBER_BYTES: usize = 80;
-/// Statistics over all paths that a thread holds beside those of the states that it measures together.
+/// Statistics over all paths that a thread holds in addition to those of the states that it measures together.
 const STATISTICS: usize = 8;
-/// Numbers a value of the history that a thread holds while it solves a robust step.
+/// Numbers for each value of the history that a thread holds while it solves a robust step.
 const STEP_NUMBERS: usize = 74;
-/// Predictions a function beyond those, where trading costs: at eight trades, while a refined table is made beside the one before.
+/// Predictions for each function beyond the first two, if trading costs: at eight trades, while a refined table is
+/// built next to the last one.
 const TABLES: usize = 16;
 const FUNCTIONS_WITHOUT_COST: usize = 2;
-/// A simulated path: what a strategy came to, and a step as a framework lived it, with the copies that a report sorts.
+/// Bytes of a simulated path: the outcome of a strategy, a step of a framework, and the copies that a report sorts.
 const ENDED_BYTES: usize = 80;
 const LIVED_BYTES: usize = 48;
 const PATH_BYTES: usize = 256;
-/// A period of a strategy's walk-forward: its decision and account, the series that are resampled, and the report with its
-/// digits and the copies that the store is given.
+/// Bytes of a period of a strategy's walk-forward: its decision and account, the series that are resampled, and the
+/// report with its digits and the copies for the store.
 const DECIDED_BYTES: usize = 1024;
-/// A share of wealth in one of several assets: itself, that of the strategy's own mix, and the report with its digits and the
-/// copies that the store is given.
+/// Bytes of a share of wealth in one of several assets: itself, that of the strategy's own mix, and the report with its
+/// digits and the copies for the store.
 const SHARE_BYTES: usize = 160;
-/// Atoms of the law that records are drawn from, beside those of the record.
+/// Atoms of the law from which records are drawn, in addition to those of the record.
 const RESAMPLED_VALUES: usize = 4096;
-/// What any job takes.
+/// Least bytes of any job.
 const LEAST: usize = 8 << 20;
 
-/// Bytes by the field of the request that asks for them.
+/// Bytes by the field of the request that causes them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     parts: Vec<Demand>,
@@ -67,7 +68,7 @@ struct Demand {
 }
 
 impl Footprint {
-    /// That `field`, which holds `value`, asks for so many bytes.
+    /// Builds the footprint of one field, whose value `value` causes so many bytes.
     pub fn of(field: &'static str, value: usize, bytes: usize) -> Self {
         Footprint { parts: vec![Demand { field, value, bytes }] }
     }
@@ -77,7 +78,7 @@ impl Footprint {
         self
     }
 
-    /// Bytes in all.
+    /// Returns the bytes in all.
     pub fn bytes(&self) -> usize {
         self.parts.iter().fold(0, |sum, part| sum.saturating_add(part.bytes))
     }
@@ -86,18 +87,18 @@ impl Footprint {
         self.parts.iter().max_by_key(|part| part.bytes)
     }
 
-    /// The field that asks for most.
+    /// Returns the field that causes most bytes.
     pub fn field(&self) -> &'static str {
         self.most().map_or("", |part| part.field)
     }
 
-    /// What that field holds.
+    /// Returns the value of that field.
     pub fn value(&self) -> usize {
         self.most().map_or(0, |part| part.value)
     }
 }
 
-/// The sizes that a training's memory follows from.
+/// The sizes that determine the memory of a training.
 struct Sizes {
     horizon: usize,
     history: usize,
@@ -113,7 +114,7 @@ struct Sizes {
 }
 
 impl Sizes {
-    /// Of a completed specification.
+    /// Computes the sizes of a completed specification.
     fn of(specification: &Specification) -> Self {
         let problem = &specification.problem;
         let (horizon, history) = (problem.horizon, problem.history.len());
@@ -133,24 +134,24 @@ impl Sizes {
         GaussianProcess::bytes_of(self.count, self.inputs)
     }
 
-    /// Bytes of the finished policy and its documents.
+    /// Returns the bytes of the finished policy and its documents.
     fn policy(&self) -> usize {
         product(&[self.horizon, self.count, self.inputs + self.functions, POLICY_NUMBER_BYTES])
     }
 
-    /// Bytes of the policy made ready to advise.
+    /// Returns the bytes of the policy prepared to advise.
     fn prepared(&self) -> usize {
         bytes_ready(self.horizon, self.horizon.saturating_mul(self.count), self.inputs, self.functions)
     }
 
-    /// Bytes while the surrogates of one step are fitted.
+    /// Returns the bytes while the surrogates of one step are fitted.
     fn fit(&self) -> usize {
         let candidate = 2 * self.inputs * NUMBER + CANDIDATE_BYTES;
         let candidates = product(&[CANDIDATES_PER_POINT * self.count + GUARDS, candidate]);
         product(&[FIT_MATRICES, self.count, self.count, NUMBER]).saturating_add(candidates)
     }
 
-    /// Bytes that threads hold while they solve robust steps.
+    /// Returns the bytes that threads hold while they solve robust steps.
     fn solving(&self, threads: usize) -> usize {
         let tabulated = TABLES * self.functions.saturating_sub(FUNCTIONS_WITHOUT_COST);
         let solved = product(&[threads, self.atoms, (STEP_NUMBERS + tabulated) * NUMBER]);
@@ -162,13 +163,13 @@ impl Sizes {
         statistics.saturating_add(product(&[threads, grown_bridges::table_bytes(self.history, self.horizon)]))
     }
 
-    /// States of a design that a thread measures together.
+    /// Returns how many states of a design a thread measures together.
     fn together(&self) -> usize {
         together(self.history + self.horizon, self.paths).min(CANDIDATES_PER_POINT * self.count)
     }
 }
 
-/// What a training of a completed specification takes on so many threads.
+/// Returns the footprint of a training of a completed specification on so many threads.
 pub fn training(specification: &Specification, threads: usize) -> Footprint {
     let sizes = Sizes::of(specification);
     let solving = sizes.solving(threads).saturating_add(LEAST);
@@ -178,7 +179,7 @@ pub fn training(specification: &Specification, threads: usize) -> Footprint {
         .and("problem.history", sizes.history, solving)
 }
 
-/// Bytes of the cache that such a training should have: the bridges of a sample size and of the next, each at most half.
+/// Returns the bytes of the cache for such a training: the bridges of a sample size and of the next, each at most half.
 pub fn kept_by_training(specification: &Specification) -> usize {
     training_keeps(&Sizes::of(specification))
 }
@@ -187,7 +188,8 @@ fn training_keeps(sizes: &Sizes) -> usize {
     sizes.bridges.saturating_mul(4)
 }
 
-/// What of a policy trained from a completed specification must be kept ready to advise by it.
+/// Returns the footprints of the data that must stay in memory to advise by a policy trained from a completed
+/// specification.
 pub fn advising(specification: &Specification) -> [Footprint; 3] {
     let sizes = Sizes::of(specification);
     [
@@ -197,7 +199,7 @@ pub fn advising(specification: &Specification) -> [Footprint; 3] {
     ]
 }
 
-/// The same of a policy as it is, with the policy itself.
+/// Returns the footprints to advise by a given policy, the policy itself included.
 pub fn advising_by(policy: &Policy) -> [Footprint; 3] {
     let problem = &policy.specification().problem;
     let sizes = Sizes::of(policy.specification());
@@ -214,7 +216,7 @@ pub fn advising_by(policy: &Policy) -> [Footprint; 3] {
     ]
 }
 
-/// What an evaluation of a completed request takes on so many threads.
+/// Returns the footprint of an evaluation of a completed request on so many threads.
 pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
     let trainings = request.frameworks.iter().filter_map(|&framework| {
         let specification = request.specification(framework, None).completed().ok()?;
@@ -235,7 +237,7 @@ pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
         .and("paths", request.paths, outcomes)
 }
 
-/// Bytes of the cache that such an evaluation should have: every path asks for the factors of all steps in turn.
+/// Returns the bytes of the cache for such an evaluation: every path asks for the factors of all steps in turn.
 pub fn kept_by_evaluation(request: &EvaluationRequest) -> usize {
     let followed = request.frameworks.iter().filter_map(|&framework| {
         let sizes = Sizes::of(&request.specification(framework, None).completed().ok()?);
@@ -245,11 +247,12 @@ pub fn kept_by_evaluation(request: &EvaluationRequest) -> usize {
     // Bridges are the same for all frameworks that learn.
     let (factors, bridges) = followed
         .fold((0usize, 0usize), |(factors, bridges), (more, own)| (factors.saturating_add(more), bridges.max(own)));
-    // Room for any of them to be half of all.
+    // Twice the sum, because an entry may take at most half of the cache.
     factors.saturating_add(bridges).saturating_mul(2)
 }
 
-/// What a frontier takes on so many threads: the bridges of its record, and a record of its own with its step for each thread.
+/// Returns the footprint of a frontier on so many threads: the bridges of its record, and for each thread a record of
+/// its own with its step.
 pub fn frontier(question: &FrontierQuestion, threads: usize) -> Footprint {
     let sizes = Sizes::of(&question.fund);
     let values = product(&[question.assets.history.len(), question.assets.assets.len()]);
@@ -262,15 +265,15 @@ pub fn frontier(question: &FrontierQuestion, threads: usize) -> Footprint {
     )
 }
 
-/// Bytes of the cache that a frontier should have: the bridges of its record, at most half.
+/// Returns the bytes of the cache for a frontier: the bridges of its record, at most half.
 pub fn kept_by_frontier(question: &FrontierQuestion) -> usize {
     Sizes::of(&question.fund).bridges.saturating_mul(2)
 }
 
-/// What a walk-forward takes on so many threads.
+/// Returns the footprint of a walk-forward on so many threads.
 pub fn backtest(backtest: &Backtest, threads: usize) -> Footprint {
     let (field, returns) = backtest.request.returns();
-    // Beside the strategies stands a constant mix.
+    // A constant mix is added to the strategies.
     let decided = product(&[returns.len(), backtest.strategies.len() + 1, DECIDED_BYTES]);
     let record = Footprint::of(field, returns.len(), decided.saturating_add(LEAST));
     let Some(sizes) = heaviest(backtest) else { return record };
@@ -284,8 +287,8 @@ pub fn backtest(backtest: &Backtest, threads: usize) -> Footprint {
     )
 }
 
-/// What a walk-forward of several assets, whose returns stand in `field`, takes on so many threads: the books and the report, and
-/// for each thread a record with its bridges and its step.
+/// Returns the footprint of a walk-forward of several assets, whose returns are in `field`, on so many threads: the
+/// accounts and the report, and for each thread a record with its bridges and its step.
 pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, threads: usize) -> Footprint {
     let periods = backtest.record.rows.len();
     let strategies = backtest.strategies().len();
@@ -298,20 +301,20 @@ pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, thread
     Footprint::of(field, periods, record).and("windows", backtest.choices.windows.len(), steps.saturating_add(bridges))
 }
 
-/// Bytes of the cache that such a walk-forward should have.
+/// Returns the bytes of the cache for such a walk-forward.
 pub fn kept_by_backtest(backtest: &Backtest, threads: usize) -> usize {
     let bridges = heaviest(backtest).map_or(0, |sizes| training_keeps(&sizes));
     bridges.saturating_mul(at_once(backtest, threads))
 }
 
-/// The sizes of the training that takes most, which learns and knows the cost.
+/// Returns the sizes of the most expensive training, which learns and knows the cost.
 fn heaviest(backtest: &Backtest) -> Option<Sizes> {
     let past = backtest.periods.get(..backtest.walk.window)?;
     let specification = backtest.walk.specification(Framework::Adaptive, *backtest.request.alpha.first()?, past);
     Some(Sizes::of(&specification.completed().ok()?))
 }
 
-/// Trainings of a stretch that run side by side.
+/// Returns how many trainings of one policy tenure run side by side.
 fn at_once(backtest: &Backtest, threads: usize) -> usize {
     let trained = backtest.strategies.iter().filter(|(_, strategy)| strategy.is_trained()).count();
     threads.min(trained).max(1)

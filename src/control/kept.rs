@@ -1,9 +1,10 @@
-//! What is kept ready, weighed in bytes: bridges, factors, levels of caution and prepared policies share one bound.
+//! The cache, bounded in bytes: bridges, factors, levels of caution and prepared policies share one bound.
 //!
-//! Everything here can be made again to the same bits from its [`Key`], so dropping it costs time and nothing else.
-//! Bridges depend on sample size, number of paths and seed alone, and a factor on its design and scales alone: policies
-//! that ask for the same share it. Who asks for what another is making waits for that one. What is being made counts
-//! as well, against a bound of its own, because making many large things at once takes as much as keeping them.
+//! Every entry can be computed again to the same bits from its [`Key`], so dropping it costs time and nothing else.
+//! Bridges depend on sample size, number of paths and seed alone, and a factor on its design and scales alone, so
+//! policies that need equal ones share them. A caller that needs an entry which another is computing waits for that
+//! one. Entries being computed also count, against a bound of their own, because computing many large ones at once
+//! takes as much memory as keeping them.
 
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -13,35 +14,35 @@ use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
 use quick_cache::sync::{Cache, DefaultLifecycle, GuardResult};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 
-/// What callers without a budget of their own share: twice the factor of the largest design.
+/// Bytes shared by callers without a budget of their own: twice the factor of the largest design.
 const SHARED_BYTES: usize = 2 << 30;
-/// Things that a cache is laid out for, as an order of magnitude.
+/// Number of entries that a cache is laid out for, as an order of magnitude.
 const THINGS: usize = 1000;
-/// Share of the bytes that what was asked for again may hold; the rest is for what is new. Nothing heavier is kept.
+/// Share of the bytes for entries requested again; the rest is for new entries. No heavier entry is kept.
 const PROVEN_SHARE: f64 = 0.5;
 
-/// What a thing is, and all that it depends on.
+/// The kind of an entry, and all that it depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Key {
     /// Simulated paths of Brownian bridges.
     Bridges {
-        /// Of the laws they are for; all large sizes share one.
+        /// Sample size of the laws they are for; all large sizes share one.
         sample_size: usize,
-        /// How many.
+        /// Number of paths.
         paths: usize,
-        /// Of the specification.
+        /// Seed of the specification.
         seed: u64,
     },
-    /// The factor behind a predicted deviation, by the hash of what it is made of.
+    /// The factor behind a predicted deviation, by the hash of its inputs.
     Factor([u8; 32]),
-    /// The levels of caution of a record, by the hash of all that they are found from.
+    /// The levels of caution of a record, by the hash of their inputs.
     Levels([u8; 32]),
-    /// A prepared policy, by the name its owner knows it under.
+    /// A prepared policy, by its owner's name for it.
     Policy(Arc<str>),
 }
 
 impl Key {
-    /// The part of memory it counts to.
+    /// Returns the part of memory that the key counts towards.
     fn part(&self) -> Part {
         match self {
             Key::Bridges { .. } => Part::Bridges,
@@ -52,7 +53,7 @@ impl Key {
     }
 }
 
-/// The parts of what is kept.
+/// The parts of the cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
     /// Simulated paths.
@@ -70,7 +71,7 @@ impl Part {
     pub const ALL: [Part; 4] = [Part::Bridges, Part::Factors, Part::Levels, Part::Policies];
 }
 
-/// A thing and what it weighs.
+/// An entry and its bytes.
 #[derive(Clone)]
 struct Thing {
     value: Arc<dyn Any + Send + Sync>,
@@ -82,7 +83,7 @@ struct Bytes;
 
 impl Weighter<Key, Thing> for Bytes {
     fn weight(&self, _: &Key, thing: &Thing) -> u64 {
-        // Zero would never be dropped.
+        // An entry of weight zero would never be dropped.
         thing.bytes.max(1) as u64
     }
 }
@@ -94,7 +95,7 @@ pub struct Kept(Arc<Shelf>);
 struct Shelf {
     things: Cache<Key, Thing, Bytes>,
     heaviest: usize,
-    /// Bytes of what is being made, and who waits for them to become fewer.
+    /// Bytes being computed; `made` wakes callers that wait for them to fall.
     making: Mutex<usize>,
     made: Condvar,
 }
@@ -107,43 +108,43 @@ impl Default for Kept {
 }
 
 impl Kept {
-    /// Keeps at most `bytes`, and makes at most half of that at a time beside it.
+    /// Creates a cache of at most `bytes`; computations use at most half of that at a time in addition.
     pub fn new(bytes: usize) -> Self {
         let options = OptionsBuilder::new()
             .estimated_items_capacity(THINGS)
             .weight_capacity(bytes as u64)
             .hot_allocation(PROVEN_SHARE)
-            // Parts of a bound that is shared out would each be too small for the heaviest things.
+            // With several shards, each part of the bound would be too small for the heaviest entries.
             .shards(1)
             .build();
         let things = match options {
             Ok(options) => {
                 Cache::with_options(options, Bytes, DefaultHashBuilder::default(), DefaultLifecycle::default())
             }
-            // Nothing above leaves out what is required.
+            // Cannot happen: every required option is set above.
             Err(_) => Cache::with_weighter(THINGS, bytes as u64, Bytes),
         };
         let heaviest = (bytes as f64 * PROVEN_SHARE) as usize;
         Kept(Arc::new(Shelf { things, heaviest, making: Mutex::new(0), made: Condvar::new() }))
     }
 
-    /// What is heavier is made anew whenever it is asked for.
+    /// Returns the largest bytes of an entry that is kept. Anything heavier is computed on every request.
     pub fn heaviest(&self) -> usize {
         self.0.heaviest
     }
 
-    /// Whether it could be had at once.
+    /// Returns true if the entry is available at once.
     pub fn has(&self, key: &Key) -> bool {
         self.0.things.contains_key(key)
     }
 
-    /// The thing of this key, if it is here.
+    /// Returns the entry of this key, if it is cached.
     pub fn get<T: Any + Send + Sync>(&self, key: &Key) -> Option<Arc<T>> {
         self.0.things.get(key)?.value.downcast().ok()
     }
 
-    /// The thing of this key, made where it is not here. `bytes` is what it weighs, and what making it takes. What is
-    /// made may not ask for anything kept.
+    /// Returns the entry of this key, computed if it is not cached. `bytes` is its weight, and the memory that
+    /// computing it takes. `make` may not ask for anything from the cache.
     pub fn get_or_make<T: Any + Send + Sync>(&self, key: &Key, bytes: usize, make: impl FnOnce() -> T) -> Arc<T> {
         match self.0.things.get_value_or_guard(key, None) {
             GuardResult::Value(thing) => {
@@ -154,20 +155,20 @@ impl Kept {
             GuardResult::Guard(place) => {
                 let _room = self.room(bytes);
                 let value = Arc::new(make());
-                // Refused only where the key was forgotten meanwhile.
+                // Refused only if the key was forgotten meanwhile.
                 let _ = place.insert(Thing { value: value.clone(), bytes });
                 return value;
             }
-            // Nothing waits for a limited time.
+            // Cannot happen: no wait has a time limit.
             GuardResult::Timeout => {}
         }
         Arc::new(make())
     }
 
-    /// The thing of this key, prepared where it is not here; who else asks for it meanwhile waits.
+    /// Returns the entry of this key, prepared if it is not cached; other callers of the key wait meanwhile.
     ///
     /// # Errors
-    /// What preparing it fails with.
+    /// The error of `prepare`.
     pub async fn get_or_prepare<T: Any + Send + Sync, E>(
         &self,
         key: &Key,
@@ -189,12 +190,12 @@ impl Kept {
         Ok(Arc::new(prepare.await?))
     }
 
-    /// Drops what is kept under the key, if anything is.
+    /// Drops the entry of the key, if there is one.
     pub fn forget(&self, key: &Key) {
         self.0.things.remove(key);
     }
 
-    /// Bytes of each part.
+    /// Returns the bytes of each part.
     pub fn bytes(&self) -> BTreeMap<Part, usize> {
         let mut parts: BTreeMap<Part, usize> = Part::ALL.map(|part| (part, 0)).into();
         for (key, thing) in self.0.things.iter() {
@@ -203,7 +204,7 @@ impl Kept {
         parts
     }
 
-    /// Waits until what is being made leaves room for so much more, or nothing is.
+    /// Waits until computations in progress leave `bytes` free, or there are none.
     fn room(&self, bytes: usize) -> Room<'_> {
         let shelf = &*self.0;
         let making = shelf.making.lock().unwrap_or_else(PoisonError::into_inner);
@@ -214,7 +215,7 @@ impl Kept {
     }
 }
 
-/// Bytes under way; given back when dropped, a panic included.
+/// Bytes of a computation in progress; released when dropped, also in a panic.
 struct Room<'a> {
     shelf: &'a Shelf,
     bytes: usize,

@@ -1,14 +1,15 @@
-//! Floor 1: nonparametric adaptive robust control (the paper), a folder a section.
+//! Floor 1: nonparametric adaptive robust control (the paper), with one folder for each section.
 //!
-//! An investor with wealth x has seen returns with empirical law F^. He holds the share a of his wealth in a risky asset
-//! through a return z that the law of the next state learns, and is robust against every law in a set around F^:
+//! An investor with wealth x has seen returns with empirical law F^. They hold the share a of their wealth in a risky
+//! asset through a return z, which is added to the law of the next state. The decision is robust against every law in a
+//! set around F^:
 //!
 //!   V_t(x, F^) = max_a  min_{F in C_t(F^)}  E_F[ V_(t+1)( S(x, a, Z), R(F^, Z) ) ],   V_T the utility of wealth.
 //!
-//! Folders from the lowest to the highest: `request` (what may be asked), `problem` (state, dynamics, utility),
-//! `uncertainty` (the set C), `assets` (one step with several assets), `surrogate` (what regresses V and the action), `bellman`
-//! (one step), `caution` (what share of the radius is acted on), `training` (all of them),
-//! `policy` (the document and how it answers), `evaluation` (strategies compared).
+//! Folders from the lowest to the highest: `request` (the requests accepted), `problem` (state, dynamics, utility),
+//! `uncertainty` (the set C), `assets` (one step with several assets), `surrogate` (the regressions of V and the
+//! action), `bellman` (one step), `caution` (the share of the radius that is used), `training` (all of them), `policy`
+//! (the document and its advice), `evaluation` (strategies compared).
 //!
 //! | paper | name | printed as | file | checked by |
 //! |---|---|---|---|---|
@@ -34,20 +35,22 @@
 //! | steps 1 to 6 | `Training` | 3.1 | `control/training.rs` | `tests/solver/control.rs::whole_horizons_agree_with_nested_grids` |
 //! | V-hat_0, N' | `Evaluation` | 3.1 | `control/evaluation/paths.rs` | `tests/solver/evaluate.rs::a_simulated_path_is_the_advisor_s_own` |
 //!
-//! The face of the floor, which is what `store`, `service` and `http` may name (a test reads `src` and checks):
+//! The interface of the floor, which `store`, `service` and `http` may name (a test reads `src` and checks):
 //!
-//! - `request`, `error`: a request comes in, and a field of it may be refused;
-//! - `training`, `progress`, `solved_step`: it is solved step by step, with what a step reports and leaves behind;
+//! - `request`, `error`: a request comes in, and one of its fields may be rejected;
+//! - `training`, `progress`, `solved_step`: it is solved step by step, with the progress and the result of each step;
 //!   `controlled_training` does so for any controlled problem, and no higher floor needs it;
 //! - `policy`, `problem`: the document answers in a state;
 //! - `evaluation`: strategies are compared;
-//! - `estimate`, `kept`, `pool`: what work costs, and the memory and threads that its caller lends.
+//! - `estimate`, `kept`, `pool`: the cost of work, and the memory and threads that its caller lends.
 //!
-//! The method itself stays behind it: how a step is solved (`bellman`, `uncertainty`, `surrogate`) may change without a
-//! higher floor noticing. The binary measures the method's parts one by one (`bench`), so they are public to it. Everything
-//! has one path, the one where it is written; only a policy's document is named by its room.
+//! The method itself stays behind this interface: the solution of a step (`bellman`, `uncertainty`, `surrogate`) may
+//! change without any change in a higher floor. The binary measures the parts of the method one by one (`bench`), so
+//! they are public to it. Everything has one path, the one of its file; only a policy's document is named by its
+//! folder.
 //!
-//! Not the paper's: the floor gain that stands for V (`problem::utility`), radius rules other than (2.5) and (2.7), and the
+//! Not from the paper: the floor gain that represents V (`problem::utility`), radius rules other than (2.5) and (2.7),
+//! and the
 //! parametric frameworks (`bellman::normal`).
 
 pub mod assets;

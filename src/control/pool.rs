@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use crate::numerics::interruption;
 
-/// A pool of threads that give way to every other; work installed on it is spread over them.
+/// A pool of lowest-priority threads; work installed on it is spread over them.
 pub struct TrainingPool(rayon::ThreadPool);
 
 /// The threads could not be started.
@@ -17,6 +17,8 @@ pub struct PoolError {
 }
 
 impl TrainingPool {
+    /// Starts the threads.
+    ///
     /// # Errors
     /// The system gives no more threads.
     pub fn new(threads: usize) -> Result<Self, PoolError> {
@@ -35,11 +37,11 @@ impl TrainingPool {
     }
 }
 
-/// The lowest of priorities, 19 by `nice`, for the calling thread: a training takes what others leave of a core, and whoever
-/// waits for an answer waits no longer because of it.
+/// Sets the lowest priority, 19 by `nice`, for the calling thread. A training uses only idle core time, and delays no
+/// request.
 fn give_way() {
-    // Linux has priorities of threads, elsewhere this would be the whole process. Where it is refused, training is only as
-    // important as all else.
+    // On Linux threads have priorities; elsewhere this would apply to the whole process. If the system refuses,
+    // training runs at normal priority.
     if cfg!(target_os = "linux") {
         let _ = rustix::process::setpriority_process(None, LOWEST_PRIORITY);
     }
@@ -47,10 +49,11 @@ fn give_way() {
 
 const LOWEST_PRIORITY: i32 = 19;
 
-/// Items that each thread has of a watched map between two checkpoints.
+/// Number of items for each thread between two checkpoints of a watched map.
 const ITEMS_BETWEEN: usize = 2;
 
-/// `work` done on every item, in their order, on the pool this is called from. Watched work passes a checkpoint every few items.
+/// Applies `work` to every item, in order, on the pool this is called from. Watched work passes a checkpoint every few
+/// items.
 pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
     let carried = interruption::carried();
     if !carried.is_watched() {
@@ -65,7 +68,7 @@ pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send)
     done
 }
 
-/// Both parts, beside each other on the pool this is called from.
+/// Runs both parts in parallel on the pool this is called from.
 pub fn join<A: Send, B: Send>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B + Send) -> (A, B) {
     let carried = interruption::carried();
     rayon::join(|| carried.within(one), || carried.within(other))

@@ -1,4 +1,4 @@
-//! What long work tells while it runs, and how it is asked to stop.
+//! The progress that long work reports, and its stop signal.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -6,34 +6,36 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::error::TrainError;
 
-/// What a running step may be asked and told: the stop signal, and a callback for progress.
+/// The watch on a running step: the stop signal, and a callback for progress.
 pub struct Watch<'a> {
     /// Raised to stop the work.
     pub stop: &'a AtomicBool,
-    /// Hears how far the work is, from any thread.
+    /// Called with the progress, from any thread.
     pub progress: &'a (dyn Fn(StepProgress) + Sync),
 }
 
 impl Watch<'_> {
-    /// Never stopped, and told to nobody.
+    /// Returns a watch that never stops the work and ignores its progress.
     pub fn unwatched() -> Watch<'static> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Watch { stop: &NEVER, progress: &|_| {} }
     }
 
+    /// Checks the stop signal.
+    ///
     /// # Errors
-    /// [`TrainError::Stopped`] once the stop signal is up.
+    /// [`TrainError::Stopped`] once the stop signal is raised.
     pub fn go_on(&self) -> Result<(), TrainError> {
         if self.stop.load(Ordering::Relaxed) { Err(TrainError::Stopped) } else { Ok(()) }
     }
 }
 
-/// How far one backward step is. Reported from worker threads, possibly concurrently, about a hundred times a step.
+/// Progress of one backward step. Reported from worker threads, possibly concurrently, about a hundred times a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepProgress {
     /// The step being solved; 0 in a simulation.
     pub step: usize,
-    /// What is being done.
+    /// The current phase.
     pub phase: Phase,
     /// Design points solved, or paths simulated, so far in this step, of `total`.
     pub done: usize,
@@ -41,7 +43,7 @@ pub struct StepProgress {
     pub total: usize,
 }
 
-/// What a job is doing.
+/// The phase of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {

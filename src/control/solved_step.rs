@@ -1,4 +1,4 @@
-//! One solved step as it is stored: what the step answers with, and how well it was solved.
+//! One solved step as it is stored: its solution, and how well it was solved.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -9,56 +9,56 @@ use crate::control::surrogate::stored::{SingleSolution, Solution};
 /// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
 pub const FORMAT: &str = "ballast-policy-1";
 
-/// Everything kept of one solved step; a checkpoint.
+/// The stored data of one solved step; a checkpoint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepSolution {
-    /// Periods observed before it.
+    /// Periods observed before this step.
     pub step: usize,
-    /// What it answers with.
+    /// The solution of the step.
     pub solution: Solution,
-    /// How well it was solved.
+    /// Diagnostics of how well it was solved.
     pub diagnostics: StepDiagnostics,
 }
 
-/// How well a step was solved.
+/// Diagnostics of how well a step was solved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StepDiagnostics {
-    /// Periods observed before it.
+    /// Periods observed before this step.
     pub step: usize,
     /// Design points solved.
     pub design_count: usize,
-    /// Share of the design points at which the robust allocation of who holds nothing yet is zero.
+    /// Share of the design points at which the robust allocation without previous holdings is zero.
     pub all_bank_share: f64,
     /// Share of the design points whose window could not be certified: mass might want to leave it.
     pub uncertified_share: f64,
     /// Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
     /// parametric frameworks, whose step has no dual.
     pub duality_gap: f64,
-    /// Of the value that it serves, where an accuracy was asked for.
+    /// Expected error of the value, if an accuracy was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected_error: Option<ExpectedError>,
-    /// Diagnostics of the value surrogate; absent where the step stores a single state's solution.
+    /// Diagnostics of the value surrogate; absent if the step stores a single state's solution.
     pub value: Option<SurrogateDiagnostics>,
-    /// Diagnostics of the policy surrogate; absent where the step stores a single state's solution.
+    /// Diagnostics of the policy surrogate; absent if the step stores a single state's solution.
     pub policy: Option<SurrogateDiagnostics>,
 }
 
-/// Root mean square errors of the value that a step serves, in basis points of the certainty equivalent: over the design's own law
-/// of its states, at the holdings it was solved at. They say nothing of states that this law seldom visits, such as those after a
-/// return beyond the record, where the value may be off by a hundred times as much, nor of the first step of a design that starts
-/// at one law.
+/// Root mean square errors of the value of a step, in basis points of the certainty equivalent: over the design's own
+/// law of its states, at the holdings it was solved at. They do not cover states that this law seldom visits, such as
+/// those after a return beyond the record, where the value may be off by a hundred times as much. Nor do they cover the
+/// first step of a design that starts at one law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedError {
-    /// Of the surrogate of the step alone.
+    /// The error of the surrogate of the step alone.
     pub own: f64,
-    /// With those of the steps after it, as errors that are independent of each other add up.
+    /// The error with those of the steps after it, added up as independent errors.
     pub total: f64,
 }
 
-/// A fitted surrogate in figures.
+/// The figures of a fitted surrogate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurrogateDiagnostics {
@@ -70,7 +70,7 @@ pub struct SurrogateDiagnostics {
     pub signal_variance: f64,
     /// In units of the target's variance over the design.
     pub noise_variance: f64,
-    /// Of the scaled targets, at the hyperparameters found.
+    /// Log likelihood of the scaled targets, at the hyperparameters found.
     pub log_likelihood_per_point: f64,
     /// Root mean square of the leave-one-out errors, in the target's own unit.
     pub leave_one_out_error: f64,
@@ -80,7 +80,7 @@ pub struct SurrogateDiagnostics {
     pub search: String,
 }
 
-/// A solved step as a training keeps it.
+/// The checkpoint of a solved step, with the format.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Checkpoint<F, S> {
@@ -89,7 +89,7 @@ struct Checkpoint<F, S> {
 }
 
 impl StepSolution {
-    /// In the place of a step that is never asked for its own: it holds nothing, and gains nothing.
+    /// Returns a placeholder for a step whose own solution is never used: it holds nothing, and gains nothing.
     pub fn unsolved(step: usize) -> Self {
         StepSolution {
             step,
@@ -107,15 +107,17 @@ impl StepSolution {
         }
     }
 
-    /// JSON whose numbers parse back to the same bits, with the format of the policy it is to be part of.
+    /// Writes JSON whose numbers parse back to the same bits, with the format of the policy that the step will be part
+    /// of.
     ///
     /// # Errors
-    /// None that plain structs of numbers and strings can make.
+    /// None for plain structs of numbers and strings.
     pub fn to_checkpoint(&self) -> serde_json::Result<Vec<u8>> {
         serde_json::to_vec(&Checkpoint { format: FORMAT, solution: self })
     }
 
-    /// `None` where the bytes are of another format, whose features or radii differ: one policy has steps of one format.
+    /// Reads a checkpoint; `None` if the bytes are of another format, whose features or radii differ: one policy has
+    /// steps of one format.
     pub fn from_checkpoint(bytes: &[u8]) -> Option<Self> {
         let Checkpoint { format, solution } = serde_json::from_slice::<Checkpoint<String, StepSolution>>(bytes).ok()?;
         (format == FORMAT).then_some(solution)

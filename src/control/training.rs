@@ -1,7 +1,7 @@
 //! Backward induction: one robust Bellman step after another, from the horizon to the start.
 //!
-//! optimise (the robust step at every design point), train (both surrogates), go one step back. A step depends on
-//! the specification and the step after it alone, so a checkpoint per step resumes to the same bits.
+//! optimise (the robust step at every design point), train (both surrogates), go one step back. A step depends only on
+//! the specification and the step after it, so a checkpoint per step resumes to the same bits.
 
 use std::cell::LazyCell;
 use std::ops::Range;
@@ -27,10 +27,10 @@ use crate::control::surrogate::learning::{Candidates, Learning, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::measured::Measured;
 
-/// The laws of a design, summed up.
+/// Summaries of the laws of a design.
 pub type Summaries = Measured<LawSummary>;
 
-/// A wealth that nothing sees.
+/// Placeholder for a wealth that no feature uses.
 const NO_WEALTH: f64 = 1.0;
 
 /// A prepared training job: the completed specification and its simulated design.
@@ -49,7 +49,7 @@ impl Training {
         Training::with(specification, Kept::default())
     }
 
-    /// The same with what can be made again in `kept`.
+    /// Completes and checks the specification, with `kept` as the cache of recomputable results.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -57,7 +57,8 @@ impl Training {
         Training::among(specification, kept, Arc::default())
     }
 
-    /// The same, measuring in common with other trainings; `measured` changes no bit.
+    /// Completes and checks the specification, and shares law summaries with other trainings; `measured` changes no
+    /// bit.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -67,7 +68,7 @@ impl Training {
         Ok(Training { design, problem: Problem::with(&specification, kept), measured })
     }
 
-    /// Number of steps to solve: steps `horizon - 1` down to 0.
+    /// Returns the number of steps to solve: steps `horizon - 1` down to 0.
     pub fn horizon(&self) -> usize {
         self.problem.specification.problem.horizon
     }
@@ -95,7 +96,7 @@ impl Training {
             (watch.progress)(StepProgress { step, phase: Phase::Solving, done: 1, total: 1 });
             return Ok(solved);
         }
-        // The first step has one state where all sessions start alike.
+        // The first step has one state if all sessions start alike.
         let erring = step + usize::from(self.design.count(0) > 1);
         let asked = Some(&self.problem.specification.design).filter(|_| counts.chosen);
         let aim = asked.and_then(|design| Aim::of(design, step, erring, after.map(|after| &after.diagnostics)));
@@ -103,7 +104,7 @@ impl Training {
         Learning { specification, names, step, counts, aim, watch }.run(&solver, after.map(|after| &after.solution))
     }
 
-    /// The policy made of all steps, in ascending order of step.
+    /// Builds the policy from all steps, in ascending order of step.
     pub fn into_policy(self, steps: Vec<StepSolution>) -> Policy {
         Policy::new(self.problem.specification, steps)
     }
@@ -116,7 +117,7 @@ impl Training {
         self.run_by_steps(watch, &|| ())
     }
 
-    /// The policy of [`Self::run`]; calls `solved` after every step.
+    /// Solves every step as [`Self::run`] does, and calls `solved` after each.
     ///
     /// # Errors
     /// As [`Self::solve_step`].
@@ -132,12 +133,12 @@ impl Training {
     }
 }
 
-/// What it takes to solve design points of one step.
+/// The context for solving design points of one step.
 struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
     measured: &'a Summaries,
-    /// Of the candidates, where their features told them.
+    /// Radii of the candidates, if their features were computed with them.
     radii: Vec<OnceLock<f64>>,
 }
 
@@ -155,7 +156,7 @@ impl Candidates for DesignSolver<'_> {
             if let Some(known) = self.radii.get(index) {
                 known.get_or_init(|| law.radii.radius);
             }
-            // Laws do not depend on what was held: states are only needed where wealth is seen.
+            // Laws do not depend on the holdings: states are only needed if wealth is a feature.
             let wealth = if problem.selection.has_wealth() { states[index - some.start].wealth } else { NO_WEALTH };
             problem.features_of(step, wealth, &law)
         };
@@ -170,7 +171,7 @@ impl Candidates for DesignSolver<'_> {
 }
 
 impl DesignSolver<'_> {
-    /// Solves the robust step where all states are one but for the holding, of which there can then be many.
+    /// Solves the robust step if all states are the same up to the holding, which allows many holdings.
     fn solve_the_only(&self) -> Result<StepSolution, TrainError> {
         let (step, problem) = (self.bellman.step, self.bellman.problem);
         let only = self.state(0);
@@ -198,7 +199,7 @@ impl DesignSolver<'_> {
     }
 }
 
-/// What a solved state tells the surrogates.
+/// Converts a solved state to a design point of the surrogates.
 fn design_point(wealth: f64, features: Features, found: DesignSolution) -> DesignPoint {
     let DesignSolution { solution, floor_gains, policy_targets } = found;
     let RobustSolution { band, floor_gain, duality_gap, certified, .. } = solution;

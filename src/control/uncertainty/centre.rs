@@ -12,8 +12,9 @@ use crate::numerics::volatility::rescaled;
 /// Smallest mass of an atom: less is lost in rounding, so an atom that decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
 
-/// The Gauss-Hermite rule of five nodes for a standard normal error, exact for polynomials up to the ninth order: nodes 0 and
-/// +-sqrt(5 -+ sqrt(10)), masses 8/15 and (7 +- 2 sqrt(10)) / 60. A record has many returns, and five nodes around each are dense.
+/// The Gauss-Hermite rule of five nodes for a standard normal error, exact for polynomials up to the ninth order: nodes
+/// 0 and +-sqrt(5 -+ sqrt(10)), masses 8/15 and (7 +- 2 sqrt(10)) / 60. A record has many returns, and five nodes
+/// around each are dense.
 const HERMITE: [(f64, f64); 5] = [
     (-2.856_970_013_872_805_6, 0.011_257_411_327_720_688),
     (-1.355_626_179_974_266, 0.222_075_922_005_612_65),
