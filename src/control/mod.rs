@@ -50,8 +50,7 @@
 //! folder.
 //!
 //! Not from the paper: the floor gain that represents V (`problem::utility`), radius rules other than (2.5) and (2.7),
-//! and the
-//! parametric frameworks (`bellman::normal`).
+//! and the parametric frameworks (`bellman::normal`).
 
 pub mod assets;
 pub mod bellman;

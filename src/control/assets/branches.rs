@@ -50,7 +50,7 @@ pub(super) struct Branches {
     levelling: Levelling,
     /// The last local minimum inside a phase: most atoms share their last phase.
     last: Inside,
-    /// False if the payoff of some atom falls without bound as it is moved further.
+    /// True unless the payoff of some atom falls without bound as it is moved further.
     pub bounded: bool,
 }
 

@@ -1,7 +1,7 @@
 //! The search for the best allocation and price of distance. The problem with the known moves of the adversary is
 //! solved by an interior point method,
 //!
-//!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for every move m known of atom j (`cuts.rs`),
+//!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for all known moves m of atom j (`cuts.rs`),
 //!
 //! within the bounds of the shares, of their sum and of gamma. At its solution the adversary's answer adds new moves.
 //! Every set of multipliers m >= 0 with sum_m m_jm = p_j makes a law in the ball, or one that is after a mixture with

@@ -21,8 +21,8 @@ use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
 use crate::numerics::chebyshev::{Chebyshev, local_cubic};
 
-/// Chebyshev nodes in the action. Over the action interval the log of the next wealth, which is the feature, is nearly a
-/// parabola: a cubic through four nodes is good to 1e-6 of the gain.
+/// Chebyshev nodes in the action. Over the action interval the log of the next wealth, which is the feature, is nearly
+/// a parabola: a cubic through four nodes is good to 1e-6 of the gain.
 const ACTION_NODES: usize = 4;
 
 /// Predictions tabulated over returns and trades, for one state.

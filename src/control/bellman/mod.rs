@@ -7,8 +7,8 @@
 //! with the wealth that the action earns and, if the framework learns, the law with z in it. Source: paper (3.2) to
 //! (3.4), with V taken at the adversary's z.
 //!
-//! If trading costs, w has the extra term `ln((1 - c |a - h|) / (1 - c h))`, the share kept by the trade, and the
-//! wealth earned counts as if all of it were sold. The worth of an action then has a kink at the holding h. So each
+//! If trading costs, w has the extra term `ln((1 - c |a - h|) / (1 - c h))`, the log of the share kept by the trade.
+//! The wealth earned counts as if all of it were sold. The worth of an action then has a kink at the holding h. So each
 //! side is searched by itself, as if its cost were paid both ways, which leaves no kink. The two optima bound the
 //! no-trade region. The best action is its nearer end, or the holding if inside. Source: Davis and Norman (1990),
 //! Portfolio selection with transaction costs.

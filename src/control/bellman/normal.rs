@@ -4,8 +4,8 @@
 //!
 //!   m' = m + (z - m)/(n+1),  v' = n v/(n+1) + n (z - m)^2/(n+1)^2.
 //!
-//! Source: Bielecki, Chen, Cialenco, Cousin and Jeanblanc (2019), Adaptive robust control under model uncertainty, SIAM J.
-//! Control Optim. 57.
+//! Source: Bielecki, Chen, Cialenco, Cousin and Jeanblanc (2019), Adaptive robust control under model uncertainty, SIAM
+//! J. Control Optim. 57.
 
 use super::Pricing;
 use super::field::{Field, Payoffs};

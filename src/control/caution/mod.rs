@@ -85,7 +85,7 @@ impl Specification {
         if let Some(levels) = kept.get::<CautionLevels>(&key) {
             return levels.as_ref().clone();
         }
-        // Computed outside the cache's lock: finding passes checkpoints, and itself asks for cached bridges.
+        // Computed before taking the cache's guard, because it passes checkpoints and itself asks for cached bridges.
         let found = base.found(kept);
         kept.get_or_make(&key, size_of::<CautionLevels>(), || found).as_ref().clone()
     }

@@ -9,8 +9,8 @@ use crate::control::problem::actions::ActionInterval;
 
 /// A controlled state, its actions, and its worth at the horizon. The law of the noise is not part of it.
 ///
-/// Worths are amounts at the horizon. Each state has a baseline, to which its certainty equivalent is compared: the surrogates
-/// regress the gain over it.
+/// Worths are amounts at the horizon. Each state has a baseline, to which its certainty equivalent is compared: the
+/// surrogates regress the gain over it.
 pub trait Controlled: Sync {
     /// X, the set of states.
     type State: Clone + Send + Sync;

@@ -176,8 +176,8 @@ mod tests {
         Dynamics::plain(0.01, 0.02)
     }
 
-    /// 100 with 30 in the asset. Buying 20 more costs 0.4; of the 99.6 left half is held, and the asset rises by a fifth:
-    /// 49.8 x 1.01 + 49.8 x 1.2 = 110.058, of which 59.76 are in the asset.
+    /// Follows 100 with 30 in the asset. Buying 20 more costs 0.4; of the 99.6 left half is held, and the asset rises
+    /// by a fifth: 49.8 x 1.01 + 49.8 x 1.2 = 110.058, of which 59.76 are in the asset.
     #[test]
     fn a_period_agrees_with_pencil_and_paper() {
         let rise = 1.2_f64.ln();
@@ -187,8 +187,8 @@ mod tests {
         assert!((costly().floor(100.0, 0.3, 2) - 99.4 * 1.01 * 1.01).abs() < 1e-12);
     }
 
-    /// The same period with 5 added at the end, and 21 withdrawn a year later: 5 / 1.01 - 21 / 1.01^2 = -15.6357... is
-    /// to come, and the same amount must stay in the bank. The 99.4 left by selling pay for both.
+    /// Adds 5 at the end of that period, and withdraws 21 a year later: 5 / 1.01 - 21 / 1.01^2 = -15.6357... is to
+    /// come, and the same amount must stay in the bank. The 99.4 left by selling pay for both.
     #[test]
     fn what_is_added_and_withdrawn_agrees_with_pencil_and_paper() {
         let problem = ProblemSpecification {

@@ -99,7 +99,7 @@ mod tests {
         Dynamics::plain(0.0, 0.02)
     }
 
-    /// Of 100, 70 are held and 50 are allowed: 20 are sold for 19.6. Selling all 70 would leave 98.6, all 50 of a
+    /// Starts with 70 of 100 held and 50 allowed: 20 are sold for 19.6. Selling all 70 would leave 98.6, all 50 of a
     /// hundred 99.
     #[test]
     fn beyond_the_highest_action_the_rest_is_sold() {

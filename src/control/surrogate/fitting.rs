@@ -41,7 +41,7 @@ pub struct DesignPoint {
     pub features: Features,
     /// The best action without holdings.
     pub action: f64,
-    /// Log certainty equivalent over the all-bank floor, at that holding.
+    /// Log certainty equivalent over the all-bank floor, at the state's own holding.
     pub floor_gain: f64,
     /// The floor gain at every holding at which the value is needed; one if the holding does not matter.
     pub floor_gains: Vec<f64>,

@@ -134,8 +134,8 @@ impl Learning<'_> {
     /// step after.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`] soon after the stop signal; a robust step that is not finite; a covariance matrix that stays
-    /// singular.
+    /// [`TrainError::Stopped`] soon after the stop signal; a robust step that is not finite; a covariance matrix that
+    /// stays singular.
     pub fn run(&self, states: &impl Candidates, after: Option<&Solution>) -> Result<StepSolution, TrainError> {
         let (step, most) = (self.step, self.counts.design);
         let mut wanted = self.aim.as_ref().map_or(most, |aim| aim.first.min(most));

@@ -1,5 +1,5 @@
-//! The radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal law's estimates, rule by
-//! rule.
+//! The radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal law's estimates,
+//! rule by rule.
 
 use std::sync::{Arc, OnceLock};
 
