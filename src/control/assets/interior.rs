@@ -1,11 +1,11 @@
 //! The search for the best allocation and price of distance. The problem with the known moves of the adversary is
 //! solved by an interior point method,
 //!
-//!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for all known moves m of atom j (`cuts.rs`),
+//!   max sum_j p_j t_j - gamma radius   over a, gamma, t,   t_j <= f_jm(a, gamma) for every known move m of atom j,
 //!
-//! within the bounds of the shares, of their sum and of gamma. At its solution the adversary's answer adds new moves.
-//! Every set of multipliers m >= 0 with sum_m m_jm = p_j makes a law in the ball, or one that is after a mixture with
-//! the centre.
+//! (`cuts.rs`) within the bounds of the shares, of their sum and of gamma. At its solution the adversary's answer adds
+//! new moves. Every set of multipliers m >= 0 with sum_m m_jm = p_j makes a law in the ball, or one that is after a
+//! mixture with the centre.
 //!
 //! A barrier of mu p_j for each move makes it smooth, with the best t_j. Steps are Newton's on
 //! `slack x multiplier = mu p_j`; they raise the barrier function, which also sets the step's length. If the

@@ -8,8 +8,8 @@ use crate::numerics::gap_places::Statistic;
 
 impl RadiusEstimator {
     /// Returns the factor on simulated quantiles that makes the one of the history exact. `None` under a calibration,
-    /// which already removes their error. Cost: that of the law of the statistic, 25 ms at 240 returns and 0.13 s at
-    /// 1,024.
+    /// which already removes their error, and under rules without bridges. Cost: that of the law of the statistic, 25
+    /// ms at 240 returns and 0.13 s at 1,024.
     ///
     /// Checked by: `a_corrected_radius_is_exact_and_stays_near_as_returns_are_learned`.
     pub fn found_correction(&self) -> Option<f64> {
