@@ -1,4 +1,4 @@
-//! The books in figures, each with an interval where a resample of the periods has a meaning.
+//! The figures of all strategies, each with an interval if resampling the periods makes sense for it.
 
 use crate::control::evaluation::account::{Account, keep, uncounted_periods};
 use crate::control::evaluation::backtest_report::BacktestFigures;
@@ -11,41 +11,41 @@ use crate::control::evaluation::yearly_worth::{
 use crate::control::problem::actions::Band;
 use crate::numerics::long_run_mean::LongRunMean;
 
-/// One strategy: what it held, and what became of it.
+/// One strategy with its decisions and its account.
 pub struct Line {
-    /// Its name.
+    /// Name of the strategy.
     pub name: String,
-    /// Its kind.
+    /// Kind of the strategy.
     pub kind: StrategyKind,
-    /// One a period.
+    /// Its decisions, one per period.
     pub decisions: Vec<Decision>,
-    /// Its books.
+    /// Its account.
     pub account: Account,
 }
 
-/// All strategies in figures.
+/// The figures of all strategies.
 pub struct Analysis {
-    /// In the order of the strategies.
+    /// Figures in the order of the strategies.
     pub figures: Vec<BacktestFigures>,
-    /// Whole years, whose utility is taken; the last ends with the last period.
+    /// Number of whole years, over which mean utility is taken; the last ends with the last period.
     pub years: usize,
-    /// Periods before the first of these years.
+    /// Number of periods before the first of these years.
     pub uncounted_periods: usize,
 }
 
 impl Line {
-    /// The books of what was decided; `cost` is charged on what is traded.
+    /// Computes the account that follows from the decisions; `cost` is the share of each trade that is lost.
     pub fn new((kind, name): (StrategyKind, String), decisions: Vec<Decision>, periods: &[Period], cost: f64) -> Self {
         let account = keep(decisions.iter().map(|decision| decision.band), periods, cost, INITIAL_WEALTH);
         Line { name, kind, decisions, account }
     }
 
-    /// Tells whether it was chosen with what only the end could tell.
+    /// Returns true if the strategy was chosen with knowledge of the whole record.
     pub fn is_hindsight(&self) -> bool {
         self.kind == StrategyKind::OwnMix
     }
 
-    /// The constant mix that holds on average what this line held: what its timing is measured against.
+    /// Returns the constant mix of this line's average share, against which its timing is measured.
     pub fn hindsight(&self, periods: &[Period], cost: f64) -> Line {
         let share = self.account.mean_allocation();
         Line::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost)
@@ -56,7 +56,7 @@ impl Line {
         Line::new(named, vec![decision; periods.len()], periods, cost)
     }
 
-    /// Whether it holds one share throughout: such a line times nothing.
+    /// Returns true if the line holds one share throughout, and so has no timing.
     fn is_constant(&self) -> bool {
         let first = self.decisions.first().map(|decision| decision.band);
         self.decisions.iter().all(|decision| Some(decision.band) == first && decision.band.low == decision.band.high)
@@ -64,7 +64,7 @@ impl Line {
 }
 
 impl Analysis {
-    /// Others are compared with line `main`; all trade at `cost`.
+    /// Compares the other lines with line `main`; all trade at `cost`.
     pub fn of(lines: &[Line], main: usize, periods: &[Period], cost: f64, scale: &Scale) -> Self {
         let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
         let own_mix =

@@ -1,4 +1,4 @@
-//! A walk-forward whole: the request made into strategies and periods, and the books made of what they decided.
+//! A whole walk-forward: turns the request into strategies and periods, and their decisions into accounts.
 
 use jiff::civil::Date;
 
@@ -19,33 +19,33 @@ use crate::control::request::warnings::Warning;
 /// A prepared walk-forward.
 #[derive(Debug, Clone)]
 pub struct Backtest {
-    /// As completed.
+    /// The completed request.
     pub request: BacktestRequest,
     /// How policies are trained.
     pub walk: WalkForward,
-    /// Of the dates; none without them.
+    /// Frequency of the dates; none if the periods have no dates.
     pub frequency: Option<Frequency>,
     /// Periods in a year.
     pub periods_per_year: usize,
     /// The whole record.
     pub periods: Vec<Period>,
-    /// Kinds and names, and what they stand for: the adaptive ones first, in the order of their levels.
+    /// Strategies with their kinds and names: the adaptive ones first, in the order of their levels.
     pub strategies: Vec<((StrategyKind, String), Strategy)>,
     days: Vec<Date>,
 }
 
-/// What was decided, and what became of it.
+/// The decisions of all strategies and their results.
 pub struct Walked {
-    /// What was asked for.
+    /// The walk-forward that was run.
     pub backtest: Backtest,
-    /// Strategies in their order, and what the timing of the main one is measured against.
+    /// Strategies in their order, then the mix against which the timing of the main one is measured.
     pub lines: Vec<Line>,
-    /// In figures.
+    /// The figures.
     pub analysis: Analysis,
 }
 
 impl Backtest {
-    /// Completes and checks the request, the training of every window among it.
+    /// Completes and checks the request, including the training of every window.
     ///
     /// # Errors
     /// A field that breaks its rule.
@@ -93,38 +93,38 @@ impl Backtest {
         })
     }
 
-    /// The periods decided about, after the first window.
+    /// Returns the periods that are decided, after the first window.
     pub fn lived(&self) -> &[Period] {
         &self.periods[self.walk.window..]
     }
 
-    /// Their dates, as fine as the frequency.
+    /// Returns their dates, with the precision of the frequency.
     pub fn dates(&self) -> Option<Vec<String>> {
         let frequency = self.frequency?;
         Some(self.days.iter().skip(self.walk.window).map(|date| frequency.shown(*date)).collect())
     }
 
-    /// A period, in a word.
+    /// Returns the noun for a period.
     pub fn noun(&self) -> &'static str {
         self.frequency.map_or("period", Frequency::noun)
     }
 
-    /// The line most is said about: the second adaptive strategy, or the only one.
+    /// Returns the index of the main line: the second adaptive strategy, or the only one.
     pub fn main_line(&self) -> usize {
         main_level(&self.request)
     }
 
-    /// What the strategies are, without their names.
+    /// Returns the strategies without their names.
     pub fn plain_strategies(&self) -> Vec<Strategy> {
         self.strategies.iter().map(|(_, strategy)| *strategy).collect()
     }
 
-    /// Policies to train.
+    /// Returns the number of policies to train.
     pub fn trainings(&self) -> usize {
         self.walk.trainings(&self.plain_strategies(), &self.periods)
     }
 
-    /// What may be a mistake, by the last window; fields as they are named here.
+    /// Returns warnings about likely mistakes, judged on the last window; fields are named as in the request.
     pub fn warnings(&self) -> Vec<Warning> {
         let last = &self.periods[self.periods.len() - self.walk.window..];
         let problem = ProblemSpecification {
@@ -135,12 +135,13 @@ impl Backtest {
         problem.warnings().into_iter().map(|warning| warning.of_walk(self.request.returns().0)).collect()
     }
 
-    /// Steps of all their trainings.
+    /// Returns the number of steps of all their trainings.
     pub fn steps(&self) -> usize {
         self.walk.steps(&self.plain_strategies(), &self.periods)
     }
 
-    /// Decides every period on the current pool and keeps the books; `solved` is called after every one of the [`steps`](Self::steps).
+    /// Decides every period on the current pool and computes the accounts; `solved` is called after each of the
+    /// [`steps`](Self::steps).
     ///
     /// # Errors
     /// As [`WalkForward::decide`].
@@ -149,7 +150,7 @@ impl Backtest {
         Ok(self.walked(decisions))
     }
 
-    /// The books of what each strategy decided in every period, in figures.
+    /// Computes the accounts and figures of the decisions of each strategy.
     pub fn walked(self, decisions: Vec<Vec<Decision>>) -> Walked {
         let (cost, main, lived) = (self.request.trading_cost, self.main_line(), self.lived());
         let names = self.strategies.iter().map(|(name, _)| name.clone());
@@ -189,11 +190,11 @@ fn strategies(request: &BacktestRequest) -> Vec<((StrategyKind, String), Strateg
         .collect()
 }
 
-/// A rule that the specification of a training breaks, under the name that its field has here.
+/// Renames the field of a rule broken by a training to the request's name for it.
 fn renamed(error: FieldError, returns: &str) -> FieldError {
     let field = match error.field.as_str() {
         "problem.history" => returns.to_owned(),
-        // Of the bridges of a window.
+        // The rule is about the bridges of a window.
         "problem.radius.paths" => "window".to_owned(),
         other if ["centre", "caution", "support"].iter().any(|part| other.starts_with(&format!("problem.{part}"))) => {
             other.trim_start_matches("problem.").to_owned()

@@ -1,4 +1,4 @@
-//! The report of a walk-forward, as it travels; `docs/backtest.md` says what its figures are.
+//! The report of a walk-forward, as it is sent; `docs/backtest.md` explains its figures.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,33 +8,33 @@ use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::support::Support;
 
-/// Name and version of the report's form.
+/// Name and version of the report format.
 pub const FORMAT: &str = "ballast-backtest-1";
 
-/// Strategies that lived through a record of returns. The same request gives the same report, bit for bit.
+/// Strategies compared over a record of returns. The same request gives the same report, bit for bit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BacktestReport {
     /// `ballast-backtest-1`.
     pub format: String,
-    /// `daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null where the periods have no dates.
+    /// `daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null if the periods have no dates.
     pub frequency: Option<String>,
     /// Periods in a year.
     pub periods_per_year: usize,
-    /// Of the periods decided about, those after the first window; null where the periods have none.
+    /// Dates of the periods that were decided, those after the first window; null if the periods have none.
     pub dates: Option<Vec<String>>,
-    /// Whole years decided about, whose utility is taken; the last ends with the last period.
+    /// Whole years that were decided, over which mean utility is taken; the last ends with the last period.
     pub whole_years: usize,
-    /// The first periods decided about, fewer than a year, which count in none of them.
+    /// Number of periods before the first whole year, fewer than a year; they count in no year.
     pub uncounted_periods: usize,
-    /// As completed.
+    /// The completed choices.
     pub choices: BacktestChoices,
     /// How the intervals were made.
     pub intervals: BacktestIntervals,
-    /// One strategy in figures each.
+    /// The figures of each strategy.
     pub strategies: Vec<BacktestFigures>,
-    /// What each strategy did, in their order.
+    /// The decisions and results of each strategy, in the same order.
     pub periods: Vec<BacktestPeriods>,
-    /// What the figures say, the most important first.
+    /// The findings in sentences, the most important first.
     pub sentences: Vec<String>,
 }
 
@@ -47,94 +47,95 @@ pub struct BacktestChoices {
     pub every: usize,
     /// Periods that a policy looked ahead.
     pub horizon: usize,
-    /// Levels of the adaptive strategies.
+    /// Miscoverage levels of the adaptive strategies.
     pub alpha: Vec<f64>,
     /// Multiple of the radius of every ball.
     pub scale: f64,
-    /// Share of every radius that was acted on.
+    /// Share of every radius that was used.
     pub caution: CautionLevel,
-    /// What the adversary could use.
+    /// The log-returns that the adversary could use.
     pub support: Support,
-    /// What the balls are centred on.
+    /// Centre of the balls.
     pub centre: CentreSpecification,
-    /// Relative.
+    /// Relative risk aversion.
     pub risk_aversion: f64,
-    /// Lost of what is traded, as a share of it.
+    /// Share of each trade that is lost.
     pub trading_cost: f64,
-    /// Whether every policy was trained as if trading were free.
+    /// True if every policy was trained as if trading were free.
     pub cost_blind: bool,
     /// Design points per step.
     pub count: usize,
-    /// Of every training, and of the resamples.
+    /// Seed of every training, and of the resamples.
     pub seed: u64,
 }
 
-/// How the intervals were made: of certainty equivalents from what each year adds to them, of chances from whole years, of other figures
-/// by circular blocks of what was lived, the same for all strategies.
+/// How the intervals were made: for certainty equivalents from each year's contribution to them, for chances from whole
+/// years, for other figures from circular blocks of the periods, the same for all strategies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BacktestIntervals {
-    /// Probability that an interval is meant to hold; those of differences all hold at once with it.
+    /// Intended coverage probability of an interval; intervals of differences hold simultaneously with it.
     pub confidence: f64,
-    /// Differences from one strategy, whose intervals hold at once; those from own mixes are as many as have one.
+    /// Differences from one strategy, whose intervals hold simultaneously. Differences from own mixes number as many as
+    /// there are strategies with one.
     pub comparisons: usize,
-    /// How many, where figures are resampled.
+    /// Number of resamples, for figures that are resampled.
     pub resamples: usize,
-    /// Periods of a block of them.
+    /// Periods per block in these resamples.
     pub period_block: usize,
-    /// Neighbouring years that may depend on each other.
+    /// Consecutive years that may depend on each other.
     pub year_block: usize,
 }
 
 /// A figure with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BootstrapEstimate {
-    /// Of what was lived.
+    /// Value on the actual record.
     pub value: f64,
-    /// Its ends.
+    /// Lower and upper end.
     #[schema(value_type = [f64; 2])]
     pub interval: [f64; 2],
 }
 
-/// What a strategy was worth and how it varied; returns as fractions.
+/// The worth of a strategy and its variation; returns are fractions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Performance {
-    /// Of mean utility over the whole years, each from wealth 100.
+    /// Certainty equivalent of mean utility over the whole years, each from wealth 100.
     pub yearly_certainty_equivalent: BootstrapEstimate,
-    /// Its own less that of the mix of its own average, which nobody could have chosen beforehand: what changing the allocation
-    /// earned. Null of strategies that are such a mix.
+    /// Its certainty equivalent less that of the mix of its own average, which nobody could have chosen beforehand: the
+    /// gain from changing the allocation. Null for strategies that are such a mix.
     pub beyond_own_mix: Option<BootstrapEstimate>,
-    /// Mean simple return of a year, compounded: `(1 + m)^p - 1`, m the mean of a period and p the periods of a year.
+    /// Mean simple return per year, compounded: `(1 + m)^p - 1`, m the mean per period and p the periods per year.
     pub annual_mean: BootstrapEstimate,
-    /// Standard deviation of simple returns.
+    /// Standard deviation of simple returns, per square root of a year.
     pub annual_volatility: BootstrapEstimate,
-    /// Mean excess over the bank by its deviation.
+    /// Mean excess over the bank divided by its deviation.
     pub sharpe_ratio: BootstrapEstimate,
-    /// Share of wealth that is bought and sold in a year.
+    /// Share of wealth that is bought and sold per year.
     pub annual_turnover: BootstrapEstimate,
-    /// Share of the years, one beginning with every period, that end with less than they began with.
+    /// Share of years that end with a loss, among the years that begin with every period.
     pub chance_of_loss: BootstrapEstimate,
     /// Mean return of the worst twentieth of these years.
     pub worst_twentieth: BootstrapEstimate,
     /// Largest fall below the highest wealth so far, as a share of it.
     pub max_drawdown: f64,
-    /// From 100.
+    /// Terminal wealth, from 100.
     pub final_wealth: f64,
-    /// Share of wealth at risk.
+    /// Mean share of wealth in the risky asset, or in all assets together.
     pub mean_allocation: f64,
 }
 
-/// One strategy in figures.
+/// The figures of one strategy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BacktestFigures {
-    /// Its name.
+    /// Name of the strategy.
     pub strategy: String,
-    /// Its kind.
+    /// Kind of the strategy.
     pub kind: StrategyKind,
-    /// Whether it was chosen with what only the end could tell.
+    /// True if it was chosen with knowledge of the whole record.
     pub hindsight: bool,
-    /// Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it. Null in hindsight.
+    /// Its rank by `yearly_certainty_equivalent`, 1 for the best; equal ones share it. Null in hindsight.
     pub place: Option<usize>,
-    /// As of every strategy; its own mix is a constant one.
+    /// Figures that every strategy has; its own mix is a constant mix.
     #[serde(flatten)]
     pub performance: Performance,
     /// The certainty equivalent of the main adaptive strategy less that of this one.
@@ -143,21 +144,21 @@ pub struct BacktestFigures {
     pub all_bank_share: f64,
 }
 
-/// What one strategy did, a number a period.
+/// The decisions and results of one strategy, one number per period.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BacktestPeriods {
-    /// Its name.
+    /// Name of the strategy.
     pub strategy: String,
-    /// Share of wealth held through the period.
+    /// Share of wealth held in the period.
     pub allocation: Vec<f64>,
-    /// Lower end of the holdings that were kept as they were.
+    /// Lower end of the no-trade region.
     pub low: Vec<f64>,
-    /// Upper end of them.
+    /// Upper end of the no-trade region.
     pub high: Vec<f64>,
-    /// Of the ball, in log-return; 0 where there was none.
+    /// Radius of the ball, in log-return; 0 if there was none.
     pub radius: Vec<f64>,
-    /// Share of wealth that changed between bank and asset at the start.
+    /// Share of wealth moved between bank and asset at the start of the period.
     pub traded: Vec<f64>,
-    /// At the end, from 100.
+    /// Wealth at the end of the period, from 100.
     pub wealth: Vec<f64>,
 }

@@ -1,12 +1,13 @@
-//! How often a ball holds the law that a record was drawn from, how wide it is, and what advice that fears it loses.
+//! How often a ball holds the law that a record was drawn from, how wide the ball is, and how much its robust advice
+//! loses.
 //!
-//! Records of n log-returns are drawn from a law that is known. Each is a history of its own: it gives the centre, the rule gives
-//! the radius, the ball holds the law where the centre's Wasserstein distance to it is at most that, and the one-step advice in the
-//! ball is scored by the law,
+//! Records of n log-returns are drawn from a known law. Each record serves as a history: it gives the centre, and the
+//! rule gives the radius. The ball holds the law if the Wasserstein distance from the centre to it is at most the
+//! radius. The law scores the one-step advice of the ball:
 //!
 //!   lost(a) = 1e4 (ln CE(a*) - ln CE(a)),   CE(a) = U^-1( E[ U(w(a, Z)) ] ),   a* the best for the law itself,
 //!
-//! in basis points a period. All centres and rules see the same records.
+//! in basis points per period. All centres and rules see the same records.
 
 use std::ops::RangeInclusive;
 
@@ -29,13 +30,13 @@ use crate::numerics::minimise::maximise_concave_scalar;
 use crate::numerics::streams::stream;
 use crate::numerics::summary::{Clustered, Estimate};
 
-/// Basis points of one.
+/// Basis points in one.
 const BASIS_POINTS: f64 = 1e4;
-/// Of the best allocation for a law.
+/// Tolerance of the best allocation for a law.
 const ALLOCATION_TOLERANCE: f64 = 1e-6;
-/// Groups of records, as many as divide them.
+/// Range for the number of groups of records; the largest divisor of the number of records is used.
 const GROUPS: RangeInclusive<usize> = 10..=25;
-/// A record of one return over and over has no ball; it is drawn again, so often at most.
+/// Most draws of a record: one whose returns are all equal has no ball and is drawn again.
 const DRAWS: usize = 100;
 
 /// A law that records are drawn from.
@@ -43,7 +44,7 @@ const DRAWS: usize = 100;
 pub enum DrawnLaw {
     /// Independent draws.
     Continuous(ContinuousLaw),
-    /// Of returns seen, oldest first, blocks of so many in a row: what follows what stays as it was.
+    /// Blocks of consecutive past returns, oldest first, which keep the dependence of a return on earlier ones.
     Blocks {
         /// Log-returns.
         returns: Vec<f64>,
@@ -52,45 +53,45 @@ pub enum DrawnLaw {
     },
 }
 
-/// What is asked.
+/// The settings of a coverage study.
 #[derive(Debug, Clone)]
 pub struct CoverageQuestion {
     /// Returns in a record.
     pub size: usize,
     /// Records drawn.
     pub records: usize,
-    /// Of the bank, per period.
+    /// Interest rate of the bank per period.
     pub rate_per_step: f64,
-    /// Of the investor, who starts with 100.
+    /// Utility of the investor, whose initial wealth is 100.
     pub utility: UtilitySpecification,
-    /// Of the balls; none looks at the law.
+    /// Centres of the balls; none of them uses the law.
     pub centres: Vec<CentreSpecification>,
-    /// Of their radii.
+    /// Radius rules of the balls.
     pub rules: Vec<RadiusRule>,
-    /// Of all draws.
+    /// Seed of all draws.
     pub seed: u64,
-    /// Of the intervals.
+    /// Confidence level of the intervals.
     pub level: f64,
 }
 
-/// What a centre and a rule do under a law.
+/// Coverage, radius and loss of a centre and a rule under a law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BallCoverage {
     /// Share of records whose ball holds the law.
     pub covered: Estimate,
     /// The mean radius, in log-return.
     pub radius: Estimate,
-    /// Mean of the lost certainty equivalent, in basis points a period.
+    /// Mean loss of certainty equivalent, in basis points per period.
     pub lost: Estimate,
     /// Mean share of wealth in the asset.
     pub allocation: f64,
 }
 
-/// A law prepared for records of it.
+/// A law prepared for drawing records.
 struct Prepared<'a> {
     law: &'a DrawnLaw,
     distance: Option<LawDistance>,
-    /// Atoms of the law, ascending, and their masses: by quadrature where it is continuous.
+    /// Atoms of the law, ascending, and their masses; a continuous law is discretised by quadrature.
     atoms: Vec<f64>,
     masses: Vec<f64>,
 }
@@ -112,7 +113,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// One record. Stream: (seed, "coverage", n, index).
+    /// Draws one record. Stream: (seed, "coverage", n, index).
     fn record(&self, question: &CoverageQuestion, index: usize) -> Vec<f64> {
         let mut generator = stream(question.seed, "coverage", question.size, index);
         let mut draw = || match self.law {
@@ -133,7 +134,7 @@ impl<'a> Prepared<'a> {
         (0..DRAWS).map(|_| draw()).find(varies).unwrap_or_default()
     }
 
-    /// From a centre to the law itself.
+    /// Returns the distance from a centre to the law itself.
     fn distance(&self, centre: &Centre) -> f64 {
         let weighed = centre.atoms.iter().copied().zip(centre.masses.iter().copied());
         if let Some(distance) = &self.distance {
@@ -147,33 +148,33 @@ impl<'a> Prepared<'a> {
         distance_of_masses(&atoms, &apart)
     }
 
-    /// Log certainty equivalent of an allocation over the bank.
+    /// Returns the log certainty equivalent of an allocation, relative to the bank.
     fn worth(&self, allocation: f64, bank: f64, utility: RelativeUtility) -> f64 {
         let of_atom = |(z, mass): (&f64, &f64)| mass * utility.value((allocation * (z.exp() / bank - 1.0)).ln_1p());
         utility.inverse(self.atoms.iter().zip(&self.masses).map(of_atom).sum())
     }
 }
 
-/// The nearest log-return that a history may hold.
+/// Returns the nearest log-return that a history accepts.
 fn accepted(log_return: f64) -> f64 {
     log_return.clamp(-LOG_RETURN, LOG_RETURN)
 }
 
-/// What each ball of the question does under `law`: centre by centre, and of each rule by rule. Cost: a robust step for each record
-/// and ball.
+/// Scores every ball of the question under `law`, centre by centre and rule by rule. Cost: a robust step for each
+/// record and ball.
 ///
 /// Checked by: `tests/solver/coverage.rs`.
 ///
 /// # Errors
-/// A centre or a rule that a training would not take either.
+/// A centre or a rule that a training would also reject.
 pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallCoverage>, FieldError> {
     let prepared = Prepared::of(law);
     let utility = RelativeUtility::new(question.utility, 100.0 * (1.0 + question.rate_per_step));
     let bank = 1.0 + question.rate_per_step;
     let worth = |allocation: f64| prepared.worth(allocation, bank, utility);
     let (_, best) = maximise_concave_scalar(worth, 0.0, 1.0, ALLOCATION_TOLERANCE);
-    // A group of records has bridges of its own and is the unit of the intervals: where all share one set all radii err alike, which
-    // no interval over records would tell.
+    // Each group of records has its own bridges and is the unit of the intervals. If all records shared one set, all
+    // radii would err alike, and no interval over records would show it.
     let groups = GROUPS.rev().find(|count| question.records.is_multiple_of(*count)).unwrap_or(question.records);
     let kept = Kept::default();
     let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {

@@ -1,20 +1,21 @@
-//! How many of the simulated paths decide what a strategy is worth for certain.
+//! How many of the simulated paths determine a strategy's certainty equivalent.
 
 use crate::control::evaluation::names::quoted;
 use crate::control::problem::utility::RelativeUtility;
 
-/// Fewer paths than these say little of a mean.
+/// Fewer paths than this are too few for a reliable mean.
 const FEW_PATHS: f64 = 100.0;
 
-/// The number of equal weights that tell as much as these: `(sum v)^2 / sum v^2`. Source: Kish (1965), Survey Sampling.
+/// Returns the effective sample size of these weights, `(sum v)^2 / sum v^2`. Source: Kish (1965), Survey Sampling.
 fn effective_number(weights: impl Iterator<Item = f64>) -> f64 {
     let (sum, squares) = weights.fold((0.0, 0.0), |(sum, squares), v| (sum + v, squares + v * v));
     sum * sum / squares
 }
 
-/// Names the strategies whose certainty equivalent so few paths decide that its interval does not hold, in a sentence: each with its
-/// terminal wealth path by path. Paths weigh as their marginal utility; fewer than a hundred, or than half of them, are few.
-/// Checked by: `what_few_paths_decide_is_said_where_intervals_do_not_hold`.
+/// Names, in a sentence, the strategies whose certainty equivalent depends on so few paths that its interval is
+/// unreliable. Each strategy comes with its terminal wealth path by path. A path's weight is its marginal utility. Few
+/// means below a hundred, or below half of the paths. Checked by:
+/// `what_few_paths_decide_is_said_where_intervals_do_not_hold`.
 pub fn few_decide<'a>(
     strategies: impl Iterator<Item = (&'a str, &'a Vec<f64>)>,
     utility: RelativeUtility,
@@ -47,8 +48,8 @@ mod tests {
     use crate::numerics::streams::stream;
     use crate::numerics::summary::Clustered;
 
-    /// Reports of 300 paths of twelve months in stocks: in how many the interval of the certainty equivalent at 90 % holds the truth,
-    /// and in how many the sentence stands.
+    /// Counts over 200 reports of 300 paths of twelve months in stocks. The first count is how often the 90 % interval
+    /// of the certainty equivalent holds the truth. The second is how often the sentence appears.
     fn held_and_said(eta: f64, crash: f64) -> [usize; 2] {
         let utility = RelativeUtility::Power { eta };
         let mut generator = stream(6, "test", eta as usize, 0);
@@ -73,7 +74,7 @@ mod tests {
 
     #[test]
     fn what_few_paths_decide_is_said_where_intervals_do_not_hold() {
-        // Three months in a hundred lose a quarter.
+        // Three months in a hundred lose a quarter of wealth.
         let [held, said] = held_and_said(10.0, 0.03);
         assert!(held < 165 && said > 190, "{held} held and {said} said of 200");
         let [held, said] = held_and_said(3.0, 0.0);

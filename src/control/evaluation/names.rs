@@ -1,6 +1,6 @@
-//! The names of strategies: one set for the terminal, tables, the wire, Python and the page.
+//! Names of strategies: one set for the terminal, tables, the wire, Python and the page.
 //!
-//! Every report carries the name as `strategy` and the kind beside it; nothing else makes a name. Checked by:
+//! Every report carries the name as `strategy` and the kind beside it; no other code makes a name. Checked by:
 //! `tests/project/dashboard.rs::the_page_calls_frameworks_what_reports_call_them`.
 
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::framework::Framework;
 
-/// A kind of strategy that walks through a record, which decides its colour and its sentences.
+/// A kind of strategy in a walk-forward, which decides its colour and its sentences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StrategyKind {
@@ -19,7 +19,7 @@ pub enum StrategyKind {
     CostBlind,
     /// A policy with a ball frozen at its window.
     Static,
-    /// The returns known are taken for the law.
+    /// A policy that takes the empirical law of the known returns as true.
     PlugIn,
     /// A constant 60 % in the risky asset.
     SixtyForty,
@@ -29,13 +29,13 @@ pub enum StrategyKind {
     AllBank,
     /// A constant mix of the average allocation of the main adaptive strategy, known only at the end.
     OwnMix,
-    /// Several assets: the best against the worst law of a ball of the norm `scaled_one`.
+    /// Several assets: the best shares against the worst law in a ball of the norm `scaled_one`.
     Robust,
-    /// Several assets: the best against the worst law of a ball of the norm `sup`.
+    /// Several assets: the best shares against the worst law in a ball of the norm `sup`.
     RobustSup,
-    /// The robust shares, chosen anew only with the radius.
+    /// The robust shares, chosen anew only when the radius is.
     RobustStatic,
-    /// All wealth at the least variance.
+    /// All wealth at minimum variance.
     MinimumVariance,
     /// All wealth, in inverse proportion to the deviations of the returns.
     InverseVolatility,
@@ -46,7 +46,7 @@ pub enum StrategyKind {
 }
 
 impl StrategyKind {
-    /// The name of the kind, without its level, its caution or its window.
+    /// Returns the name of the kind, without its level, its caution or its window.
     pub fn name(self) -> &'static str {
         match self {
             StrategyKind::Adaptive => framework_name(Framework::Adaptive),
@@ -68,7 +68,7 @@ impl StrategyKind {
     }
 }
 
-/// The name of a framework of policies.
+/// Returns the name of a framework of policies.
 pub fn framework_name(framework: Framework) -> &'static str {
     match framework {
         Framework::Adaptive => "Cautious, learns",
@@ -80,7 +80,7 @@ pub fn framework_name(framework: Framework) -> &'static str {
     }
 }
 
-/// The name of the constant mix that holds `share` of wealth in the risky asset.
+/// Returns the name of the constant mix that holds `share` of wealth in the risky asset.
 pub fn mix_name(share: f64) -> String {
     match share {
         0.0 => StrategyKind::AllBank.name().into(),
@@ -90,17 +90,17 @@ pub fn mix_name(share: f64) -> String {
     }
 }
 
-/// The name of one of several adaptive policies, by the confidence `1 - alpha` of its ball.
+/// Returns the name of one of several adaptive policies, by the confidence `1 - alpha` of its ball.
 pub fn at_level(alpha: f64) -> String {
     format!("{}, {}", StrategyKind::Adaptive.name(), percent(1.0 - alpha))
 }
 
-/// The name of the mix of an average allocation that is known only at the end.
+/// Returns the name of the mix of an average allocation that is known only at the end.
 pub fn own_mix_name(share: f64) -> String {
     format!("{}: {:.1} % in stocks", StrategyKind::OwnMix.name(), 100.0 * share)
 }
 
-/// How much of the measured radius is taken, in words.
+/// Returns, in words, how much of the measured radius is used.
 pub fn caution_in_words(level: CautionLevel) -> String {
     match level {
         CautionLevel::Paper => "full caution".into(),
@@ -109,12 +109,13 @@ pub fn caution_in_words(level: CautionLevel) -> String {
     }
 }
 
-/// A name within a sentence: quoted, since some have commas.
+/// Quotes a name within a sentence, because some contain commas.
 pub fn quoted(name: &str) -> String {
     format!("\u{201c}{name}\u{201d}")
 }
 
-/// A share with the digits that it has: 97.5 %. Digits beyond a millionth of a percent are those of binary fractions.
+/// Formats a share with only its significant digits, as in 97.5 %. Digits beyond a millionth of a percent come from
+/// binary fractions.
 fn percent(share: f64) -> String {
     format!("{} %", (1e8 * share).round() / 1e6)
 }

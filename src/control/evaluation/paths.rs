@@ -1,8 +1,8 @@
-//! Strategies side by side on common random numbers.
+//! Strategies compared on common random numbers.
 //!
-//! Path p of history h has the same returns under every strategy: the stream ("evaluate-path", h, p) of the seed, as the
-//! drawn histories are the streams ("evaluate-history", h, 0). Strategies act through the calls that live sessions make.
-//! Whatever the threads, outcomes are collected in the order of histories and paths.
+//! Path p of history h has the same returns under every strategy: the stream ("evaluate-path", h, p) of the seed. The
+//! drawn histories are the streams ("evaluate-history", h, 0). Strategies act through the same calls as live sessions.
+//! For any number of threads, outcomes are collected in the order of histories and paths.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -32,7 +32,7 @@ const REPORTS: usize = 100;
 
 /// A prepared comparison: the completed request, the true law, the initial histories.
 pub struct Evaluation {
-    /// As completed.
+    /// The completed request.
     pub request: EvaluationRequest,
     /// The log-returns that each group of paths starts from.
     pub histories: Vec<Vec<f64>>,
@@ -40,34 +40,34 @@ pub struct Evaluation {
     kept: Kept,
 }
 
-/// One step of one path as a framework lived it.
+/// One step of a framework on one path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lived {
     /// Share of wealth held in the risky asset.
     pub allocation: f64,
-    /// Of the uncertainty set, in the unit of an advice's radius.
+    /// Radius of the uncertainty set, in the unit of an advice's radius.
     pub radius: f64,
-    /// Distance of the centre of its ball to the true law.
+    /// Distance from the centre of its ball to the true law.
     pub distance: f64,
-    /// Whether the advice was solved anew.
+    /// True if the advice was solved anew.
     pub resolved: bool,
 }
 
-/// One path: what every strategy comes to, and every step of every framework, framework by framework.
+/// One path: the result of every strategy, and every step of every framework, framework by framework.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Strategy by strategy: frameworks, then constant mixes.
+    /// Results strategy by strategy: frameworks, then constant mixes.
     pub ended: Vec<Ended>,
-    /// Framework by framework, each step by step.
+    /// Steps of each framework, one framework after another.
     pub lived: Vec<Lived>,
 }
 
-/// Where the paths of one history start.
+/// The starting point of all paths of one history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HistoryStart {
-    /// The bridge quantile there, under that radius rule.
+    /// The bridge quantile there, if the radius rule uses bridges.
     pub quantile: Option<f64>,
-    /// Of the first framework with a ball, in log-return; 0 where there is none.
+    /// Radius of the first framework with a ball, in log-return; 0 if there is none.
     pub radius: f64,
     /// Certainty equivalent of each framework's first advice.
     pub promised: Vec<f64>,
@@ -76,19 +76,19 @@ pub struct HistoryStart {
 /// Everything simulated: `outcomes` holds the paths of the first history, then those of the second, and so on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcomes {
-    /// History by history.
+    /// Starting points, history by history.
     pub starts: Vec<HistoryStart>,
-    /// Path by path, history by history.
+    /// Outcomes path by path, history by history.
     pub outcomes: Vec<Outcome>,
     /// Seconds spent on re-solved steps; all else is the same for the same request.
     pub resolve_seconds: f64,
 }
 
-/// A framework and the policy that serves every history, where one does.
+/// A framework and, if all histories share one, its policy.
 pub struct Follower {
-    /// Which framework it follows.
+    /// The framework it follows.
     pub framework: Framework,
-    /// Absent where each history has a policy of its own.
+    /// The shared policy; none if each history has its own.
     pub advisor: Option<Advisor>,
 }
 
@@ -107,12 +107,12 @@ impl Evaluation {
         Ok(Evaluation { request, histories, law, kept: Kept::default() })
     }
 
-    /// The same with what can be made again in `kept`.
+    /// Uses the cache `kept`.
     pub fn keeping(self, kept: Kept) -> Self {
         Evaluation { kept, ..self }
     }
 
-    /// As [`Self::new`], but from these histories, as if they had been drawn.
+    /// As [`Self::new`], but starts from these histories instead of drawing them.
     ///
     /// # Errors
     /// A field or a history that breaks its rule.
@@ -130,7 +130,7 @@ impl Evaluation {
         Ok(Evaluation { law: true_law(&request), request, histories, kept: Kept::default() })
     }
 
-    /// A framework with its policy, trained on the current pool; without one where each history has its own.
+    /// Returns a framework with its policy, trained on the current pool, or without one if each history has its own.
     ///
     /// # Errors
     /// As [`Training::solve_step`].
@@ -147,18 +147,18 @@ impl Evaluation {
         Ok(Advisor::with(policy, self.kept.clone()))
     }
 
-    /// The returns of a path.
+    /// Draws the returns of a path.
     pub fn returns(&self, history: usize, path: usize) -> Vec<f64> {
         let problem = &self.request.problem;
         let mut generator = stream(self.request.seed, "evaluate-path", history, path);
         (0..problem.horizon).map(|_| admissible(self.law.draw(&mut generator), problem)).collect()
     }
 
-    /// Sends every strategy through every path, on the current pool. `followers` are in the order of the request's
-    /// frameworks; `clock` tells seconds.
+    /// Simulates every strategy on every path, on the current pool. `followers` are in the order of the request's
+    /// frameworks; `clock` returns seconds.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`] soon after the stop signal; what the training of a frozen framework can fail with.
+    /// [`TrainError::Stopped`] soon after the stop signal; any error from training a frozen framework.
     pub fn simulate(
         &self,
         followers: &[Follower],
@@ -191,13 +191,13 @@ fn true_law(request: &EvaluationRequest) -> ContinuousLaw {
     continuous_law(law, &request.problem)
 }
 
-/// The history `index` of those drawn from the true law of a completed request.
+/// Draws history `index` from the true law of a completed request.
 pub fn drawn_history(request: &EvaluationRequest, law: &ContinuousLaw, index: usize) -> Vec<f64> {
     let mut generator = stream(request.seed, "evaluate-history", index, 0);
     request.problem.history.iter().map(|_| admissible(law.draw(&mut generator), &request.problem)).collect()
 }
 
-/// What it takes to simulate.
+/// The inputs of a simulation.
 struct Simulator<'a> {
     evaluation: &'a Evaluation,
     followers: &'a [Follower],
@@ -209,7 +209,7 @@ struct Simulator<'a> {
     done: AtomicUsize,
 }
 
-/// The paths of one history, with the seconds each spent on re-solved steps.
+/// The paths of one history, with the seconds that each spent on re-solved steps.
 type Paths = Vec<(Outcome, f64)>;
 
 impl Simulator<'_> {
@@ -232,7 +232,7 @@ impl Simulator<'_> {
         Ok((start(&advisors, history)?, outcomes?))
     }
 
-    /// The policies of the frameworks frozen at this history.
+    /// Trains the policies of the frameworks that are frozen at this history.
     fn own_advisors(&self, history: &[f64]) -> Result<Vec<Option<Advisor>>, TrainError> {
         let silent = Watch { stop: self.watch.stop, progress: &|_| {} };
         let own = |follower: &Follower| {
@@ -275,13 +275,13 @@ impl Simulator<'_> {
         Ok((outcome, seconds))
     }
 
-    /// Adds a return to what the distance of the centre is found from.
+    /// Adds a return to the sample from which the centre's distance is computed.
     fn learn(&self, sample: &mut Vec<Placed>, log_return: f64) {
         let spread = self.centring.spread(log_return).map(|(atom, mass)| self.distances.place(atom, mass));
         self.distances.learn(sample, spread);
     }
 
-    /// Distances of the centre to the true law before each return.
+    /// Returns the distances of the centre to the true law before each return.
     fn distances_along(&self, sample: &[Placed], returns: &[f64]) -> Vec<f64> {
         let mut sample = sample.to_vec();
         let before = |&log_return: &f64| {
@@ -292,7 +292,7 @@ impl Simulator<'_> {
         returns.iter().map(before).collect()
     }
 
-    /// What one framework comes to.
+    /// Simulates one framework on a path and returns its result.
     fn follow(
         &self,
         advisor: &Advisor,
@@ -330,7 +330,8 @@ impl Simulator<'_> {
     }
 }
 
-/// Quantile and radius at a history, those of the first framework with a ball, and what the frameworks promise there.
+/// Returns the quantile and radius of the first framework with a ball at a history, and the certainty equivalents
+/// promised there.
 fn start(advisors: &[&Advisor], history: &[f64]) -> Result<HistoryStart, TrainError> {
     let mut start = HistoryStart { quantile: None, radius: 0.0, promised: Vec::with_capacity(advisors.len()) };
     for advisor in advisors {

@@ -1,5 +1,4 @@
-//! What was lived, in figures, and the same of resamples of it: alike for all strategies, so that differences are of the same
-//! worlds.
+//! Figures of the record and of its resamples. All strategies share the resamples, so that differences are paired.
 
 use crate::control::evaluation::account::{Account, Annual};
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
@@ -9,39 +8,39 @@ use crate::numerics::streams::stream;
 use crate::numerics::student::{normal_cdf, student_two_sided};
 use crate::numerics::summary::{quantile, share_interval};
 
-/// Resamples; a block of periods is a year of them.
+/// Number of resamples; a block of periods is one year.
 pub const RESAMPLES: usize = 2000;
-/// Share of the years that are the worst.
+/// Share of the years that count as the worst.
 const WORST: f64 = 0.05;
 /// The series of one strategy that are resampled.
 pub struct Series<'a> {
     returns: Vec<f64>,
     traded: &'a [f64],
-    /// Returns of the years that begin with every period, ascending, each with the period.
+    /// Returns over the years that begin with every period, ascending, each with its first period.
     years: Vec<(f64, usize)>,
 }
 
-/// What one resample of the periods and rolling years gives for one strategy.
+/// The figures of one strategy on one resample of the periods and rolling years.
 pub struct Measured {
     /// Mean, volatility and Sharpe ratio.
     pub annual: Annual,
-    /// Share of wealth that is traded in a year.
+    /// Share of wealth that is traded per year.
     pub turnover: f64,
-    /// Share of the years, one from every period on, that end with less than they began with.
+    /// Share of years that end with a loss, among the years that begin with every period.
     pub chance_of_loss: f64,
-    /// Mean return of the worst twentieth of them.
+    /// Mean return of the worst twentieth of these years.
     pub worst_twentieth: f64,
 }
 
-/// All strategies over what was lived and over every resample of it.
+/// The figures of all strategies on the record and on every resample of it.
 pub struct Resampled {
     whole: Vec<Measured>,
     resampled: Vec<Vec<Measured>>,
-    /// Blocks of a year in what was lived.
+    /// Length of the record in years, which is its number of blocks of a year.
     years: f64,
 }
 
-/// How the intervals are made, those of differences of `comparisons` at once.
+/// Describes the intervals, with `comparisons` simultaneous differences.
 pub fn intervals(periods_per_year: usize, comparisons: usize) -> BacktestIntervals {
     BacktestIntervals {
         confidence: CONFIDENCE,
@@ -53,7 +52,7 @@ pub fn intervals(periods_per_year: usize, comparisons: usize) -> BacktestInterva
 }
 
 impl<'a> Series<'a> {
-    /// The series in the books of a strategy.
+    /// Returns the series in the account of a strategy.
     pub fn of(account: &'a Account, periods_per_year: usize) -> Self {
         let rolling = account.rolling_growth(periods_per_year).enumerate();
         let mut years: Vec<(f64, usize)> = rolling.map(|(start, growth)| (growth - 1.0, start)).collect();
@@ -76,8 +75,8 @@ impl<'a> Series<'a> {
         }
     }
 
-    /// The share of losses among the years that begin with every period, each counted so often, and the mean of the worst of them; of
-    /// the year at the edge as much counts as makes the share whole.
+    /// Returns the share of losses among the years that begin with every period, weighted by `counts`, and the mean of
+    /// the worst of them. The last of the worst years counts only in part, so that the share is exact.
     fn losses(&self, counts: &[f64]) -> (f64, f64) {
         let all: f64 = counts.iter().sum();
         let lost: f64 = self.years.iter().take_while(|year| year.0 < 0.0).map(|year| counts[year.1]).sum();
@@ -93,21 +92,21 @@ impl<'a> Series<'a> {
     }
 }
 
-/// What is counted, and how often.
+/// A resample: the periods and how often each rolling year counts.
 struct Drawn {
-    /// By number.
+    /// Indices of the periods.
     periods: Vec<usize>,
-    /// How often each year counts of those that begin with every period.
+    /// Weight of each of the years that begin with every period.
     rolling: Vec<f64>,
 }
 
 impl Drawn {
-    /// All that was lived, once.
+    /// Returns the whole record, once.
     fn whole(periods: usize, year: usize) -> Self {
         Drawn { periods: (0..periods).collect(), rolling: vec![1.0; periods + 1 - year] }
     }
 
-    /// Streams: ("bootstrap months", 0, draw) and ("rolling years", 0, draw).
+    /// Draws a resample. Streams: ("bootstrap months", 0, draw) and ("rolling years", 0, draw).
     fn again(whole: &Drawn, scale: &Scale, draw: usize) -> Self {
         let blocks = |purpose, length, block| circular_blocks(length, block, &mut stream(scale.seed, purpose, 0, draw));
         let year = scale.periods_per_year;
@@ -119,7 +118,7 @@ impl Drawn {
 }
 
 impl Resampled {
-    /// Resamples periods and rolling years; `bank` is what the bank paid in each period.
+    /// Resamples periods and rolling years; `bank` is the interest the bank paid in each period.
     pub fn of(series: &[Series], bank: &[f64], scale: &Scale) -> Self {
         let whole = Drawn::whole(bank.len(), scale.periods_per_year);
         let measure = |drawn: &Drawn| -> Vec<Measured> {
@@ -130,7 +129,7 @@ impl Resampled {
         Resampled { whole: measure(&whole), resampled: (0..RESAMPLES).map(resample).collect(), years }
     }
 
-    /// How the strategy of this number varied, whose books are `account`, and what it was worth.
+    /// Returns the worth and variation of strategy `index`, whose account is `account`.
     pub fn performance(
         &self,
         index: usize,
@@ -157,7 +156,7 @@ impl Resampled {
         }
     }
 
-    /// A figure of what was lived, with the ends of its resamples in blocks of so many years.
+    /// Returns a figure of the record, with an interval from its resamples in blocks of `block` years.
     fn estimate(&self, block: usize, of: impl Fn(&[Measured]) -> f64) -> BootstrapEstimate {
         let values: Vec<f64> = self.resampled.iter().map(|measured| of(measured)).collect();
         let tail = tail(self.years / block as f64);
@@ -165,8 +164,8 @@ impl Resampled {
     }
 }
 
-/// The share of resamples beyond each end, below (1 - [`CONFIDENCE`]) / 2 as so few blocks vary less among resamples than among
-/// records:
+/// Returns the share of resamples beyond each end. It is below (1 - [`CONFIDENCE`]) / 2, because with few blocks
+/// resamples vary less than records do:
 ///
 ///   normal( -t sqrt(n / (n - 1)) ),   t the quantile of Student's law with n - 1 degrees of freedom.
 ///
@@ -186,8 +185,8 @@ mod tests {
     use super::*;
     use crate::control::request::specification::UtilitySpecification;
 
-    /// 90 % of intervals of the mean and of the deviation hold the truth, within three standard errors of 300 records, at ten years
-    /// as at forty. The plain percentiles hold the mean in 83 % at ten.
+    /// Checks that 90 % of intervals of the mean and of the deviation hold the truth, within three standard errors of
+    /// 300 records, at ten years and at forty. At ten years the plain percentiles hold the mean in only 83 %.
     #[test]
     fn intervals_of_resamples_hold_in_few_years() {
         let mut generator = stream(5, "test", 0, 0);

@@ -1,7 +1,9 @@
-//! Walk-forward: every so many periods a policy is trained on the window of returns before, and lived by until the next one.
+//! Walk-forward: every `every` periods a policy is trained on the window of returns before, and followed until the next
+//! training.
 //!
-//! Decisions and accounts are apart: under power and log utility no band depends on wealth, and hardly on what is held, so the
-//! stretches between trainings can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
+//! Decisions and accounts are separate: under power and log utility no band depends on wealth, and hardly on the
+//! holding. The blocks of periods between trainings can therefore be decided in parallel, and wealth is computed
+//! afterwards ([`crate::control::evaluation::account`]).
 
 use std::sync::Arc;
 
@@ -24,50 +26,50 @@ use crate::control::request::specification::{
 use crate::control::request::support::Support;
 use crate::control::training::{Summaries, Training};
 
-/// One period of the real world.
+/// Returns of one actual period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Period {
-    /// Of the risky asset.
+    /// Log-return of the risky asset.
     pub log_return: f64,
     /// Simple return of the bank.
     pub bank_return: f64,
 }
 
-/// How allocations are found.
+/// A way to choose allocations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Strategy {
-    /// A ball that learns, at this miscoverage.
+    /// A policy with a ball that learns.
     Adaptive {
         /// Miscoverage of its ball.
         alpha: f64,
     },
-    /// The same, trained as if trading were free.
+    /// An adaptive policy trained as if trading were free.
     CostBlind {
         /// Miscoverage of its ball.
         alpha: f64,
     },
-    /// A ball frozen at the window.
+    /// A policy with a ball frozen at the window.
     Static {
         /// Miscoverage of its ball.
         alpha: f64,
     },
-    /// The centre of the balls, learned and taken as true.
+    /// A policy that learns the centre of the balls and takes it as true.
     PlugIn,
-    /// The same share always.
+    /// A constant mix.
     Mix {
         /// Share of wealth in the risky asset.
         share: f64,
     },
 }
 
-/// What was decided for one period, and why.
+/// The decision for one period, with its radius and source.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
-    /// The holdings that are kept as they are.
+    /// The no-trade region: holdings in it are kept as they are.
     pub band: Band,
-    /// Radius of the ball then; 0 where there is none.
+    /// Radius of the ball at that time; 0 if there is none.
     pub radius: f64,
-    /// Absent where nothing was trained.
+    /// Source of the advice; none if nothing was trained.
     pub source: Option<AdviceSource>,
 }
 
@@ -76,30 +78,30 @@ pub struct Decision {
 pub struct WalkForward {
     /// Periods of history that each policy is trained on.
     pub window: usize,
-    /// Periods that a policy is lived by, until the next is trained: at most the horizon.
+    /// Periods for which a policy is followed until the next is trained, at most the horizon.
     pub every: usize,
     /// Periods that a policy looks ahead.
     pub horizon: usize,
     /// Multiple of the radius of every ball.
     pub scale: f64,
-    /// Share of every radius that is acted on.
+    /// Share of every radius that is used.
     pub caution: CautionLevel,
-    /// What the adversary may use.
+    /// The log-returns that the adversary may use.
     pub support: Support,
-    /// Of the balls, and the law that plug-in takes as true.
+    /// Centre of the balls, and the law that plug-in takes as true.
     pub centre: CentreSpecification,
     /// Relative risk aversion: log utility at 1, power utility above.
     pub risk_aversion: f64,
-    /// That policies reckon with, of what is traded.
+    /// Cost that policies assume, as a share of each trade.
     pub trading_cost: f64,
-    /// Design points a step.
+    /// Design points per step.
     pub count: usize,
-    /// Of every training.
+    /// Seed of every training.
     pub seed: u64,
 }
 
 impl Strategy {
-    /// Whether it follows a policy.
+    /// Returns true if the strategy follows a policy.
     pub fn is_trained(self) -> bool {
         self.framework().is_some()
     }
@@ -108,21 +110,21 @@ impl Strategy {
         match self {
             Strategy::Adaptive { alpha } | Strategy::CostBlind { alpha } => Some((Framework::Adaptive, alpha)),
             Strategy::Static { alpha } => Some((Framework::Static, alpha)),
-            // Its radius is zero whatever the rule says.
+            // Its radius is zero under every rule.
             Strategy::PlugIn => Some((Framework::PlugIn, 0.1)),
             Strategy::Mix { .. } => None,
         }
     }
 }
 
-/// What the trainings of one stretch have in common; no bit of what is decided depends on it.
+/// Work shared by the trainings of one block of periods; no bit of a decision depends on it.
 pub struct Common {
     kept: Kept,
     measured: Arc<Summaries>,
 }
 
 impl Common {
-    /// With what can be made again in `kept`.
+    /// Prepares the shared work, with the cache `kept`.
     pub fn of(strategies: &[Strategy], kept: Kept) -> Self {
         let mut alphas: Vec<f64> = Vec::new();
         for strategy in strategies {
@@ -137,27 +139,28 @@ impl Common {
 }
 
 impl WalkForward {
-    /// Of terminal wealth, and of a year's in the figures.
+    /// Returns the utility of terminal wealth, also used for yearly wealth in the figures.
     pub fn utility(&self) -> UtilitySpecification {
         UtilitySpecification::relative(self.risk_aversion)
     }
 
-    /// From one training to the next, how often; the last may be cut short.
+    /// Returns the number of blocks of periods, one per training; the last may be cut short.
     pub fn stretches(&self, periods: usize) -> usize {
         periods.saturating_sub(self.window).div_ceil(self.every)
     }
 
-    /// Trainings that [`Self::decide`] takes: one a strategy that needs it and a stretch.
+    /// Returns the number of trainings in [`Self::decide`]: one per trained strategy and block of periods.
     pub fn trainings(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
         self.stretches(periods.len()) * strategies.iter().filter(|strategy| strategy.is_trained()).count()
     }
 
-    /// Steps of all these trainings.
+    /// Returns the number of steps of all these trainings.
     pub fn steps(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
         self.trainings(strategies, periods) * self.horizon
     }
 
-    /// The training request of one stretch from the periods before it. The bank is taken to go on paying what it paid last.
+    /// Returns the training request of one block from the periods before it. The bank is assumed to keep paying its
+    /// last rate.
     pub fn specification(&self, framework: Framework, alpha: f64, past: &[Period]) -> Specification {
         Specification {
             problem: ProblemSpecification {
@@ -181,9 +184,8 @@ impl WalkForward {
         }
     }
 
-    /// What each strategy holds through every period after the first window, on the current pool of threads.
-    /// The last stretch may be cut short. `solved` is called after every step of a training, of which there are
-    /// [`Self::steps`].
+    /// Decides what each strategy holds in every period after the first window, on the current pool of threads. The
+    /// last block of periods may be cut short. `solved` is called after each of the [`Self::steps`] of the trainings.
     ///
     /// # Errors
     /// Returns or choices that break a rule of the specification; a training that fails; the stop signal.
@@ -208,8 +210,8 @@ impl WalkForward {
         Ok(decisions)
     }
 
-    /// What one strategy holds from a training to the next; `common` is of its stretch, and `solved` is called after every
-    /// step of the training.
+    /// Decides what one strategy holds from one training to the next. `common` belongs to this block of periods, and
+    /// `solved` is called after every step of the training.
     ///
     /// # Errors
     /// As [`Self::decide`].
@@ -231,7 +233,7 @@ impl WalkForward {
         if matches!(strategy, Strategy::CostBlind { .. }) {
             specification.problem.trading_cost = 0.0;
         }
-        // A level has another share of the radius at each miscoverage, so that nothing is measured in common.
+        // A level uses a different share of the radius at each miscoverage, so no measurement can be shared.
         let measured = if self.caution.is_found() { Arc::default() } else { common.measured.clone() };
         let training = Training::among(&specification, common.kept.clone(), measured)?;
         let policy = training.run_by_steps(watch, solved)?;

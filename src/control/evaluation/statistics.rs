@@ -1,4 +1,4 @@
-//! From simulated paths to the report: what each strategy ended with, each figure with its interval.
+//! Turns simulated paths into the report, each figure with its interval.
 
 use rayon::prelude::*;
 
@@ -18,18 +18,18 @@ use crate::control::request::framework::Framework;
 use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
 
-/// Bins of the histograms.
+/// Number of bins of the histograms.
 const BINS: usize = 40;
-/// Wealth this near to that of the bank, as a share of it, is the bank's: it differs by rounding alone.
+/// Relative distance to the bank's wealth within which wealth counts as the bank's: it differs by rounding alone.
 const AT_BANK: f64 = 1e-9;
-/// Share of the paths that are the worst.
+/// Share of the paths that count as the worst.
 const WORST: f64 = 0.05;
 
 impl EvaluationReport {
-    /// The report of what was simulated, on the current pool. Cost O(strategies paths ln paths).
+    /// Builds the report of a simulation, on the current pool. Cost O(strategies paths ln paths).
     ///
     /// # Errors
-    /// As [`Policy::to_json`](crate::control::policy::Policy::to_json), from whose bytes a policy has its name.
+    /// As [`Policy::to_json`](crate::control::policy::Policy::to_json), whose bytes identify a policy.
     pub fn new(
         evaluation: &Evaluation,
         followers: &[Follower],
@@ -78,7 +78,7 @@ impl EvaluationReport {
 }
 
 impl Costs {
-    /// From the seconds of the two stages, and what re-solving took in all.
+    /// Computes the costs from the seconds of both stages and the total time of re-solving.
     pub fn new(training_seconds: f64, simulation_seconds: f64, outcomes: &Outcomes) -> Self {
         let resolved =
             outcomes.outcomes.iter().flat_map(|outcome| &outcome.lived).filter(|lived| lived.resolved).count();
@@ -87,14 +87,14 @@ impl Costs {
     }
 }
 
-/// Edges of [`BINS`] even bins from the least of all values to the most.
+/// Returns the edges of [`BINS`] even bins from the smallest value to the largest.
 fn edges(values: &[Vec<f64>]) -> Vec<f64> {
     let all = || values.iter().flatten().copied();
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     (0..=BINS).map(|bin| low + (high - low) * bin as f64 / BINS as f64).collect()
 }
 
-/// How many of the values lie in each bin between even edges.
+/// Counts the values in each bin between even edges.
 fn binned(values: impl Iterator<Item = f64>, edges: &[f64]) -> Vec<usize> {
     let (low, high) = (edges[0], edges[BINS]);
     let mut counts = vec![0; BINS];
@@ -179,7 +179,8 @@ impl Table<'_> {
         }
     }
 
-    /// The mean in units of the floor, where nothing saturates, taken back to wealth; no further than wealths seen.
+    /// Maps mean utility in units of the floor, which does not saturate, back to wealth, clamped to the simulated
+    /// wealths.
     fn certainty_equivalent(&self, wealth: &[f64]) -> Estimate {
         let (relative, floor) = self.relative_utility();
         let extreme = |pick: fn(f64, f64) -> f64, start: f64| wealth.iter().copied().fold(start, pick);
@@ -196,7 +197,8 @@ impl Table<'_> {
         Difference { utility: self.sample.mean(&utility), certainty_equivalent }
     }
 
-    /// Certainty equivalents by the delta method: each utility weighs as U^{-1} is steep at its strategy's mean.
+    /// Returns the difference of certainty equivalents by the delta method: each utility is weighted by the slope of
+    /// U^{-1} at its strategy's mean.
     fn apart(&self, own: &[f64], other: &[f64]) -> Estimate {
         let (relative, floor) = self.relative_utility();
         let linear = |wealth: &[f64]| {
@@ -210,7 +212,8 @@ impl Table<'_> {
         self.sample.mean(&apart)
     }
 
-    /// The mix goes through the returns of every path anew, since its share is known only now.
+    /// Compares a framework with its own mix. The mix is simulated on every path again, because its share is known only
+    /// now.
     fn own_mix(&self, index: usize) -> OwnMix {
         let Evaluation { request, .. } = self.evaluation;
         let (sum, count) = self.lived(index).fold((0.0, 0), |(sum, count), lived| (sum + lived.allocation, count + 1));
@@ -233,13 +236,13 @@ impl Table<'_> {
         wealth.iter().map(|wealth| relative.value((wealth / floor).ln())).collect()
     }
 
-    /// Every step of a framework, path by path.
+    /// Returns every step of a framework, path by path.
     fn lived(&self, index: usize) -> impl Iterator<Item = &Lived> {
         let horizon = self.evaluation.request.problem.horizon;
         self.outcomes.outcomes.iter().flat_map(move |outcome| &outcome.lived[index * horizon..(index + 1) * horizon])
     }
 
-    /// What `of` says of one period of a framework, on every path.
+    /// Returns the value of `of` in one period of a framework, on every path.
     fn at(&self, index: usize, step: usize, of: impl Fn(&Lived) -> f64) -> Vec<f64> {
         let position = index * self.evaluation.request.problem.horizon + step;
         self.outcomes.outcomes.iter().map(|outcome| of(&outcome.lived[position])).collect()
@@ -298,19 +301,19 @@ impl Table<'_> {
     }
 }
 
-/// Utility in units of the terminal wealth of all-bank, and that wealth.
+/// Returns utility in units of the terminal wealth of all-bank, and that wealth.
 fn relative_utility(problem: &ProblemSpecification) -> (RelativeUtility, f64) {
     let floor = Dynamics::of(problem)[0].floor(problem.initial_wealth, 0.0, problem.horizon);
     (RelativeUtility::new(problem.utility, floor), floor)
 }
 
-/// Whether changing the allocation earned anything.
+/// Returns a sentence on whether changing the allocation earned anything.
 fn sentence(strategy: &StrategyReport) -> Option<String> {
     let OwnMix { allocation, beyond: Estimate { value, low, high } } = strategy.own_mix?;
     Some(beside_own_mix(&strategy.strategy, allocation, value, [low, high], "these paths do"))
 }
 
-/// The derivative at `value` of wealth over the floor, exp(u^{-1}).
+/// Returns the derivative at `value` of wealth over the floor, exp(u^{-1}).
 fn wealth_slope(relative: RelativeUtility, value: f64) -> f64 {
     relative.inverse_slope(value) * relative.inverse(value).exp()
 }

@@ -1,5 +1,4 @@
-//! What the figures say, flattering or not: every sentence follows from them by a rule that is blind to the strategy. And the
-//! report of both.
+//! Sentences about the figures, flattering or not, by rules that treat all strategies alike; and the report of both.
 
 use crate::control::evaluation::analysis::Line;
 use crate::control::evaluation::backtest::{Backtest, Walked};
@@ -13,13 +12,14 @@ use crate::control::evaluation::yearly_worth::CONFIDENCE;
 use crate::control::policy::advice::AdviceSource;
 use crate::numerics::digits::{fixed, signed};
 
-/// Below it years say too little about the next one: a crash that comes once in ten years is missing from 35 % of the records of ten
-/// years, 12 % of those of twenty and 4 % of those of thirty, and an interval counts only what was seen.
+/// Fewer years say too little about the next one. A crash that comes once in ten years is missing from 35 % of the
+/// records of ten years, 12 % of those of twenty and 4 % of those of thirty. An interval counts only what is in the
+/// record.
 const FEWEST_YEARS: usize = 30;
-/// A hundredth of a millionth of wealth: a difference within it is rounding.
+/// A hundredth of a millionth of the initial wealth: a smaller difference is rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// One statement each, the most important first.
+/// Returns one statement each, the most important first.
 pub fn sentences(walked: &Walked) -> Vec<String> {
     let Walked { backtest, lines, analysis } = walked;
     let (figures, main) = (&analysis.figures, backtest.main_line());
@@ -44,7 +44,7 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
     sentences
 }
 
-/// The statement instead of comparisons, for years too few to compare.
+/// Returns the statement that replaces comparisons if there are too few years to compare.
 pub fn few_years(years: usize) -> Option<String> {
     let sentence = || {
         format!(
@@ -55,7 +55,7 @@ pub fn few_years(years: usize) -> Option<String> {
     (years < FEWEST_YEARS).then(sentence)
 }
 
-/// The periods that count in no year; none where there are none.
+/// Describes the periods that belong to no year; none if there are none.
 pub fn uncounted(periods: usize, noun: &str) -> Option<String> {
     let first = match periods {
         0 => return None,
@@ -80,7 +80,7 @@ fn ranking(figures: &[BacktestFigures], main: usize) -> String {
     )
 }
 
-/// Which strategies are behind, ahead, or not to be told apart.
+/// Names the strategies that are behind, ahead, or indistinguishable.
 fn against<'a>(others: impl Iterator<Item = &'a BacktestFigures>) -> String {
     let groups = grouped(others.map(|other| (other.strategy.as_str(), other.adaptive_ahead)));
     let compared = all_at_once(groups.iter().map(Vec::len).sum());
@@ -90,7 +90,7 @@ fn against<'a>(others: impl Iterator<Item = &'a BacktestFigures>) -> String {
     )
 }
 
-/// How many intervals hold together.
+/// Returns, in words, how many intervals hold simultaneously.
 pub fn all_at_once(comparisons: usize) -> String {
     let percent = 100.0 * CONFIDENCE;
     match comparisons {
@@ -99,7 +99,7 @@ pub fn all_at_once(comparisons: usize) -> String {
     }
 }
 
-/// Who has an interval above zero, who below, and who around it.
+/// Groups the names by intervals above zero, below zero and around zero.
 pub fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate)>) -> [Vec<&'a str>; 3] {
     let mut groups: [Vec<&str>; 3] = Default::default();
     for (name, BootstrapEstimate { interval: [low, high], .. }) in differences {
@@ -113,14 +113,14 @@ pub fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate
     groups
 }
 
-/// Names one after the other.
+/// Lists names, quoted.
 pub fn listed(names: &[&str]) -> String {
     let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
     if names.is_empty() { "none".into() } else { names.join("; ") }
 }
 
-/// What a strategy earned beside a constant mix of its own average allocation, and whether `witness` shows that changing the
-/// allocation did anything.
+/// Describes the gain of a strategy over a constant mix of its own average allocation, and whether `witness` shows an
+/// effect of changing the allocation.
 pub fn beside_own_mix(strategy: &str, allocation: f64, value: f64, [low, high]: [f64; 2], witness: &str) -> String {
     let verdict = match () {
         () if low > 0.0 => "changing the allocation paid".into(),
@@ -138,14 +138,14 @@ pub fn beside_own_mix(strategy: &str, allocation: f64, value: f64, [low, high]: 
     )
 }
 
-/// Whether moving in and out did anything that its average would not have done.
+/// Describes whether changing the allocation did anything that its average would not have done.
 fn timing(figures: &[BacktestFigures], main: usize) -> Option<String> {
     let main = &figures[main];
     let BootstrapEstimate { value, interval } = main.performance.beyond_own_mix?;
     Some(beside_own_mix(&main.strategy, main.performance.mean_allocation, value, interval, "the record does"))
 }
 
-/// The same of every other strategy that changes its allocation.
+/// Describes the timing of every other strategy that changes its allocation.
 fn timing_of_others(figures: &[BacktestFigures], main: usize) -> String {
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main);
     let [paid, cost, unclear] =
@@ -181,7 +181,7 @@ fn drawdown(figures: &[BacktestFigures], main: usize) -> Option<String> {
     ))
 }
 
-/// How often the surrogate could not be trusted and the step was solved.
+/// Describes how often the surrogate could not be trusted and the step was solved.
 fn guard(line: &Line, noun: &str) -> String {
     let decisions = &line.decisions;
     let resolved = decisions.iter().filter(|one| one.source == Some(AdviceSource::ResolvedOutsideDesign)).count();
@@ -191,10 +191,10 @@ fn guard(line: &Line, noun: &str) -> String {
     )
 }
 
-/// What trading costs in every account, and who knows of it.
+/// Describes the cost of trading in every account; `known` states which strategies take it into account.
 pub fn cost(cost: f64, known: &str) -> String {
     if cost > 0.0 {
-        // To a millionth, below which digits are those of binary fractions.
+        // Rounded to a millionth, because later digits come from binary fractions.
         let basis_points = (1e10 * cost).round() / 1e6;
         format!("Trading costs {basis_points} bp of what is traded in every account; {known}.")
     } else {
@@ -203,7 +203,7 @@ pub fn cost(cost: f64, known: &str) -> String {
 }
 
 impl BacktestReport {
-    /// Of all that was lived.
+    /// Builds the report of a finished walk-forward.
     pub fn new(walked: &Walked) -> Self {
         let Walked { backtest, lines, analysis } = walked;
         let (request, walk) = (&backtest.request, &backtest.walk);

@@ -1,4 +1,4 @@
-//! How much a year of a strategy is worth for certain, and by how much more than another's, with intervals.
+//! Certainty equivalent of a strategy per year, and its excess over another's, with intervals.
 
 use crate::control::evaluation::account::Account;
 use crate::control::evaluation::backtest_report::BootstrapEstimate;
@@ -6,26 +6,27 @@ use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::specification::UtilitySpecification;
 use crate::numerics::long_run_mean::{DRAWS, LongRunMean, simultaneous_spread};
 
-/// Wealth at the start of the whole, and of every year whose utility is taken.
+/// Wealth at the start of the record, and of every year whose utility is taken.
 pub const INITIAL_WEALTH: f64 = 100.0;
-/// Neighbouring years that may depend on each other.
+/// Consecutive years that may depend on each other.
 pub const YEAR_BLOCK: usize = 3;
-/// Probability that an interval is meant to hold.
+/// Intended coverage probability of an interval.
 pub const CONFIDENCE: f64 = 0.9;
-/// How far the share of a mix is moved to see what its share is worth.
+/// Step of a mix's share in a finite difference of its worth.
 const SHARE_STEP: f64 = 1e-3;
 
-/// Units and seed of the figures of a year.
+/// Units and seed of yearly figures.
 pub struct Scale {
     /// Periods in a year.
     pub periods_per_year: usize,
-    /// Of a year's wealth.
+    /// Utility of wealth at the end of a year.
     pub utility: UtilitySpecification,
-    /// Of the resamples.
+    /// Seed of the resamples.
     pub seed: u64,
 }
 
-/// The certainty equivalent of mean utility over years that each start with [`INITIAL_WEALTH`], and how much each year adds to it:
+/// The certainty equivalent of mean utility over years that each start with [`INITIAL_WEALTH`], and the contribution of
+/// each year to it:
 ///
 ///   C = U^-1( mean U(x_i) ),   part_i = (U(x_i) - mean U) / U'(C),
 ///
@@ -36,7 +37,7 @@ pub struct YearlyWorth {
     parts: Vec<f64>,
 }
 
-/// The books of a constant mix of a strategy's average share, and of one that holds a little more or less.
+/// The accounts of a constant mix of a strategy's average share, and of a mix with a slightly larger or smaller share.
 #[derive(Debug, Clone)]
 pub struct MixBooks {
     at_mean: Account,
@@ -45,7 +46,7 @@ pub struct MixBooks {
 }
 
 impl MixBooks {
-    /// The mix of `share`, whose books `keep` keeps.
+    /// Computes the accounts of the mix of `share` with `keep`.
     pub fn new(share: f64, keep: impl Fn(f64) -> Account) -> Self {
         let step = if share > 0.5 { -SHARE_STEP } else { SHARE_STEP };
         MixBooks { at_mean: keep(share), nearby: keep(share + step), step }
@@ -53,7 +54,7 @@ impl MixBooks {
 }
 
 impl YearlyWorth {
-    /// From the growth of wealth in each year.
+    /// Computes the worth from the growth of wealth in each year.
     pub fn new(utility: UtilitySpecification, growth: &[f64]) -> Self {
         let relative = RelativeUtility::new(utility, INITIAL_WEALTH);
         let values: Vec<f64> = growth.iter().map(|growth| relative.value(growth.ln())).collect();
@@ -64,25 +65,25 @@ impl YearlyWorth {
         YearlyWorth { certainty_equivalent, parts }
     }
 
-    /// The worth with its own interval.
+    /// Returns the worth with its own interval.
     pub fn estimate(&self) -> BootstrapEstimate {
         let mean = LongRunMean::new(self.certainty_equivalent, &self.parts, YEAR_BLOCK);
         BootstrapEstimate { value: mean.value(), interval: mean.interval(CONFIDENCE) }
     }
 
-    /// Its place among `worths`, 1 the best, by the certainty equivalent; equal ones share it.
+    /// Returns its rank among `worths` by the certainty equivalent, 1 for the best; equal ones share it.
     pub fn place<'a>(&self, worths: impl Iterator<Item = &'a YearlyWorth>) -> usize {
         1 + worths.filter(|other| other.certainty_equivalent > self.certainty_equivalent).count()
     }
 
-    /// By how much it exceeds another of the same years.
+    /// Returns its excess over another worth of the same years.
     pub fn beyond(&self, other: &YearlyWorth) -> LongRunMean {
         let parts: Vec<f64> = self.parts.iter().zip(&other.parts).map(|(own, other)| own - other).collect();
         LongRunMean::new(self.certainty_equivalent - other.certainty_equivalent, &parts, YEAR_BLOCK)
     }
 
-    /// By how much it exceeds the mix of the average share of `account`, whose worth this is. That share is itself an average over the
-    /// years, so a year that held more than it counts as what holding more was worth:
+    /// Returns its excess over the mix of the average share of `account`, whose worth this is. That share is itself an
+    /// average over the years, so each year is corrected by the worth of its deviation from it:
     ///
     ///   part_i = own_i - mix_i - dC_mix/da (a_i - mean a).
     ///
@@ -100,14 +101,14 @@ impl YearlyWorth {
     }
 }
 
-/// Intervals that hold all at once: whichever of so many comparisons looks best is among them.
+/// Returns simultaneous intervals, which also hold for whichever comparison looks best.
 pub fn at_once(differences: &[LongRunMean], seed: u64) -> Vec<BootstrapEstimate> {
     let spread = simultaneous_spread(differences, CONFIDENCE, DRAWS, seed);
     let estimate = |mean: &LongRunMean| BootstrapEstimate { value: mean.value(), interval: mean.within(spread) };
     differences.iter().map(estimate).collect()
 }
 
-/// As [`at_once`], where some have nothing to be compared with.
+/// As [`at_once`], if some have nothing to be compared with.
 pub fn present_at_once(differences: Vec<Option<LongRunMean>>, seed: u64) -> Vec<Option<BootstrapEstimate>> {
     let present: Vec<LongRunMean> = differences.iter().flatten().cloned().collect();
     let mut estimates = at_once(&present, seed).into_iter();
@@ -130,7 +131,7 @@ mod tests {
         let even = YearlyWorth::new(UtilitySpecification::Power { risk_aversion: 2.0 }, &[0.8, 1.2]);
         // Harmonic mean: 2 / (1/80 + 1/120).
         assert!((even.certainty_equivalent - 96.0).abs() < 1e-10);
-        // Risk aversion 30: U(100) has 1e-58 left of 1/29, and relative utility has all its digits.
+        // At risk aversion 30, U(100) keeps 1e-58 of 1/29, and relative utility has all its digits.
         let averse = UtilitySpecification::Power { risk_aversion: 30.0 };
         let expected = 100.0 * ((0.9_f64.powi(-29) + 1.1_f64.powi(-29)) / 2.0).powf(-1.0 / 29.0);
         assert!((YearlyWorth::new(averse, &[0.9, 1.1]).certainty_equivalent - expected).abs() < 1e-9);
@@ -153,8 +154,8 @@ mod tests {
         assert_eq!(worths.each_ref().map(|worth| worth.place(worths.iter())), [2, 1, 2, 4]);
     }
 
-    /// Shares that change from year to year for no reason: the truth is the average loss against the mix of the expected share, and
-    /// that the realised average differs from it is counted.
+    /// Checks shares that change at random from year to year. The truth is the average loss against the mix of the
+    /// expected share, and the interval accounts for the deviation of the realised average from it.
     #[test]
     fn the_share_of_the_own_mix_is_an_average_too() {
         let scale = Scale { periods_per_year: 1, utility: UtilitySpecification::Power { risk_aversion: 3.0 }, seed: 1 };
@@ -180,7 +181,7 @@ mod tests {
                 low <= truth && truth <= high
             })
             .count();
-        // 90 % of 600 within three standard errors, and a little for forty years that are linearised.
+        // 90 % of 600 within three standard errors, and a little more for the linearisation over forty years.
         assert!((505..=565).contains(&held), "{held}");
     }
 }

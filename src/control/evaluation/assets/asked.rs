@@ -1,4 +1,4 @@
-//! From a walk-forward request of several assets to the walk.
+//! Turns a request for a walk-forward of several assets into a prepared walk-forward.
 
 use super::report::AssetsChoices;
 use super::rules::{Rule, strategies};
@@ -12,7 +12,7 @@ use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
 
 impl AssetsBacktest {
-    /// Checks and completes a request, and that what it asks for is bounded.
+    /// Checks and completes a request, and bounds its size.
     ///
     /// # Errors
     /// A field that breaks its rule.
@@ -42,7 +42,7 @@ impl AssetsBacktest {
         Ok(backtest)
     }
 
-    /// Shares that all strategies together hold.
+    /// Returns the number of shares that all strategies hold over all periods.
     pub fn shares(&self) -> usize {
         let held = self.lived().len().saturating_mul(strategies(&self.choices.windows).len());
         held.saturating_mul(self.record.assets.len())
@@ -64,7 +64,7 @@ impl AssetsBacktest {
         Ok(())
     }
 
-    /// Log-returns that the one-step problems of all periods read.
+    /// Returns how many log-returns the one-step problems of all periods read.
     fn read(&self) -> usize {
         let is_solved = |rule: &Rule| matches!(rule, Rule::Robust { .. });
         let periods = self.first..self.record.rows.len();
@@ -75,8 +75,8 @@ impl AssetsBacktest {
         solved.map(|strategy| known(strategy.window)).sum::<usize>().saturating_mul(self.record.assets.len())
     }
 
-    /// What may be a mistake, by the fund of inverse volatilities of the first periods decided about; fields as they are named in
-    /// `request`.
+    /// Returns warnings about likely mistakes, judged on the inverse-volatility fund over the first periods that are
+    /// decided. Fields are named as in `request`.
     pub fn warnings(&self, request: &AssetsBacktestRequest) -> Vec<Warning> {
         let rows = self.record.known(self.first, self.choices.windows.iter().copied().flatten().max());
         let problem = ProblemSpecification {
@@ -88,7 +88,7 @@ impl AssetsBacktest {
     }
 }
 
-/// A rule that the walk breaks, under the name that its field has in a request.
+/// Renames the field of a rule broken by the walk-forward to the request's name for it.
 fn renamed(error: FieldError, returns: &str) -> FieldError {
     let field = match error.field.strip_prefix("simple_returns") {
         Some(at) => format!("{returns}{at}"),

@@ -1,4 +1,4 @@
-//! From the books of several assets to the report.
+//! Turns the accounts of several assets into the report.
 
 use super::report::{AssetsBacktestReport, AssetsFigures, AssetsPeriods, FORMAT};
 use super::words::sentences;
@@ -9,13 +9,13 @@ use crate::control::evaluation::backtest_report::BootstrapEstimate;
 use crate::control::evaluation::resampling::{Resampled, Series, intervals};
 use crate::control::evaluation::yearly_worth::{Scale, YearlyWorth, present_at_once};
 
-/// The index of equal shares of all wealth: the last but one.
+/// Returns the index of the strategy with all wealth in equal shares: the last but one.
 fn reference(lines: &[AssetsLine]) -> usize {
     lines.len() - 2
 }
 
 impl AssetsBacktestReport {
-    /// Of all that was lived.
+    /// Builds the report of a finished walk-forward.
     pub fn new(walked: &AssetsWalked) -> Self {
         let AssetsWalked { backtest, lines } = walked;
         let (record, choices) = (&backtest.record, &backtest.choices);
@@ -43,7 +43,8 @@ impl AssetsBacktestReport {
     }
 }
 
-/// The worth of a strategy and its place, and by how much it exceeds equal shares, and those at its own average total.
+/// A strategy's worth and rank, its excess over equal shares, and its excess over equal shares at its own average
+/// total.
 struct Compared {
     place: usize,
     worth: BootstrapEstimate,
@@ -88,7 +89,7 @@ fn figures(walked: &AssetsWalked, index: usize, compared: Compared, resampled: &
     }
 }
 
-/// `(sum a)^2 / sum a^2`, the mean over the periods in which anything is held.
+/// Returns `(sum a)^2 / sum a^2`, averaged over the periods in which anything is held.
 fn effective_assets(held: &[Vec<f64>]) -> Option<f64> {
     let of = |shares: &Vec<f64>| {
         let squares = shares.iter().map(|share| share * share).sum::<f64>();

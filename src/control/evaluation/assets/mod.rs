@@ -1,11 +1,13 @@
-//! Several assets walked through: what to hold of each through every period, by the one-step problem and by rules that people use.
+//! Walk-forward of several assets: the share of each to hold in every period, by the one-step problem and by common
+//! rules.
 //!
-//! Before a period a strategy chooses shares of wealth in the assets, the rest in the bank, from the returns that it knows, and they
-//! are held through it; nothing later is used. *Robust* is the one-step problem ([`crate::control::assets`]) under power or log
-//! utility. Its ball is that of `POST /advise` ([`FundsBall`]) at a level of caution, and is found at the start of every stretch of
-//! periods. *Static* solves once a stretch and keeps its shares; *plug-in* has the radius 0. No strategy knows of
-//! the trading cost. Nothing is trained: a policy of a fund over many periods holds what the one-step problem proposes, and its
-//! worth beyond that is some basis points a year.
+//! Before a period a strategy chooses shares of wealth in the assets, the rest in the bank, from the returns that it
+//! knows. It holds them through the period; nothing later is used. *Robust* is the one-step problem
+//! ([`crate::control::assets`]) under power or log utility. Its ball is that of `POST /advise` ([`FundsBall`]) at a
+//! level of caution, recomputed at the start of every block of periods. *Static* solves once per block and keeps its
+//! shares; *plug-in* has the radius 0. No strategy takes the trading cost into account. Nothing is trained: a policy
+//! over many periods holds the shares that the one-step problem proposes, and its worth beyond that is some basis
+//! points a year.
 
 use self::report::AssetsChoices;
 use self::rules::{AssetsStrategy, NONE, Rule, equal, strategies};
@@ -34,73 +36,73 @@ pub mod report;
 pub mod rules;
 mod words;
 
-/// Years that windows have, beside all.
+/// Lengths of the default windows in years, besides the window of all known returns.
 const WINDOW_YEARS: [usize; 2] = [10, 20];
-/// Windows at most.
+/// Most windows in a request.
 pub const MOST_WINDOWS: usize = 5;
 
-/// What several assets and the bank paid, period by period.
+/// Returns of several assets and of the bank, period by period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AssetsRecord {
     /// Names of the assets.
     pub assets: Vec<String>,
-    /// Log-returns, one for each asset.
+    /// Log-returns, one row per period and one column per asset.
     pub rows: Vec<Vec<f64>>,
     /// Simple returns of the bank.
     pub bank: Vec<f64>,
-    /// As fine as the frequency.
+    /// Dates, with the precision of the frequency.
     pub dates: Vec<String>,
-    /// How often there is a period.
+    /// How often a period occurs.
     pub frequency: Frequency,
     /// Periods in a year.
     pub periods_per_year: usize,
 }
 
-/// A prepared walk.
+/// A prepared walk-forward.
 #[derive(Debug, Clone)]
 pub struct AssetsBacktest {
     /// The whole record.
     pub record: AssetsRecord,
-    /// As checked.
+    /// The checked choices.
     pub choices: AssetsChoices,
-    /// The first period decided about: after the longest window, and after 20 years where all is known.
+    /// The first period that is decided: after the longest window, or after 20 years if all returns are known.
     pub first: usize,
 }
 
-/// What became of a strategy.
+/// The decisions and results of one strategy.
 pub struct AssetsLine {
-    /// In words.
+    /// Name in words.
     pub name: String,
-    /// How it found its shares.
+    /// How the strategy chooses its shares.
     pub strategy: AssetsStrategy,
     /// Shares of wealth in the assets, period by period.
     pub held: Vec<Vec<f64>>,
-    /// Radius of the ball in each period; 0 where there is none.
+    /// Radius of the ball in each period; 0 if there is none.
     pub radii: Vec<f64>,
-    /// Its books; an allocation is that in all assets together.
+    /// Its account; an allocation is the share in all assets together.
     pub account: Account,
-    /// The books of equal shares at its own average total; none of equal shares.
+    /// The accounts of equal shares at the strategy's own average total; none for equal shares themselves.
     pub own_mix: Option<MixBooks>,
 }
 
-/// What was decided, and what became of it.
+/// The decisions of all strategies and their results.
 pub struct AssetsWalked {
-    /// What was asked for.
+    /// The walk-forward that was run.
     pub backtest: AssetsBacktest,
     /// Strategies in their order.
     pub lines: Vec<AssetsLine>,
 }
 
 impl AssetsRecord {
-    /// The log-returns before `period` that are within a window.
+    /// Returns the log-returns before `period` that are within a window.
     fn known(&self, period: usize, window: Option<usize>) -> &[Vec<f64>] {
         &self.rows[window.map_or(0, |window| period.saturating_sub(window))..period]
     }
 }
 
 impl AssetsChoices {
-    /// Those that count where nothing is said, of so many periods a year and `found` in all: the windows that leave a year of the
-    /// record, else half of it.
+    /// Returns the default choices for a record of `found` periods with so many periods in a year. The windows are
+    /// those that leave one year of the record, or else half of it.
     pub fn usual(periods_per_year: usize, found: usize) -> Self {
         let long = WINDOW_YEARS.map(|years| years * periods_per_year);
         let mut windows: Vec<_> =
@@ -167,48 +169,48 @@ impl AssetsBacktest {
         Ok(backtest)
     }
 
-    /// The periods decided about.
+    /// Returns the log-returns of the periods that are decided.
     pub fn lived(&self) -> &[Vec<f64>] {
         &self.record.rows[self.first..]
     }
 
-    /// What the bank paid in them.
+    /// Returns what the bank paid in these periods.
     pub fn bank(&self) -> &[f64] {
         &self.record.bank[self.first..]
     }
 
-    /// Their dates.
+    /// Returns the dates of these periods.
     pub fn dates(&self) -> &[String] {
         &self.record.dates[self.first..]
     }
 
-    /// Of terminal wealth, and of a year's in the figures.
+    /// Returns the utility of terminal wealth, also used for yearly wealth in the figures.
     pub fn utility(&self) -> UtilitySpecification {
         UtilitySpecification::relative(self.choices.risk_aversion)
     }
 
-    /// How much of the past strategies of a window know, in words.
+    /// Returns, in words, how much of the past the strategies of a window know.
     pub fn window_in_words(&self, window: Option<usize>) -> String {
         words::window(window, self.record.periods_per_year, self.record.frequency.noun())
     }
 
-    /// Parts of the work: stretches of a strategy, and radii of a window.
+    /// Returns the number of parts of the work: blocks of periods per strategy, and radii per window.
     pub fn parts(&self) -> usize {
         self.starts().count() * (self.strategies().len() + self.choices.windows.len())
     }
 
-    /// Strategies in their order.
+    /// Returns the strategies in their order.
     pub fn strategies(&self) -> Vec<AssetsStrategy> {
         strategies(&self.choices.windows)
     }
 
-    /// The first periods of the stretches.
+    /// Returns the first period of each block.
     fn starts(&self) -> impl Iterator<Item = usize> + use<> {
         (self.first..self.record.rows.len()).step_by(self.choices.every)
     }
 
-    /// Decides every period on the current pool and keeps the books; `done` hears of every one of the [`parts`](Self::parts).
-    /// Cost: a one-step problem a period for each of the robust strategies.
+    /// Decides every period on the current pool and computes the accounts. `done` is called after each of the
+    /// [`parts`](Self::parts). Cost: a one-step problem per period for each of the robust strategies.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
@@ -218,7 +220,8 @@ impl AssetsBacktest {
         Ok(self.walked(&balls, held.into_iter().collect::<Result<_, _>>()?))
     }
 
-    /// The ball that holds for all funds at once, window by window, at the start of every stretch: as `POST /advise` finds it.
+    /// Returns the ball that holds for all funds at once, for each window at the start of every block, as `POST
+    /// /advise` finds it.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
@@ -238,7 +241,8 @@ impl AssetsBacktest {
         self.choices.windows.iter().map(of_window).collect()
     }
 
-    /// What `POST /advise` is asked before a period by who knows a window. The bank is taken to go on paying what it paid last.
+    /// Returns the problem that `POST /advise` would solve before a period with a window of returns. The bank is
+    /// assumed to keep paying its last rate.
     fn problem(&self, period: usize, window: Option<usize>) -> AssetsProblem {
         let asked = ProblemSpecification {
             utility: self.utility(),
@@ -250,7 +254,7 @@ impl AssetsBacktest {
         asked_of(self.record.assets.clone(), self.record.known(period, window).to_vec(), &asked)
     }
 
-    /// What a strategy holds in every period, where the balls are those.
+    /// Returns the shares that a strategy holds in every period, given the balls.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
@@ -264,7 +268,7 @@ impl AssetsBacktest {
         strategy.decide(self, self.balls_of(strategy, balls), watch, done)
     }
 
-    /// The books of what every strategy held.
+    /// Computes the accounts of the shares that every strategy held.
     pub fn walked(self, balls: &[Vec<FundsBall>], held: Vec<Vec<Vec<f64>>>) -> AssetsWalked {
         let line = |(strategy, held)| self.line(strategy, held, self.balls_of(strategy, balls));
         let lines = self.strategies().into_iter().zip(held).map(line).collect();
@@ -341,7 +345,7 @@ mod tests {
         walked.lines.iter().find(|line| line.name == name).unwrap_or_else(|| panic!("{name} is none of {names:?}"))
     }
 
-    /// The robust one too: half of three equal assets is half of one.
+    /// Checks the robust strategy also: half of three equal assets is half of one.
     #[test]
     fn assets_that_are_one_have_the_rows_of_one() {
         let walked = walk(record(3, 30, |_, period| log_return(0, period)));
@@ -374,7 +378,7 @@ mod tests {
                 (beyond.is_some(), found.performance.beyond_own_mix.is_some()),
                 (strategy.starts_with("Robust"), beyond_own_mix.is_some())
             );
-            // Its interval is wider beside more strategies.
+            // The interval is wider if there are more strategies.
             let value = |found: BootstrapEstimate| BootstrapEstimate { value: found.value, interval: [found.value; 2] };
             let beyond = beyond.map(|(found, one)| (value(found), value(one)));
             for (found, one) in estimates.into_iter().chain(beyond) {
@@ -390,7 +394,7 @@ mod tests {
         }
     }
 
-    /// Plug-in is the best mean utility over all funds of the returns known: no other share of its fund is worth more.
+    /// Checks that plug-in attains the best mean utility over all funds of the known returns: no grid point has more.
     #[test]
     fn plug_in_is_best_by_direct_search_and_robust_holds_less() {
         let walked = walk(record(2, 24, log_return));
@@ -407,7 +411,7 @@ mod tests {
         let best = grid.map(mean).fold(f64::NEG_INFINITY, f64::max);
         // Twelve periods of a hundredth of a basis point.
         assert!(mean([plug_in[0], plug_in[1]]) > best - 12.0 * 2.0 * 1e-6, "{plug_in:?}");
-        // At a radius of few doubts all are the same, and at the usual one the whole of it leaves little.
+        // At a small radius all shares are equal, and the whole usual radius leaves little in the assets.
         let all: f64 = plug_in.iter().sum();
         let careful = walk_at(record(2, 24, log_return), 0.1);
         let total =
@@ -432,7 +436,7 @@ mod tests {
         }
         let before = changed(0, 4);
         for (line, other) in walked.lines.iter().zip(&before.lines) {
-            // Radii and static shares of a year are of its start, three years and more after the change.
+            // Radii and static shares of a year date from its start, which is at least three years after the change.
             let forgets = line.strategy.window.is_some() || matches!(line.strategy.rule, Rule::Equal { .. });
             let apart = line.held[4..].iter().flatten().zip(other.held[4..].iter().flatten());
             let apart = apart.map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
@@ -450,14 +454,14 @@ mod tests {
         assert_eq!((&kept.held[0], &kept.radii), (&robust.held[0], &robust.radii));
         let wide = named(&walked, "Robust, full caution, knows all");
         assert!(wide.radii.iter().zip(&robust.radii).all(|(whole, share)| share <= whole));
-        // Of one fund at least: its bridges' quantile over the root of the number of returns.
+        // At least the radius of one fund: its bridges' quantile over the square root of the number of returns.
         let rows = &walked.backtest.record.rows[..16];
         let bridges = FundBridges::simulate(rows, 500, walked.backtest.choices.seed);
         let half = bridges.quantile(&[0.5, 0.5], 0.9).value / 4.0;
         assert!(wide.radii[4] > half && wide.radii[4] < 3.0 * half, "{} {half}", wide.radii[4]);
     }
 
-    /// At every level, as `POST /advise` holds at the start of the walk.
+    /// Checks each level against the shares that `POST /advise` holds at the start of the walk-forward.
     #[test]
     fn a_level_holds_what_advice_at_that_level_holds() {
         let walked = walk(record(3, 24, log_return));

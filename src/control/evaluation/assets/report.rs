@@ -1,4 +1,4 @@
-//! The report of several assets walked through, as it is written; `docs/backtest.md` says what its figures are.
+//! The report of a walk-forward of several assets, as it is serialised; `docs/backtest.md` explains its figures.
 
 use std::collections::BTreeMap;
 
@@ -9,88 +9,89 @@ use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEs
 use crate::control::evaluation::names::StrategyKind;
 use crate::control::request::support::Support;
 
-/// Name and version of the report's form.
+/// Name and version of the report format.
 pub const FORMAT: &str = "ballast-backtest-assets-1";
 
-/// Strategies that lived through a record of several assets. The same record and choices give the same report, bit for bit.
+/// Strategies compared over a record of several assets. The same record and choices give the same report, bit for bit.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsBacktestReport {
     /// `ballast-backtest-assets-1`.
     pub format: String,
-    /// Names, in the order of the columns.
+    /// Names of the assets, in the order of the columns.
     pub assets: Vec<String>,
     /// `daily`, `weekly`, `monthly`, `quarterly` or `yearly`.
     pub frequency: String,
     /// Periods in a year.
     pub periods_per_year: usize,
-    /// Of the periods decided about.
+    /// Dates of the periods that were decided.
     pub dates: Vec<String>,
-    /// Whole years decided about, whose utility is taken; the last ends with the last period.
+    /// Whole years that were decided, over which mean utility is taken; the last ends with the last period.
     pub whole_years: usize,
-    /// The first periods decided about, fewer than a year, which count in none of them.
+    /// Number of periods before the first whole year, fewer than a year; they count in no year.
     pub uncounted_periods: usize,
-    /// As completed.
+    /// The completed choices.
     pub choices: AssetsChoices,
     /// How the intervals were made.
     pub intervals: BacktestIntervals,
-    /// One strategy in figures each.
+    /// The figures of each strategy.
     pub strategies: Vec<AssetsFigures>,
-    /// What each strategy did, in their order.
+    /// The decisions and results of each strategy, in the same order.
     pub periods: Vec<AssetsPeriods>,
-    /// What the figures say, the most important first.
+    /// The findings in sentences, the most important first.
     pub sentences: Vec<String>,
 }
 
-/// How a record of several assets is walked through.
+/// The choices of a walk-forward of several assets.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsChoices {
-    /// Periods that strategies know; null is all since the first.
+    /// Numbers of past periods that strategies know; null means all since the first.
     pub windows: Vec<Option<usize>>,
-    /// Periods from one measuring of the radius, and one choice of the static strategy, to the next.
+    /// Periods from one measurement of the radius, and one choice of the static strategy, to the next.
     pub every: usize,
     /// Miscoverage of the radius.
     pub alpha: f64,
     /// The log-returns of each asset that the adversary may use.
     pub support: Support,
-    /// Relative.
+    /// Relative risk aversion.
     pub risk_aversion: f64,
-    /// Lost of what is traded, as a share of it.
+    /// Share of each trade that is lost.
     pub trading_cost: f64,
-    /// Of the bridges and of the resamples.
+    /// Seed of the bridges and of the resamples.
     pub seed: u64,
 }
 
-/// One strategy in figures.
+/// The figures of one strategy.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsFigures {
-    /// Its name.
+    /// Name of the strategy.
     pub strategy: String,
-    /// Its kind.
+    /// Kind of the strategy.
     pub kind: StrategyKind,
-    /// Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it.
+    /// Its rank by `yearly_certainty_equivalent`, 1 for the best; equal ones share it.
     pub place: usize,
-    /// As of every strategy; its own mix is equal shares at its own average total, and an allocation that in all assets together.
+    /// Figures that every strategy has. Its own mix is equal shares at its own average total, and an allocation is the
+    /// share in all assets together.
     #[serde(flatten)]
     pub performance: Performance,
-    /// Its certainty equivalent less that of equal shares in all assets; null of those.
+    /// Its certainty equivalent less that of equal shares in all assets; null for equal shares.
     pub beyond_equal: Option<BootstrapEstimate>,
-    /// `(sum a)^2 / sum a^2`, the mean over the periods in which anything is held; null where nothing ever is.
+    /// `(sum a)^2 / sum a^2`, averaged over the periods in which anything is held; null if nothing ever is.
     pub effective_assets: Option<f64>,
     /// Share of wealth in each asset, by its name.
     pub mean_allocations: BTreeMap<String, f64>,
 }
 
-/// What one strategy did, a number a period.
+/// The decisions and results of one strategy, one number per period.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsPeriods {
-    /// Its name.
+    /// Name of the strategy.
     pub strategy: String,
     /// Share of wealth held in each asset, by its name.
     pub allocations: BTreeMap<String, Vec<f64>>,
-    /// Of the ball, in log-return; 0 where there was none.
+    /// Radius of the ball, in log-return; 0 if there was none.
     pub radius: Vec<f64>,
-    /// Share of wealth that was bought and sold at the start.
+    /// Share of wealth that was bought and sold at the start of the period.
     pub traded: Vec<f64>,
-    /// At the end, from 100.
+    /// Wealth at the end of the period, from 100.
     pub wealth: Vec<f64>,
 }

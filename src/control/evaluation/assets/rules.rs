@@ -1,4 +1,4 @@
-//! What to hold of several assets, by rule.
+//! Rules that choose the shares of several assets.
 
 use super::AssetsBacktest;
 use crate::control::assets::advising::{FundsBall, floors};
@@ -13,49 +13,49 @@ use crate::control::request::fund::GroundNorm;
 use crate::numerics::least_variance::least_variance;
 use crate::numerics::levelling::inverse_volatility;
 
-/// How shares of wealth are found.
+/// A rule that chooses shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// The one-step problem, solved in every period. At no caution it is plug-in: the empirical law is taken as true.
+    /// The one-step problem, solved in every period. With no caution it is plug-in: the empirical law is taken as true.
     Robust {
-        /// What moving a law costs the adversary.
+        /// The adversary's cost of moving a law.
         norm: GroundNorm,
-        /// Of the radius, what is acted on.
+        /// Share of the radius that is used.
         caution: CautionLevel,
     },
-    /// The same under the norm `scaled_one`, solved at the start of every stretch and kept.
+    /// The one-step problem under the norm `scaled_one`, solved at the start of every block of periods and kept.
     Static {
-        /// Of the radius, what is acted on.
+        /// Share of the radius that is used.
         caution: CautionLevel,
     },
-    /// All wealth at the least variance.
+    /// All wealth at minimum variance.
     MinimumVariance,
     /// All wealth, in inverse proportion to the deviations of the returns.
     InverseVolatility,
     /// The same share in every asset.
     Equal {
-        /// In all of them together.
+        /// Share in all assets together.
         share: f64,
     },
 }
 
-/// A rule, and how many of the last periods it knows; all since the first where that is none.
+/// A rule, and how many of the last periods it knows; none means all since the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AssetsStrategy {
-    /// How it finds its shares.
+    /// How it chooses its shares.
     pub rule: Rule,
-    /// Periods.
+    /// Number of periods it knows.
     pub window: Option<usize>,
 }
 
-/// What of the radius is walked with, the default first: under the norm `scaled_one`, and under `sup`.
+/// Levels of caution that are compared, the default first: under the norm `scaled_one`, and under `sup`.
 const LEVELS: [CautionLevel; 4] =
     [CautionLevel::Balanced, CautionLevel::Bold, CautionLevel::Cautious, CautionLevel::Paper];
 const SUP_LEVELS: [CautionLevel; 2] = [CautionLevel::Balanced, CautionLevel::Paper];
-/// What trusts the record.
+/// The caution that uses none of the radius and so trusts the record.
 pub const NONE: CautionLevel = CautionLevel::Scale(0.0);
 
-/// Those that are walked for each window, and the two that know nothing.
+/// Returns the strategies compared for each window, and the two that use no returns.
 pub fn strategies(windows: &[Option<usize>]) -> Vec<AssetsStrategy> {
     let robust = LEVELS.into_iter().map(|caution| Rule::Robust { norm: GroundNorm::ScaledOne, caution });
     let sup = SUP_LEVELS.into_iter().map(|caution| Rule::Robust { norm: GroundNorm::Sup, caution });
@@ -72,7 +72,7 @@ pub fn strategies(windows: &[Option<usize>]) -> Vec<AssetsStrategy> {
 }
 
 impl Rule {
-    /// Its kind, whatever its scale.
+    /// Returns the kind of the rule.
     pub fn kind(self) -> StrategyKind {
         match self {
             Rule::Robust { caution: NONE, .. } => StrategyKind::PlugIn,
@@ -86,7 +86,7 @@ impl Rule {
         }
     }
 
-    /// What of the radius is acted on, where there is one.
+    /// Returns the level of caution, if the rule uses a radius.
     pub fn caution(self) -> Option<CautionLevel> {
         match self {
             Rule::Robust { caution, .. } | Rule::Static { caution, .. } => Some(caution).filter(|level| *level != NONE),
@@ -95,13 +95,13 @@ impl Rule {
     }
 }
 
-/// Shares that are the same in every asset.
+/// Returns shares that are the same in every asset.
 pub fn equal(assets: usize, share: f64) -> Vec<f64> {
     vec![share / assets as f64; assets]
 }
 
 impl AssetsStrategy {
-    /// In words; `known` says of the window what it is.
+    /// Returns the name in words; `known` describes the window.
     pub fn name(&self, known: impl Fn(Option<usize>) -> String) -> String {
         let caution = self.rule.caution().map_or(String::new(), |level| format!(", {}", caution_in_words(level)));
         let window = match self.rule {
@@ -111,7 +111,8 @@ impl AssetsStrategy {
         format!("{}{caution}{window}", self.rule.kind().name())
     }
 
-    /// Shares of wealth in every period decided about; `balls` are those of the stretches. `done` hears of every stretch.
+    /// Returns the shares of wealth in every period that is decided; `balls` are those of the blocks of periods. `done`
+    /// is called after every block.
     ///
     /// # Errors
     /// [`TrainError::Stopped`].
@@ -151,16 +152,16 @@ impl AssetsStrategy {
     }
 }
 
-/// The one-step problem before a period. The bank is taken to go on paying what it paid last.
+/// Returns the one-step problem before a period. The bank is assumed to keep paying its last rate.
 fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: GroundNorm, radius: f64) -> AssetsStep {
     let rate = backtest.record.bank[period - 1];
-    // Under power and log utility wealth changes nothing.
+    // Under power and log utility the solution does not depend on wealth.
     let utility = RelativeUtility::new(backtest.utility(), 1.0 + rate);
     let law = AssetsLaw { returns: rows, radius, floors: floors(backtest.choices.support, rows) };
     AssetsStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
 }
 
-/// Of log-returns, date by date.
+/// Returns the covariance of log-returns, given date by date.
 fn covariance(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let (count, width) = (rows.len() as f64, rows[0].len());
     let mean = |asset: usize| rows.iter().map(|row| row[asset]).sum::<f64>() / count;

@@ -1,4 +1,4 @@
-//! What the figures of several assets say, by rules that are blind to the strategy.
+//! Sentences about the figures of several assets, by rules that treat all strategies alike.
 
 use super::report::AssetsFigures;
 use super::{AssetsLine, AssetsWalked};
@@ -7,7 +7,7 @@ use crate::control::evaluation::backtest_report::BootstrapEstimate;
 use crate::control::evaluation::names::{StrategyKind, quoted};
 use crate::control::evaluation::verdict::{all_at_once, cost, few_years, grouped, listed, uncounted};
 
-/// How much of the past a strategy knows.
+/// Returns, in words, how much of the past a strategy knows.
 pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
     let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
     match window {
@@ -17,7 +17,7 @@ pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
     }
 }
 
-/// One statement each, the most important first.
+/// Returns one statement each, the most important first.
 pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures]) -> Vec<String> {
     let (lived, record) = (walked.backtest.lived().len(), &walked.backtest.record);
     let mut sentences = vec![ranking(figures)];
@@ -75,14 +75,14 @@ fn against_own_mix(figures: &[AssetsFigures]) -> String {
     )
 }
 
-/// Who has an interval above zero and who below, by name; how many have it around zero.
+/// Returns the names with an interval above zero, the names with one below, and how many have one around zero.
 fn of_each(figures: &[AssetsFigures], of: impl Fn(&AssetsFigures) -> Option<BootstrapEstimate>) -> [String; 3] {
     let [above, below, around] =
         grouped(figures.iter().filter_map(|figures| Some((figures.strategy.as_str(), of(figures)?))));
     [listed(&above), listed(&below), format!("the other {}", around.len())]
 }
 
-/// From the least to the most of every family of strategies.
+/// Returns the range from least to most of every family of strategies.
 fn ranges(
     lines: &[AssetsLine],
     figures: &[AssetsFigures],

@@ -1,4 +1,4 @@
-//! The laws that records are drawn from, and the draws.
+//! The laws that records are drawn from, and the drawing of records.
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -9,28 +9,29 @@ use crate::control::request::learning::SMALLEST_DEVIATION;
 use crate::control::request::support::Interval;
 use crate::numerics::streams::stream;
 
-/// Atoms of a smoothed law, about; every return seen is spread over as many, two at least.
+/// Approximate number of atoms of a smoothed law; each past return is spread over equally many atoms, at least two.
 const ATOMS: usize = 4096;
-/// Atoms of one return, at most.
+/// Most atoms of one return.
 const MOST_SPREAD: usize = 16;
-/// A record in which an asset never moves has no volatility: it is drawn again, so often at most.
+/// Most draws of a record: one in which an asset never moves has no volatility and is drawn again.
 const DRAWS: usize = 100;
 
-/// A law of log-returns whose atoms, date by date, have the same mass.
+/// A law of log-returns with atoms of equal mass, one for each date.
 pub(super) struct RecordLaw {
     pub(super) rows: Vec<Vec<f64>>,
     pub(super) bandwidth: f64,
 }
 
 impl RecordLaw {
-    /// Of the returns seen.
+    /// Returns the empirical law of the past returns.
     pub(super) fn of(rows: &[Vec<f64>]) -> Self {
         RecordLaw { rows: rows.to_vec(), bandwidth: 0.0 }
     }
 
-    /// The returns seen, each spread over a few draws of a normal law with `bandwidth^2` times the covariance of the record, and
-    /// brought back to its means and variances: Silverman's smoothed bootstrap that keeps the variance. The bandwidth is his rule of
-    /// thumb, `(4 / ((d + 2) n))^(1 / (d + 4))`. What lies beyond `support` is moved to its end, which moves means and variances.
+    /// Returns the smoothed law: each past return is spread over a few draws of a normal law with `bandwidth^2` times
+    /// the covariance of the record. The result is rescaled to the record's means and variances: Silverman's smoothed
+    /// bootstrap that keeps the variance. The bandwidth is Silverman's rule of thumb, `(4 / ((d + 2) n))^(1 / (d +
+    /// 4))`. Values beyond `support` are clamped to its ends, which changes means and variances.
     ///
     /// Source: Silverman (1986), Density estimation, sections 4.3.2 and 6.4.1. Checked by: `means_and_variances_stay`.
     pub(super) fn smoothed(rows: &[Vec<f64>], support: Option<Interval>, seed: u64) -> Self {
@@ -40,7 +41,7 @@ impl RecordLaw {
         let (means, deviations) = moments(rows);
         let pairs = (ATOMS / count).clamp(2, MOST_SPREAD) / 2;
         let mut generator = stream(seed, "kernel", 0, 0);
-        // A normal sum of the record's own deviations has its covariance.
+        // A normally weighted sum of the record's own deviations has the record's covariance.
         let noise: Vec<Vec<f64>> = (0..pairs * count)
             .map(|_| {
                 let mut noise = vec![0.0; width];
@@ -71,8 +72,8 @@ impl RecordLaw {
         RecordLaw { rows: spread, bandwidth }
     }
 
-    /// The same with every asset's mean simple return that of the bank, whose growth a period is `bank`. Where that lies above, it is
-    /// moved up. The returns may leave the support.
+    /// Returns this law moved so that every asset's mean simple return is that of the bank, whose growth per period is
+    /// `bank`. An asset with a lower mean is moved up. The returns may leave the support.
     pub(super) fn without_premium(&self, bank: f64) -> Self {
         let width = self.rows.first().map_or(0, Vec::len);
         let size = self.rows.len() as f64;
@@ -82,10 +83,10 @@ impl RecordLaw {
         RecordLaw { rows: self.rows.iter().map(moved).collect(), bandwidth: self.bandwidth }
     }
 
-    /// A record of so many dates. Stream: (seed, "smoothed" or "blocks", 0, index).
+    /// Draws a record of `count` dates. Stream: (seed, "smoothed" or "blocks", 0, index).
     ///
     /// # Errors
-    /// An asset moves so rarely that no record drawn shows it.
+    /// An asset that moves so rarely that no drawn record shows a change.
     pub(super) fn record(
         &self,
         kind: Bootstrap,
@@ -117,7 +118,7 @@ impl RecordLaw {
     }
 }
 
-/// Mean and deviation of every column.
+/// Returns mean and deviation of every column.
 fn moments(rows: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let (size, width) = (rows.len() as f64, rows.first().map_or(0, Vec::len));
     let column = |asset: usize| rows.iter().map(move |row| row[asset]);

@@ -1,18 +1,19 @@
-//! The frontier of caution: for multiples of the radius, what following the robust advice would have cost on records like the one
-//! at hand, on average and from record to record.
+//! The frontier of caution: for multiples of the radius, the cost of following the robust advice on records like the
+//! given one, on average and from record to record.
 //!
 //! Three laws stand for the unknown one:
-//!   smoothed         every return seen, spread by a kernel (`laws`); records are independent draws of it,
-//!   block            the returns seen; records are blocks of them in a row, so that what follows what stays as it was,
-//!   without premium  the smoothed law moved down to the bank's mean, as the record may have been luck.
-//! A record of the length of the own one is drawn, the advice at each multiple is solved on it, and is scored by the law that
-//! the record was drawn from. What is told is the loss against the best allocation for that law,
+//!   smoothed         every past return, spread by a kernel (`laws`); records are independent draws of it,
+//!   block            the past returns; records are blocks of consecutive returns, which keeps their dependence,
+//!   without premium  the smoothed law moved down to the bank's mean, because the record may have been luck.
+//! A record as long as the given one is drawn, and the advice at each multiple is solved on it. The law that the record
+//! was drawn from scores the advice. The reported figure is the loss against the best allocation for that law,
 //!
 //!   lost(a) = 1e4 (ln CE(a*) - ln CE(a)),   CE(a) = U^-1( E[ U(w(a, Z)) ] ),
 //!
-//! in basis points, times the periods of a year where they are known. For penalties by smooth divergences a little
-//! robustness costs the mean at second order and spares the deviation at first (Gotoh, Kim and Lim 2021, Calibration of distributionally
-//! robust empirical optimization models, Operations Research 69). For this ball neither holds: its price is of first order.
+//! in basis points, times the periods per year if they are known. For penalties by smooth divergences, a little
+//! robustness costs the mean at second order and reduces the deviation at first (Gotoh, Kim and Lim 2021, Calibration
+//! of distributionally robust empirical optimization models, Operations Research 69). For this ball neither holds: its
+//! price is of first order.
 
 mod laws;
 pub mod report;
@@ -37,37 +38,37 @@ use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
 use crate::numerics::summary::{Clustered, Estimate};
 
-/// Of all intervals.
+/// Confidence level of all intervals.
 const LEVEL: f64 = 0.9;
-/// Basis points of one.
+/// Basis points in one.
 const BASIS_POINTS: f64 = 1e4;
-/// Laws that records are drawn from.
+/// Number of laws that records are drawn from.
 const LAWS: usize = 3;
-/// How far a share is moved to see what it is worth.
+/// Step of a share in a finite difference of the worth.
 const SHARE_STEP: f64 = 1e-5;
-/// Progress is told about so often.
+/// Number of progress reports.
 const REPORTS: usize = 100;
 
-/// A question with what its answer needs made ready.
+/// A question, with everything that its answer needs prepared.
 pub struct Frontier {
     question: FrontierQuestion,
     radii: RadiusEstimator,
-    /// Of the radius of all funds at once over that of one, at the record at hand; records drawn from it take the same, and so they
-    /// do the factor of a calibrated radius.
+    /// The radius for all funds at once divided by that for one, on the given record. Records drawn from it use the
+    /// same factor, and also the same factor of a calibrated radius.
     factor: f64,
     utility: RelativeUtility,
 }
 
-/// What was decided on one record at every scale.
+/// The decisions on one record at every scale.
 struct Decided {
-    /// Lost by each, in the unit of the report.
+    /// Loss at each scale, in the unit of the report.
     lost: Vec<f64>,
-    /// Shares of wealth in the assets.
+    /// Shares of wealth in the assets, at each scale.
     allocations: Vec<Vec<f64>>,
 }
 
 impl Frontier {
-    /// With what can be made again in `kept`.
+    /// Prepares the answer, with the cache `kept`.
     pub fn new(question: FrontierQuestion, kept: Kept) -> Self {
         let fund = &question.fund.problem;
         let factor = advising::radius_factor(&question.assets, fund, question.request.seed);
@@ -76,7 +77,7 @@ impl Frontier {
         Frontier { radii, factor, utility, question }
     }
 
-    /// The report. Cost: a robust step for each scale and resample.
+    /// Computes the report. Cost: a robust step for each scale and resample.
     /// Checked by: `tests/service/frontier.rs`.
     ///
     /// # Errors
@@ -109,7 +110,7 @@ impl Frontier {
         })
     }
 
-    /// `done` counts the records of all laws.
+    /// Draws records from one law and scores the advice on them. `done` counts the records of all laws.
     fn resampled(
         &self,
         kind: Bootstrap,
@@ -149,7 +150,7 @@ impl Frontier {
                 lost: sample.mean(&lost),
                 deviation: sample.variance(&lost).mapped(|variance| variance.max(0.0).sqrt()),
                 beyond_least: (index != least).then(|| sample.mean(&apart)),
-                // The worth is concave: an average allocation is worth no less than what it is the average of.
+                // The worth is concave, so an average allocation is worth at least the average of the worths.
                 beyond_own_mix: Estimate { high: beyond_own_mix.high.min(0.0), ..beyond_own_mix },
                 total: average.iter().sum(),
             }
@@ -157,11 +158,12 @@ impl Frontier {
         Ok(Resampled { bootstrap: kind, best, points: points.collect() })
     }
 
-    /// What each record adds to the mean of what its allocation is worth more than the average of all of them:
+    /// Returns, for each record, the worth of its allocation less that of the average allocation, linearised in the
+    /// average:
     ///
     ///   worth(a_i) - worth(mean a) - worth'(mean a) (a_i - mean a).
     ///
-    /// The average is one over the same records: without the last part it would be taken for known.
+    /// The average is taken over the same records. Without the last term it would be treated as known.
     /// Checked by: `tests/service/frontier.rs::intervals_beyond_the_own_mix_are_as_wide_as_seeds_differ`.
     fn beyond_own_mix<'a>(
         &self,
@@ -184,7 +186,7 @@ impl Frontier {
         allocations.map(part).collect()
     }
 
-    /// The advice at every scale on a record.
+    /// Returns the advice at every scale on a record.
     fn decide(&self, rows: &[Vec<f64>], watch: &Watch) -> Result<Vec<Vec<f64>>, TrainError> {
         let radius = self.radius(rows);
         let mut near = None;
@@ -198,7 +200,7 @@ impl Frontier {
         self.question.request.scales.iter().map(advise).collect()
     }
 
-    /// Of the rule at a record.
+    /// Returns the radius that the rule gives for a record.
     fn radius(&self, rows: &[Vec<f64>]) -> f64 {
         let fund = fund_returns(rows, &inverse_volatility(rows));
         self.factor * self.radii.radius(&EmpiricalDistribution::new(&fund))
@@ -208,7 +210,7 @@ impl Frontier {
         advising::step(&self.question.assets, &self.question.fund.problem, rows, radius)
     }
 
-    /// Log certainty equivalent over the bank of an allocation under a law.
+    /// Returns the log certainty equivalent of an allocation under a law, relative to the bank.
     fn worth(&self, law: &RecordLaw, allocation: &[f64]) -> f64 {
         let bank = 1.0 + self.question.fund.problem.rate_per_step;
         let of_row = |row: &Vec<f64>| {
@@ -218,13 +220,13 @@ impl Frontier {
         self.utility.inverse(law.rows.iter().map(of_row).sum::<f64>() / law.rows.len() as f64)
     }
 
-    /// Basis points of a log certainty equivalent, a year where the periods of one are known.
+    /// Returns the basis points of a log certainty equivalent, per year if the periods per year are known.
     fn unit(&self) -> f64 {
         BASIS_POINTS * self.question.assets.periods_per_year.unwrap_or(1.0)
     }
 
-    /// Standard errors that the mean simple return of the record, in the fund of inverse volatilities, lies above the bank's:
-    /// `(mean - r) sqrt(n) / s`, s the sample deviation.
+    /// Returns by how many standard errors the record's mean simple return exceeds the bank's, in the
+    /// inverse-volatility fund: `(mean - r) sqrt(n) / s`, s the sample deviation.
     /// Checked by: `tests/service/frontier.rs::at_the_record_itself_it_advises_as_advise_does`.
     fn evidence(&self) -> f64 {
         let rows = &self.question.assets.history;
@@ -234,7 +236,7 @@ impl Frontier {
     }
 }
 
-/// Of allocations to the same assets.
+/// Returns the average of allocations to the same assets.
 fn average<'a>(allocations: impl ExactSizeIterator<Item = &'a [f64]>) -> Vec<f64> {
     let count = allocations.len() as f64;
     let add = |mut sum: Vec<f64>, allocation: &[f64]| {

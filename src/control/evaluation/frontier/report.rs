@@ -1,4 +1,4 @@
-//! The report of a frontier, as it travels.
+//! The report of a frontier, as it is sent.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,50 +6,51 @@ use utoipa::ToSchema;
 use crate::control::request::frontier::FrontierRequest;
 use crate::numerics::summary::Estimate;
 
-/// Name and version of the report's form.
+/// Name and version of the report format.
 pub const FORMAT: &str = "ballast-frontier-1";
 
-/// What following the advice at multiples of the radius loses on records like the one at hand. The same request gives the same
-/// report, bit for bit.
+/// The loss from following the advice at multiples of the radius, on records like the given one. The same request gives
+/// the same report, bit for bit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FrontierReport {
     /// `ballast-frontier-1`.
     pub format: String,
-    /// As completed.
+    /// The completed request.
     pub request: FrontierRequest,
-    /// Of the intervals, which tell how exactly the resamples tell a figure, not how like the true law they are.
+    /// Confidence level of the intervals. They show how exactly the resamples determine a figure, not how close the
+    /// resampled laws are to the true law.
     pub level: f64,
-    /// Whether losses are a year's: where `problem.periods_per_year` is given. Else they are a period's.
+    /// True if losses are per year, because `problem.periods_per_year` is given; otherwise they are per period.
     pub per_year: bool,
-    /// Of the rule at the record itself, in log-return; scales are multiples of it.
+    /// Radius of the rule at the record itself, in log-return; scales are multiples of it.
     pub radius: f64,
-    /// Standard errors that the record's mean return lies above the bank's, in the fund of inverse volatilities.
+    /// By how many standard errors the record's mean return exceeds the bank's, in the inverse-volatility fund.
     pub evidence: f64,
-    /// What is advised at the record itself, scale by scale: the share of wealth in each asset, in the order of the request.
+    /// Advice at the record itself, scale by scale: the share of wealth in each asset, in the order of the request.
     pub own: Vec<Vec<f64>>,
-    /// By the law that records were drawn from.
+    /// Results for each law that records were drawn from.
     pub resampled: Vec<Resampled>,
-    /// What the figures say, and what they cannot.
+    /// Sentences on what the figures show, and what they cannot show.
     pub sentences: Vec<String>,
 }
 
-/// How records are drawn from the one at hand.
+/// How records are drawn from the given one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Bootstrap {
-    /// Independent draws of the returns seen, spread by a kernel.
+    /// Independent draws of the past returns, spread by a kernel.
     Smoothed {
-        /// Deviation of the kernel over that of the record, before the variance is brought back.
+        /// Deviation of the kernel over that of the record, before the variance is restored.
         bandwidth: f64,
     },
-    /// The same, every return moved by as much, to where its asset's mean is the bank's: were there no premium.
+    /// The smoothed law with each asset's returns shifted so that its mean is the bank's: no premium.
     WithoutPremium {
-        /// Deviation of the kernel over that of the record, before the variance is brought back.
+        /// Deviation of the kernel over that of the record, before the variance is restored.
         bandwidth: f64,
     },
-    /// Blocks of the returns seen, in a row; the last is followed by the first.
+    /// Blocks of consecutive past returns; the last is followed by the first.
     Block {
-        /// Periods of a block.
+        /// Periods per block.
         length: usize,
     },
 }
@@ -57,27 +58,27 @@ pub enum Bootstrap {
 /// The frontier on records drawn from one law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Resampled {
-    /// How they were drawn.
+    /// How the records were drawn.
     pub bootstrap: Bootstrap,
-    /// The best allocation for who knows the law: the share of wealth in each asset.
+    /// The best allocation under the known law: the share of wealth in each asset.
     pub best: Vec<f64>,
-    /// Scale by scale.
+    /// Results scale by scale.
     pub points: Vec<FrontierPoint>,
 }
 
-/// What one multiple of the radius loses.
+/// The loss at one multiple of the radius.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FrontierPoint {
-    /// Of the radius.
+    /// Multiple of the radius.
     pub scale: f64,
-    /// Basis points of certainty equivalent behind the best allocation, on average over records.
+    /// Basis points of certainty equivalent below the best allocation, on average over records.
     pub lost: Estimate,
-    /// Of that loss from record to record.
+    /// Standard deviation of that loss from record to record.
     pub deviation: Estimate,
-    /// What more is lost than at the scale that loses least on average, record by record; null at that scale.
+    /// Loss beyond that at the scale that loses least on average, record by record; null at that scale.
     pub beyond_least: Option<Estimate>,
-    /// What the advice gains over a constant mix of its own average allocation over all records, in the unit of `lost`: at most 0, up
-    /// to rounding, since what an allocation is worth under one law is concave in it.
+    /// Gain of the advice over a constant mix of its own average allocation over all records, in the unit of `lost`. It
+    /// is at most 0, up to rounding, because worth under one law is concave in the allocation.
     pub beyond_own_mix: Estimate,
     /// Share of wealth held in all assets together, on average over records.
     pub total: f64,

@@ -1,11 +1,11 @@
-//! What a frontier says, in sentences.
+//! Sentences about a frontier.
 
 use super::report::{Bootstrap, Resampled};
 
-/// Standard errors beyond which a premium is told from none.
+/// Standard errors beyond which a premium counts as distinguishable from none.
 const TOLD: f64 = 2.0;
 
-/// What the figures say, the most important first.
+/// Returns the findings in sentences, the most important first.
 pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) -> Vec<String> {
     let mut sentences: Vec<String> = resampled.iter().filter_map(|resampled| of_one(resampled, per_year)).collect();
     sentences.extend(resampled.first().map(|first| of_own_mix(first, per_year)));
@@ -23,12 +23,12 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
     sentences
 }
 
-/// What comes in basis points, in percent.
+/// Formats basis points as percent.
 fn percent(basis_points: f64) -> String {
     format!("{:.3} %", basis_points / 100.0)
 }
 
-/// A multiple of the caution asked for, within a sentence.
+/// Names a multiple of the requested caution, within a sentence.
 fn caution(scale: f64) -> String {
     match scale {
         0.0 => "no caution".to_owned(),
@@ -37,7 +37,7 @@ fn caution(scale: f64) -> String {
     }
 }
 
-/// Several names, as a sentence lists them.
+/// Lists several names within a sentence.
 fn listed(names: &[String]) -> String {
     match names {
         [] => String::new(),
@@ -46,13 +46,13 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// The same at the start of a sentence.
+/// Capitalises the words for the start of a sentence.
 fn opening(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// What following each record earned beside holding what is advised on average.
+/// Compares following each record with holding the average of its advice.
 fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
     let per = if per_year { "a year" } else { "a period" };
     let lost = |beyond: f64| percent((-beyond).max(0.0));
@@ -67,7 +67,7 @@ fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
     )
 }
 
-/// Which scale loses least, and which cannot be told apart from it.
+/// Names the scale that loses least, and the scales indistinguishable from it.
 fn of_one(resampled: &Resampled, per_year: bool) -> Option<String> {
     let least = resampled.points.iter().find(|point| point.beyond_least.is_none())?;
     let steadiest =
