@@ -1,15 +1,15 @@
-//! What a policy answers: an advice, and the uncertainty set behind it.
+//! The answer of a policy: an advice, and the uncertainty set behind it.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::problem::actions::Band;
 
-/// Where an advice came from.
+/// How an advice was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AdviceSource {
-    /// The policy surrogate (or the stored solution of a single-state design).
+    /// Read from the policy surrogate (or the stored solution of a single-state design).
     PolicySurrogate,
     /// Re-solved on request.
     Resolved,
@@ -17,57 +17,59 @@ pub enum AdviceSource {
     ResolvedOutsideDesign,
     /// Re-solved for a hypothetical radius, which the policy surrogate was not trained for.
     ResolvedOtherRadius,
-    /// The robust step has no finite solution at the state, or its wealth does not pay for what is withdrawn: all of it stays in
-    /// the bank, which no law can hurt.
+    /// Not solved: the robust step has no finite solution at the state, or its wealth does not pay for the withdrawals.
+    /// All wealth stays in the bank, which no law can hurt.
     Unsolved,
 }
 
-/// The robust allocation for the coming period and what it is worth.
+/// The robust allocation for the coming period and its worth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Advice {
-    /// Share of wealth to hold in the risky asset: the holding, brought to the nearer end of the band.
+    /// Share of wealth to hold in the risky asset: the nearest point of the band to the holding.
     pub allocation: f64,
     /// Share of wealth in the risky asset before trading.
     pub holding: f64,
-    /// The holdings that are best kept as they are; where trading costs nothing both ends are the allocation.
+    /// The no-trade region: holdings that are best kept as they are. If trading costs nothing, both ends are the
+    /// allocation.
     #[schema(value_type = [f64; 2])]
     pub band: Band,
-    /// The allocation less the holding: the share of wealth to buy, or where it is negative to sell.
+    /// The allocation less the holding: the share of wealth to buy, or to sell if negative.
     pub trade: f64,
-    /// Money added at the end of the period, withdrawn where it is negative.
+    /// Money added at the end of the period, or withdrawn if negative.
     pub contribution: f64,
     /// Certainty equivalent of the robust value, in terminal wealth.
     pub certainty_equivalent: f64,
-    /// Terminal wealth of selling everything now and staying in the bank, with all that is added and withdrawn until then: no
-    /// law can take it away.
+    /// Terminal wealth if everything is sold now and stays in the bank, with all later contributions and withdrawals.
+    /// No law can take it away.
     pub floor: f64,
-    /// Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
-    /// of the confidence region in the mean, in estimated standard deviations of a return.
+    /// Radius of the uncertainty set. For the Wasserstein ball it is in log-return. In the parametric frameworks it is
+    /// half the width of the confidence region in the mean, in estimated standard deviations of a return.
     pub radius: f64,
-    /// Returns seen, those of the history among them.
+    /// Number of returns observed, including the history.
     pub sample_size: usize,
-    /// How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`.
+    /// Effective sample size; equal to `sample_size` if `learning` is `equal`.
     pub effective_size: f64,
     /// Predicted standard deviation of the log certainty equivalent.
     pub surrogate_sd: f64,
-    /// Whether the state lies where the surrogates were trained.
+    /// True if the state lies within the region where the surrogates were trained.
     pub in_design: bool,
-    /// How it was found.
+    /// How the advice was computed.
     pub source: AdviceSource,
 }
 
-/// The uncertainty set of a state, in figures.
+/// The figures of a state's uncertainty set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Uncertainty {
-    /// Returns seen, those of the history among them.
+    /// Number of returns observed, including the history.
     pub sample_size: usize,
-    /// How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`.
+    /// Effective sample size; equal to `sample_size` if `learning` is `equal`.
     pub effective_size: f64,
-    /// Raw moments of the law learned, first to the specification's count.
+    /// Raw moments of the learned law, from the first to the specification's count.
     pub moments: Vec<f64>,
-    /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`. Under `bridge`
-    /// it is exact for the history of the policy, and simulated in proportion to that after returns were learned.
+    /// (1 - alpha)-quantile of the bridge statistic; absent under radius rules other than `bridge` and `calibrated`.
+    /// Under `bridge` it is exact for the history of the policy. After more returns it is simulated in proportion to
+    /// that value.
     pub quantile: Option<f64>,
-    /// As in an advice.
+    /// The radius, as in an advice.
     pub radius: f64,
 }

@@ -1,5 +1,5 @@
-//! A policy made ready to answer: what to hold in a state, what the law and the radius are, where the next return leads.
-//! Live sessions and the simulator call these same functions.
+//! A policy prepared for answering: the allocation in a state, the law and the radius there, and the state after the
+//! next return. Live sessions and the simulator call the same functions.
 
 use std::sync::OnceLock;
 
@@ -19,19 +19,19 @@ use crate::control::request::specification::Specification;
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
 
-/// Numbers read in some hundreds of microseconds.
+/// Count of numbers that takes some hundreds of microseconds to read.
 const PROMPT_COST: usize = 1 << 20;
 
-/// How an allocation is found.
+/// How an allocation is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AdviceMode {
-    /// From the policy surrogate; by re-solving where the state lies outside the design.
+    /// From the policy surrogate, or by re-solving if the state lies outside the design.
     Surrogate,
-    /// By solving the robust step at the exact state with the value surrogate of the step after.
+    /// By solving the robust step at the exact state with the value surrogate of the next step.
     Resolve,
 }
 
-/// A policy with what its evaluation needs prepared. Cheap to share behind an `Arc`; all methods are pure.
+/// A policy with everything prepared for its evaluation. Cheap to share behind an `Arc`; all methods are pure.
 pub struct Advisor {
     policy: Policy,
     problem: Problem,
@@ -39,7 +39,7 @@ pub struct Advisor {
     kept: Kept,
 }
 
-/// What an advice is for.
+/// The inputs of an advice.
 struct Asked<'a> {
     step: usize,
     state: &'a State,
@@ -47,13 +47,13 @@ struct Asked<'a> {
     source: AdviceSource,
 }
 
-/// A state outside the design, where the surrogate gives no advice, and what was found on the way there.
+/// A state outside the design, for which the surrogate gives no advice, with the intermediate results.
 pub struct OutsideDesign {
     radius: f64,
     predicted: Prediction,
 }
 
-/// What the surrogates say of a state.
+/// The predictions of the surrogates for a state.
 struct Prediction {
     band: Band,
     floor_gain: f64,
@@ -62,12 +62,12 @@ struct Prediction {
 }
 
 impl Advisor {
-    /// A policy that keeps what can be made again in the cache of the process.
+    /// Prepares a policy, with the process-wide cache.
     pub fn new(policy: Policy) -> Self {
         Advisor::with(policy, Kept::default())
     }
 
-    /// The same with what can be made again in `kept`.
+    /// Prepares a policy, with the cache `kept`.
     pub fn with(policy: Policy, kept: Kept) -> Self {
         let problem = policy.problem(kept.clone());
         let prepared = policy.steps().iter().map(|_| OnceLock::new()).collect();
@@ -78,36 +78,37 @@ impl Advisor {
         advisor
     }
 
-    /// The highest allocation of the period after `step`.
+    /// Returns the highest allocation of the period after `step`.
     pub(super) fn highest_action(&self, step: usize, state: &State) -> f64 {
         self.problem.actions(step, state).highest
     }
 
-    /// Bytes it holds, without bridges and factors.
+    /// Returns the bytes it holds, without bridges and factors.
     pub fn bytes(&self) -> usize {
         prepared_bytes(&self.policy)
     }
 
-    /// Bytes of the largest bridges that a session of so many periods from `sample_size` returns asks for.
+    /// Returns the bytes of the largest bridges needed by a session of `periods` periods that starts from `sample_size`
+    /// returns.
     pub fn heaviest_bridges(&self, sample_size: usize, periods: usize) -> usize {
         self.problem.sets.heaviest(sample_size, periods)
     }
 
-    /// The policy it answers by.
+    /// Returns the policy.
     pub fn policy(&self) -> &Policy {
         &self.policy
     }
 
-    /// The completed specification of the policy.
+    /// Returns the completed specification of the policy.
     pub fn specification(&self) -> &Specification {
         self.policy.specification()
     }
 
-    /// The state a session starts from: `history` and `wealth` default to the specification's, and all of it is
-    /// in the bank.
+    /// Returns the state at the start of a session: `history` and `wealth` default to the specification's, and all
+    /// wealth is in the bank.
     ///
     /// # Errors
-    /// A history or a wealth that breaks a rule; a history other than the policy's own where the uncertainty set is frozen
+    /// A history or a wealth that breaks a rule; a history other than the policy's own if the uncertainty set is frozen
     /// at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
@@ -119,16 +120,16 @@ impl Advisor {
         State::new(history, wealth.unwrap_or(problem.initial_wealth), problem.learning)
     }
 
-    /// Checks that a state at the start can pay for every withdrawal to come.
+    /// Checks that a state at the start can pay for every later withdrawal.
     ///
     /// # Errors
-    /// The bank alone runs dry, under the name `wealth`.
+    /// Wealth in the bank alone runs out, under the name `wealth`.
     pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
         self.problem.check_withdrawals(state)
     }
 
-    /// The advice for the period after `step` observed periods. `step` must be below the horizon.
-    /// Cost: two kernel sums and one triangular solve; a robust step where it re-solves.
+    /// Returns the advice for the period after `step` observed periods. `step` must be below the horizon. Cost: two
+    /// kernel sums and one triangular solve, or a robust step if it re-solves.
     pub fn advise(&self, step: usize, state: &State, mode: AdviceMode) -> Advice {
         let radius = self.radius(state);
         match mode {
@@ -142,10 +143,10 @@ impl Advisor {
         }
     }
 
-    /// [`Self::advise`] from the policy surrogate where the radius of the state is known.
+    /// Returns the advice of [`Self::advise`] from the policy surrogate, given the radius of the state.
     ///
     /// # Errors
-    /// The state lies outside the design: [`Self::advise_outside`] goes on from what is returned.
+    /// The state lies outside the design: [`Self::advise_outside`] continues from the returned value.
     pub fn advise_from_surrogate(&self, step: usize, state: &State, radius: f64) -> Result<Advice, OutsideDesign> {
         let predicted = self.predict(step, state, radius);
         if predicted.in_design {
@@ -155,15 +156,16 @@ impl Advisor {
         }
     }
 
-    /// [`Self::advise`] by re-solving, where [`Self::advise_from_surrogate`] found the state outside the design.
+    /// Returns the advice of [`Self::advise`] by re-solving, after [`Self::advise_from_surrogate`] found the state
+    /// outside the design.
     pub fn advise_outside(&self, step: usize, state: &State, outside: &OutsideDesign) -> Advice {
         let OutsideDesign { radius, predicted } = outside;
         let asked = Asked { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
         self.resolved(&asked, predicted).0
     }
 
-    /// Whether [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what they need is
-    /// prepared, and small.
+    /// Returns true if [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what
+    /// they need is prepared, and small.
     pub fn is_prompt(&self, step: usize, state: &State) -> bool {
         let (points, is_ready) = match self.surrogates(step) {
             Some((stored, prepared)) => (stored.count(), prepared.factor.is_in(&self.kept)),
@@ -173,7 +175,7 @@ impl Advisor {
         is_ready && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
     }
 
-    /// Makes what [`Self::is_prompt`] asks for.
+    /// Prepares what [`Self::is_prompt`] checks for.
     pub fn prepare(&self, step: usize, state: &State) {
         self.problem.prepare(state);
         if let Some((stored, prepared)) = self.surrogates(step) {
@@ -181,7 +183,8 @@ impl Advisor {
         }
     }
 
-    /// The surrogates of a step, as stored and made ready; `None` where all its states are one, or past the horizon.
+    /// Returns the surrogates of a step, stored and prepared; `None` if the step has a single state or lies past the
+    /// horizon.
     fn surrogates(&self, step: usize) -> Option<(&StepSurrogates, &PreparedStep)> {
         match &self.policy.steps().get(step)?.solution {
             Solution::Single(_) => None,
@@ -198,18 +201,19 @@ impl Advisor {
         self.advice(&asked, predicted.band, predicted.floor_gain, predicted)
     }
 
-    /// The re-solved advice and the worst-case law behind it.
+    /// Returns the re-solved advice and the worst-case law behind it.
     pub fn explain(&self, step: usize, state: &State) -> (Advice, WorstCase) {
         let own = self.radius(state);
         self.explain_knowing(step, state, own, own)
     }
 
-    /// The same were the radius of the coming period `radius`, whatever the law says; later periods keep their own.
+    /// Returns the re-solved advice if the radius of the coming period were `radius`, for any law; later periods keep
+    /// their own.
     pub fn explain_within(&self, step: usize, state: &State, radius: f64) -> (Advice, WorstCase) {
         self.explain_knowing(step, state, self.radius(state), radius)
     }
 
-    /// The same where the radius of the state, `own`, is known.
+    /// Returns the result of [`Self::explain_within`], given the radius of the state, `own`.
     pub(super) fn explain_knowing(&self, step: usize, state: &State, own: f64, radius: f64) -> (Advice, WorstCase) {
         let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
         let predicted = self.predict(step, state, own);
@@ -220,12 +224,12 @@ impl Advisor {
         (advice, worst)
     }
 
-    /// Radius of the uncertainty set at a state, as in an advice.
+    /// Returns the radius of the uncertainty set at a state, as in an advice.
     pub fn radius(&self, state: &State) -> f64 {
         self.problem.radius(state)
     }
 
-    /// The allocation and the floor gain that the surrogates predict, wherever the state lies.
+    /// Returns the allocation and the floor gain that the surrogates predict, for any state.
     pub fn surrogate(&self, step: usize, state: &State) -> (f64, f64) {
         let Prediction { band, floor_gain, .. } = self.predict(step, state, self.radius(state));
         (band.nearest(state.holding), floor_gain)
@@ -241,12 +245,12 @@ impl Advisor {
                 return (self.advice(asked, solution.band, solution.floor_gain, predicted), Some(solution));
             }
         }
-        // All-bank is feasible and no law can hurt it.
+        // Keeping all wealth in the bank is feasible, and no law can hurt it.
         let unsolved = Asked { source: AdviceSource::Unsolved, ..*asked };
         (self.advice(&unsolved, Band::of(&[0.0]), 0.0, predicted), None)
     }
 
-    /// Whether all that a state has, and what is to come, pays for every withdrawal.
+    /// Returns true if the state's wealth and later contributions pay for every withdrawal.
     fn pays(&self, step: usize, state: &State) -> bool {
         self.problem.floor(step, state) > 0.0
     }
@@ -272,9 +276,9 @@ impl Advisor {
         }
     }
 
-    /// `radius` is that of the state.
+    /// Predicts by the surrogates; `radius` is that of the state.
     fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
-        // An imported policy may claim anything.
+        // An imported policy may contain any number.
         let largest = self.problem.largest_gain(step, state);
         let (dynamics, highest) = (self.problem.dynamics(step), self.problem.actions(step, state).highest);
         let in_hand = dynamics.in_hand(state.wealth, state.holding);
@@ -299,7 +303,7 @@ impl Advisor {
                 let prediction = holdings.at(&predictions, state.holding);
                 let total = dynamics.total(state.wealth, holdings.within(state.holding));
                 let gain = value.clamped_gain(prediction, total) + holdings.beyond(dynamics, state.holding, in_hand);
-                // What is cut off above the largest gain that was solved is not known.
+                // Gains above the largest that was solved are cut off, because they are not known.
                 let cut = value.beyond_solved(prediction, total);
                 let is_solved = cut <= 0.0 && !ends.iter().any(|end| self.problem.is_ruined(radius, *end));
                 Prediction {
@@ -315,7 +319,7 @@ impl Advisor {
         }
     }
 
-    /// Whether `state` is the one state that a single-state step was solved at.
+    /// Returns true if `state` is the state at which a single-state step was solved.
     fn is_single_state(&self, step: usize, state: &State) -> bool {
         let problem = &self.specification().problem;
         let same_law =
@@ -325,12 +329,12 @@ impl Advisor {
         same_law && same_wealth
     }
 
-    /// The least mean of e^Z, Z the return, among the laws of a state's ball.
+    /// Returns the least mean of e^Z, Z the return, among the laws of a state's ball.
     pub fn worst_mean(&self, state: &State) -> f64 {
         self.problem.worst_mean(state)
     }
 
-    /// Sample size, moments, quantile and radius of a state.
+    /// Returns sample size, moments, quantile and radius of a state.
     pub fn uncertainty(&self, state: &State) -> Uncertainty {
         let Measure { radius, quantile } = self.problem.measure(state);
         Uncertainty {
@@ -342,7 +346,7 @@ impl Advisor {
         }
     }
 
-    /// The state after the period that follows `step` observed periods.
+    /// Returns the state after the period that follows `step` observed periods.
     pub fn advance(&self, step: usize, state: &State, realised: &Realised) -> State {
         state.next_state(self.problem.dynamics(step), realised)
     }

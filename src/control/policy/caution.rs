@@ -1,41 +1,42 @@
-//! What to know before an advice is followed.
+//! Warnings to read before an advice is followed.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A record with fewer returns, by its effective size, is short: two years of months.
+/// Effective sample size below which a record is short: two years of months.
 const SHORT_RECORD: usize = 24;
 
-/// Basis points between value and bound up to which an allocation counts as the best, and from which the bound says nothing.
+/// Basis points between value and bound: up to `CERTIFIED` an allocation counts as the best, and from `BEYOND_USE` on
+/// the bound is no use.
 const CERTIFIED: f64 = 0.01;
 const BEYOND_USE: f64 = 100.0;
 
 /// A reason to be careful with an advice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Caution {
-    /// For programs.
+    /// Code for programs.
     pub code: CautionCode,
-    /// For people.
+    /// Sentence for people.
     pub sentence: String,
 }
 
-/// The reasons.
+/// The kinds of reasons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CautionCode {
-    /// The record has fewer than 24 returns, by its effective size.
+    /// The record has an effective sample size below 24 returns.
     ShortRecord,
-    /// Without one of its returns the advice would move by more than half of the action interval, or between the bank alone and
-    /// holding something. Told where the sensitivity is asked for.
+    /// Without one of its returns the advice would move by more than half of the action interval, or between the bank
+    /// alone and holding something. Reported if the sensitivity is requested.
     OneReturn,
     /// The search for the best allocation of several assets ended before its two bounds met within a hundredth of a basis point.
     NotCertified,
-    /// The policy that is to follow is not there yet, and the one before it advises.
+    /// The next policy is not ready yet, and the one before it advises.
     Waiting,
 }
 
 impl Caution {
-    /// Of an advice that rests on few returns, or on few by their weight.
+    /// Warns of an advice that rests on few returns, or on few by their weight.
     pub fn short_record(sample_size: usize, effective_size: f64) -> Option<Self> {
         if effective_size >= SHORT_RECORD as f64 {
             return None;
@@ -50,8 +51,8 @@ impl Caution {
         Some(Caution { code: CautionCode::ShortRecord, sentence })
     }
 
-    /// Warns that another allocation may be worth more than the one advised: `gap` is the log certainty equivalent between the value
-    /// of the advice and the bound of all.
+    /// Warns that another allocation may be worth more than the advised one. `gap` is the difference, in log certainty
+    /// equivalent, between the value of the advice and the upper bound.
     pub fn not_certified(gap: f64) -> Option<Self> {
         let basis_points = 1e4 * gap;
         let sentence = match basis_points {
@@ -65,7 +66,8 @@ impl Caution {
         Some(Caution { code: CautionCode::NotCertified, sentence })
     }
 
-    /// Of the advice for `period` by a policy that was trained up to `horizon`, while the next one is to come.
+    /// Warns that the advice for `period` comes from a policy trained up to `horizon`, because the next one is not
+    /// ready.
     pub fn waiting(period: usize, horizon: usize) -> Self {
         let sentence = match period > horizon {
             true => format!(
@@ -78,7 +80,7 @@ impl Caution {
         Caution { code: CautionCode::Waiting, sentence }
     }
 
-    /// Of a return without which the advice would be another.
+    /// Warns that the advice would be different without one return.
     pub(super) fn one_return(simple_return: f64, without: f64, with: f64) -> Self {
         let [lacking, without, with] = [simple_return, without, with].map(|share| 100.0 * share);
         let sentence = format!(

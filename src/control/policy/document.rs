@@ -16,7 +16,8 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::{FORMAT, StepDiagnostics, StepSolution};
 use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates};
 
-/// The periods that a year has by the specification in a policy's bytes, where it says; none of bytes that are no policy.
+/// Returns the periods per year of the specification in a policy's bytes, if it gives them; none if the bytes are not a
+/// policy.
 pub fn periods_per_year(json: &[u8]) -> Option<f64> {
     #[derive(Deserialize)]
     struct Document {
@@ -43,49 +44,50 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// The policy of a completed specification from the solutions of all its steps, ascending.
+    /// Builds the policy of a completed specification from the solutions of all its steps, ascending.
     pub fn new(specification: Specification, steps: Vec<StepSolution>) -> Self {
         Policy { format: FORMAT.to_owned(), specification, steps }
     }
 
-    /// The completed specification it was trained from.
+    /// Returns the completed specification it was trained from.
     pub fn specification(&self) -> &Specification {
         &self.specification
     }
 
-    /// The solutions of all steps, ascending.
+    /// Returns the solutions of all steps, ascending.
     pub fn steps(&self) -> &[StepSolution] {
         &self.steps
     }
 
-    /// Diagnostics of every step, ascending.
+    /// Returns the diagnostics of every step, ascending.
     pub fn diagnostics(&self) -> impl Iterator<Item = &StepDiagnostics> {
         self.steps.iter().map(|step| &step.diagnostics)
     }
 
-    /// The problem it solves, what can be made again in `kept`.
+    /// Returns the problem it solves, with the cache `kept`.
     pub fn problem(&self, kept: Kept) -> Problem {
         Problem::with(&self.specification, kept)
     }
 
-    /// The portable form: JSON whose numbers parse back to the same bits.
+    /// Returns the portable form: JSON whose numbers parse back to the same bits.
     ///
     /// # Errors
-    /// None that plain structs of numbers and strings can make.
+    /// None that plain structs of numbers and strings can cause.
     pub fn to_json(&self) -> serde_json::Result<Vec<u8>> {
         serde_json::to_vec(self)
     }
 
-    /// Reads and checks the portable form as hostile input: format, shapes, finite numbers, the specification's rules.
+    /// Reads the portable form and checks it as hostile input: format, shapes, finite numbers, the specification's
+    /// rules.
     ///
     /// # Errors
-    /// What is wrong, naming the field.
+    /// The first fault, naming the field.
     pub fn from_json(bytes: &[u8]) -> Result<Self, PolicyError> {
         let policy: Policy = serde_json::from_slice(bytes).map_err(|error| PolicyError::Format(error.to_string()))?;
         Ok(policy.checked()?)
     }
 
-    /// This policy, where its parts fit together and its specification keeps the rules.
+    /// Returns this policy if its parts fit together and its specification keeps the rules.
     ///
     /// # Errors
     /// The first field that breaks a rule.
@@ -152,12 +154,12 @@ fn check_single(
     single.floor_gains.iter().try_for_each(|&gain| rules::within(&field_of("floor_gains"), gain, 0.0, largest))
 }
 
-/// Holdings at which a step of one law may know its value, where trading costs, and at which a surrogate may: a robust step
-/// tabulates those of a surrogate over all the returns it looks at.
+/// Allowed numbers of holdings at which a step's value is stored if trading costs: for a step of one law, and for a
+/// surrogate. A robust step tabulates those of a surrogate over all the returns it considers.
 const HOLDINGS_OF_ONE_LAW: RangeInclusive<usize> = 4..=1025;
 const HOLDINGS_OF_A_SURROGATE: RangeInclusive<usize> = 4..=65;
 
-/// One function of the law where trading costs nothing; else one for each of so many holdings.
+/// Checks the number of functions: one if trading costs nothing, or else one for each holding.
 fn check_holdings(
     field: &str,
     count: usize,
@@ -170,13 +172,13 @@ fn check_holdings(
     }
 }
 
-/// Rounding forgiven to a gain at its bound.
+/// Rounding tolerance for a gain at its bound.
 const ROUNDING: f64 = 1e-9;
 
-/// The floor gain of a step were every return the best that is accepted: no state is worth more.
+/// Returns the floor gain of a step if every return were the best that is accepted: no state is worth more.
 fn credible_gain(specification: &Specification, step: usize) -> f64 {
     let problem = &specification.problem;
-    // Of what withdrawals leave, selling may take nearly everything.
+    // With withdrawals, the cost of selling may take nearly all of the wealth that remains.
     let unsold = match problem.contributions.are_none() {
         true => Dynamics::plain(problem.rate_per_step, problem.trading_cost).liquidation(1.0).ln(),
         false => (rules::WEALTH.0 / rules::WEALTH.1).ln(),
@@ -228,7 +230,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
     rules::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)
 }
 
-/// A value for each holding, and either end of the band, where trading costs.
+/// Checks that there is a value for each holding and, if trading costs, a policy for each end of the band.
 fn check_functions(field: &str, stored: &StepSurrogates, specification: &Specification) -> Result<(), FieldError> {
     let functions = stored.value.weights.len();
     check_holdings(&format!("{field}.value.weights"), functions, specification, &HOLDINGS_OF_A_SURROGATE)?;
@@ -236,7 +238,7 @@ fn check_functions(field: &str, stored: &StepSurrogates, specification: &Specifi
     rules::whole(&format!("{field}.policy.weights"), stored.policy.weights.len(), &(ends..=ends))
 }
 
-/// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.
+/// Returns the SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.
 pub fn content_hash(json: &[u8]) -> String {
     let digit = |value: u8| char::from(b"0123456789abcdef"[usize::from(value)]);
     Sha256::digest(json).iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()

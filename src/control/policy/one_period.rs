@@ -1,4 +1,4 @@
-//! Advice for a single period, of a problem that no policy was trained for: the robust step at the horizon, which is solved
+//! Advice for a single period, for a problem that no policy was trained for. The robust step at the horizon is solved
 //! exactly and needs no surrogate.
 
 use super::advice::Advice;
@@ -24,25 +24,26 @@ pub struct OnePeriod {
 }
 
 impl OnePeriod {
-    /// Of a completed specification of horizon 1, what can be made again in `kept`.
+    /// Prepares a completed specification of horizon 1, with the cache `kept`.
     pub fn new(specification: &Specification, kept: Kept) -> Self {
         let policy = Policy::new(specification.clone(), vec![StepSolution::unsolved(0)]);
         OnePeriod { advisor: Advisor::with(policy, kept.clone()), kept }
     }
 
-    /// The same with the levels of his caution found, where it is one of them. Cost: as [`Specification::resolved`].
+    /// Computes the levels of the investor's caution, if the caution is one of them. Cost: as
+    /// [`Specification::resolved`].
     #[must_use]
     pub fn resolved(&self) -> Self {
         OnePeriod::new(&self.advisor.specification().clone().resolved(&self.kept), self.kept.clone())
     }
 
-    /// The same at another level of those found.
+    /// Returns the investor at another level of those computed.
     #[must_use]
     pub fn at(&self, level: CautionLevel) -> Self {
         self.of(ProblemSpecification { caution: Some(level), ..self.problem().clone() })
     }
 
-    /// The same with its radius so many times as large, where it is simulated.
+    /// Returns the investor with the radius multiplied by `factor`, if it is simulated.
     #[must_use]
     pub fn within(&self, factor: f64) -> Self {
         let radius = Some(self.problem().radius_rule().scaled(factor));
@@ -54,12 +55,12 @@ impl OnePeriod {
         OnePeriod::new(&specification, self.kept.clone())
     }
 
-    /// Of its simulations.
+    /// Returns the seed of its simulations.
     pub fn seed(&self) -> u64 {
         self.advisor.specification().seed
     }
 
-    /// What each level would advise, where they were found. Cost: six robust steps.
+    /// Returns the advice at each level, if the levels were computed. Cost: six robust steps.
     ///
     /// # Errors
     /// As [`Self::advise`].
@@ -73,7 +74,7 @@ impl OnePeriod {
         Ok(Some(LevelsAdvised::of(found, followed, at)))
     }
 
-    /// Why `advice` holds nothing, where it does and its set is a ball. Cost: a robust step.
+    /// Returns why `advice` holds nothing, if it does and its set is a ball. Cost: a robust step.
     ///
     /// # Errors
     /// As [`Self::advise`].
@@ -93,24 +94,24 @@ impl OnePeriod {
         }))
     }
 
-    /// Bytes of the bridges that its radius asks for.
+    /// Returns the bytes of the bridges that its radius needs.
     pub fn bridges(&self) -> usize {
         self.advisor.heaviest_bridges(self.problem().history.len(), 1)
     }
 
-    /// The advice for who holds the share `holding` of the initial wealth, and the worst law behind it.
-    /// Cost: the radius, and a robust step.
+    /// Returns the advice for an investor with the share `holding` of the initial wealth in the asset, and the worst
+    /// law behind it. Cost: the radius, and a robust step.
     ///
     /// # Errors
-    /// A holding that is no share, or one whose sale leaves less than is withdrawn.
+    /// A holding that is no share, or one whose sale leaves less than the withdrawals.
     pub fn advise(&self, holding: f64) -> Result<(Advice, WorstCase), FieldError> {
         let state = self.state(holding)?;
         self.advisor.check_withdrawals(&state)?;
         Ok(self.advisor.explain(0, &state))
     }
 
-    /// The sensitivity of that advice, of which another record is another history; a calibrated radius keeps its factor. Cost: as
-    /// [`Advisor::sensitivity`].
+    /// Returns the sensitivity of that advice. Another record replaces the history; a calibrated radius keeps its
+    /// factor. Cost: as [`Advisor::sensitivity`].
     ///
     /// # Errors
     /// A holding that is no share.
@@ -118,7 +119,7 @@ impl OnePeriod {
         let state = self.state(holding)?;
         let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).found_rule());
         let of = |record: &[f64]| {
-            // The share of its level is in the rule found.
+            // The rule found already includes the level's share.
             let caution = Some(CautionLevel::Paper);
             let problem = ProblemSpecification { history: record.to_vec(), radius, caution, ..self.problem().clone() };
             let law = self.problem().learning.law(record);
@@ -131,7 +132,7 @@ impl OnePeriod {
     /// Checks that some return changes the advice.
     ///
     /// # Errors
-    /// Under the name `sensitivity`: the framework is `known_law`, which knows no returns.
+    /// Under the name `sensitivity`: the framework is `known_law`, which uses no returns.
     pub fn check_sensitivity(&self) -> Result<(), FieldError> {
         check_learning(self.problem(), self.problem().framework != Framework::KnownLaw)
     }
@@ -140,7 +141,7 @@ impl OnePeriod {
         self.advisor.initial_state(None, None)?.with_holding(holding)
     }
 
-    /// Radius of the set.
+    /// Returns the radius of the set.
     ///
     /// # Errors
     /// The history breaks a rule, which a completed one does not.
@@ -148,7 +149,7 @@ impl OnePeriod {
         Ok(self.advisor.radius(&self.state(0.0)?))
     }
 
-    /// The completed problem.
+    /// Returns the completed problem.
     pub fn problem(&self) -> &ProblemSpecification {
         &self.advisor.specification().problem
     }

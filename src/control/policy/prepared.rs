@@ -1,4 +1,4 @@
-//! A policy's steps made ready to evaluate, and what that takes of memory.
+//! The steps of a policy prepared for evaluation, and the memory they need.
 
 use std::sync::Arc;
 
@@ -15,21 +15,21 @@ use crate::numerics::gp::GaussianProcess;
 const POLICY_BYTES: usize = 4096;
 const STEP_BYTES: usize = 4096;
 
-/// The surrogates of one step ready for evaluation.
+/// The surrogates of one step, prepared for evaluation.
 pub struct PreparedStep {
-    /// Of the value.
+    /// Surrogate of the value.
     pub value: ValueSurrogate,
-    /// Of the action, not yet moved into its interval.
+    /// Surrogate of the action, not yet clamped to its interval.
     pub policy: Surrogate,
-    /// Behind the predicted deviation of the value; made on first use, and kept elsewhere.
+    /// Factor for the predicted deviation of the value; computed on first use, and cached elsewhere.
     pub factor: Factor,
 }
 
-/// The process behind the predicted deviation, which does not depend on the targets: the name it is kept under.
+/// Cache key of the process behind the predicted deviation, which does not depend on the targets.
 pub struct Factor(Key);
 
 impl PreparedStep {
-    /// Of a step of a policy trained from `specification`.
+    /// Prepares a step of a policy trained from `specification`.
     pub fn new(specification: &Specification, step: usize, stored: &StepSurrogates) -> Self {
         PreparedStep {
             value: ValueSurrogate::new(specification, step, stored),
@@ -40,7 +40,7 @@ impl PreparedStep {
 }
 
 impl Factor {
-    /// Named by the hash of all that it is made of.
+    /// Returns the key: the hash of all inputs of the factor.
     fn of(stored: &StepSurrogates) -> Self {
         let scales = &stored.value.hyperparameters;
         let numbers = stored.inputs.iter().flatten().chain(&scales.lengthscales);
@@ -51,12 +51,12 @@ impl Factor {
         Factor(Key::Factor(hash.finalize().into()))
     }
 
-    /// Whether it could be had at once.
+    /// Returns true if the factor is in the cache.
     pub fn is_in(&self, kept: &Kept) -> bool {
         kept.has(&self.0)
     }
 
-    /// `None` where the matrix does not factor.
+    /// Returns the process; `None` if the matrix does not factor.
     pub fn process(&self, kept: &Kept, stored: &StepSurrogates) -> Arc<Option<GaussianProcess>> {
         kept.get_or_make(&self.0, factor_bytes(stored), || {
             let zeros = vec![0.0; stored.count()];
@@ -65,12 +65,12 @@ impl Factor {
     }
 }
 
-/// Bytes of the process of a step.
+/// Returns the bytes of the process of a step.
 pub fn factor_bytes(stored: &StepSurrogates) -> usize {
     GaussianProcess::bytes_of(stored.count(), stored.inputs.len())
 }
 
-/// Bytes of a prepared policy, without bridges and factors.
+/// Returns the bytes of a prepared policy, without bridges and factors.
 pub fn prepared_bytes(policy: &Policy) -> usize {
     let designs = policy.steps().iter().map(|step| match &step.solution {
         Solution::Single(single) => (1, 0, single.floor_gains.len()),
@@ -86,8 +86,8 @@ pub fn prepared_bytes(policy: &Policy) -> usize {
     bytes_ready(policy.steps().len(), points, inputs, functions) + 2 * rows * size_of::<f64>()
 }
 
-/// Of so many steps with so many design points in all: the inputs as stored and for either surrogate, and the weights of
-/// every function as stored and ready to evaluate.
+/// Returns the bytes for `steps` steps with `points` design points in all. They count the inputs, as stored and for
+/// both surrogates, and the weights of every function, as stored and as prepared.
 pub fn bytes_ready(steps: usize, points: usize, inputs: usize, functions: usize) -> usize {
     let numbers = points.saturating_mul(3 * inputs + 2 * functions);
     numbers.saturating_mul(size_of::<f64>()).saturating_add(POLICY_BYTES + STEP_BYTES * steps)

@@ -1,11 +1,11 @@
-//! A policy followed through given returns, as a live session follows it.
+//! Follows a policy through given returns, as a live session does.
 
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use crate::control::problem::state::{Realised, State};
 use crate::control::request::specification::{InitialLaws, Specification};
 
-/// Share of the largest effective size from which on a record counts as settled.
+/// Share of the largest effective sample size from which a record counts as settled.
 const SETTLED: f64 = 0.99;
 
 /// An investor who follows a policy through given returns.
@@ -13,7 +13,7 @@ pub struct Walk<'a> {
     advisor: &'a Advisor,
     returns: &'a [f64],
     step: usize,
-    /// Where he is now.
+    /// The current state.
     pub state: State,
 }
 
@@ -30,15 +30,15 @@ impl Iterator for Walk<'_> {
 }
 
 impl Advisor {
-    /// Returns from which on a record is as long as any to what is learned of it: its effective size is within a hundredth of what
-    /// that tends to, from where laws move on and their precision does not. `None` where it grows for ever.
+    /// Returns the number of returns from which a record counts as settled: its effective sample size is within a
+    /// hundredth of its limit. From then on laws change but their precision does not. `None` if it grows without limit.
     /// Checked by: `tests/solver/learning.rs::the_first_step_serves_every_law_once_the_record_has_settled`.
     pub fn settled_from(&self) -> Option<usize> {
         self.specification().problem.learning.settled_from(SETTLED)
     }
 
-    /// Checks that [`Self::advise`] at step 0 serves every period of an investor who starts from so many returns: its surrogates were
-    /// trained over laws such as he meets, and nothing but the law tells one period from another.
+    /// Checks that [`Self::advise`] at step 0 serves every period of an investor who starts from `returns` returns. Its
+    /// surrogates must be trained over laws like those of later periods, and periods may differ only in the law.
     /// Checked by: `tests/solver/learning.rs::a_session_that_cannot_roll_is_refused`.
     ///
     /// # Errors
@@ -65,7 +65,7 @@ impl Advisor {
         Ok(())
     }
 
-    /// The advice before each of `returns`, followed; at most `horizon` returns are used.
+    /// Follows the advice before each of `returns`; at most `horizon` returns are used.
     pub fn walk<'a>(&'a self, start: State, returns: &'a [f64]) -> Walk<'a> {
         let horizon = self.specification().problem.horizon;
         Walk { advisor: self, returns: &returns[..returns.len().min(horizon)], step: 0, state: start }

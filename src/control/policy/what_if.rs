@@ -1,4 +1,4 @@
-//! What a policy would advise were something else the case: another wealth, another holding, another radius, another return.
+//! What-if advice: for another wealth, another holding, another radius, another return.
 
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
@@ -7,41 +7,41 @@ use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::state::{Realised, State};
 use crate::control::request::rules;
 
-/// What is supposed; what is not stays as it is. The parts are taken in this order.
+/// The hypothetical changes; everything else stays as it is. They apply in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Hypothesis {
     /// Wealth now.
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset now.
     pub holding: Option<f64>,
-    /// Return of the coming period, through which the advised allocation is held; the advice is for the period after.
+    /// Return of the coming period, during which the advised allocation is held; the advice is for the period after.
     pub log_return: Option<f64>,
-    /// The uncertainty set of the period advised; later ones keep their own.
+    /// Radius of the uncertainty set in the advised period; later periods keep their own.
     pub radius: Option<HypotheticalRadius>,
 }
 
 /// A radius other than the state's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HypotheticalRadius {
-    /// So many times the state's own.
+    /// A multiple of the state's own radius.
     Scaled(f64),
-    /// In the unit of an advice's radius.
+    /// A radius in the unit of an advice's radius.
     Fixed(f64),
 }
 
 /// The advice under a hypothesis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supposed {
-    /// Wealth by then.
+    /// Wealth at that time.
     pub wealth: f64,
-    /// For the period after those observed by then.
+    /// Advice for the period after those observed at that time.
     pub advice: Advice,
-    /// Where the step was solved, not read off a surrogate.
+    /// The worst case, if the step was solved and not read off a surrogate.
     pub worst_case: Option<WorstCase>,
 }
 
 impl Hypothesis {
-    /// The factor on the radius, if one is supposed.
+    /// Returns the factor on the radius, if there is one.
     pub fn radius_scale(&self) -> Option<f64> {
         match self.radius {
             Some(HypotheticalRadius::Scaled(scale)) => Some(scale),
@@ -49,7 +49,7 @@ impl Hypothesis {
         }
     }
 
-    /// Checks what can be checked without a state; fields are named as on the wire.
+    /// Checks the fields as far as possible without a state; fields are named as on the wire.
     ///
     /// # Errors
     /// The first field that breaks its rule.
@@ -76,13 +76,13 @@ impl Hypothesis {
 }
 
 impl Advisor {
-    /// The advice for `state` after `step` observed periods, were `hypothesis` so; `following` is the step that advises the period
-    /// after that, if one does. A radius other than the state's
-    /// own is beyond the policy surrogate: the robust step is solved over the value surrogate of the step after, as it
-    /// always is under [`AdviceMode::Resolve`]. Cost: as [`Advisor::advise`], twice where a return is supposed.
+    /// Returns the advice for `state` after `step` observed periods under `hypothesis`. `following` is the step that
+    /// advises the period after that, if there is one. The policy surrogate does not cover a radius other than the
+    /// state's own. For it the robust step is solved over the value surrogate of the next step, as always under
+    /// [`AdviceMode::Resolve`]. Cost: as [`Advisor::advise`], twice with a hypothetical return.
     ///
     /// # Errors
-    /// A field out of its range; a return that leads past the horizon or out of the wealth taken.
+    /// A field out of its range; a return that leads past the horizon or to a wealth that is not accepted.
     pub fn suppose(
         &self,
         step: usize,
@@ -109,7 +109,7 @@ impl Advisor {
         Ok(Supposed { wealth, advice, worst_case })
     }
 
-    /// The state with the wealth supposed, and after the return supposed.
+    /// Returns the step and state with the hypothetical wealth and holding, after the hypothetical return.
     fn supposed_state(
         &self,
         step: usize,

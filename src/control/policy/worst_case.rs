@@ -9,21 +9,22 @@ use crate::control::request::centre::CentreSpecification;
 use crate::numerics::confidence_region::NormalLaw;
 use crate::numerics::wasserstein::Move;
 
-/// Radius, in log-return, whose price the sentence tells.
+/// Radius, in log-return, for which the sentence gives the price.
 const RADIUS_UNIT: f64 = 0.001;
-/// Basis points of one.
+/// Basis points in one.
 const BASIS_POINTS: f64 = 1e4;
 
-/// The law that is worst for the advised allocation: a transport of the ball's centre, or, in the parametric frameworks, a
-/// normal law.
+/// The law that is worst for the advised allocation: a transport of the ball's centre or, in the parametric frameworks,
+/// a normal law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstCase {
     /// Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius.
     pub multiplier: f64,
-    /// The same in log certainty equivalent: the slope at this radius, of this period's ball alone. A wider ball costs at most that
-    /// times what it is wider by, and at most all that the advice is worth above the floor.
+    /// Loss of log certainty equivalent per unit of extra radius: the slope at this radius, for this period's ball
+    /// alone. A wider ball costs at most this times the extra radius, and at most the whole worth of the advice above
+    /// the floor.
     pub radius_cost: f64,
-    /// Empty in the parametric frameworks.
+    /// The transport of mass; empty in the parametric frameworks.
     pub transport: Vec<TransportedMass>,
     /// The worst normal law and the estimated one; absent in the other frameworks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -37,42 +38,43 @@ pub struct WorstCase {
 /// The worst mean and variance of the log-return of one period, within the confidence region of the estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstNormalLaw {
-    /// Of the log-return, per step.
+    /// Worst mean of the log-return, per step.
     pub mean: f64,
-    /// Of the log-return, per step.
+    /// Worst variance of the log-return, per step.
     pub variance: f64,
-    /// As the returns seen say, per step.
+    /// Mean estimated from the returns, per step.
     pub estimated_mean: f64,
-    /// As the returns seen say, per step.
+    /// Variance estimated from the returns, per step.
     pub estimated_variance: f64,
 }
 
-/// Mass of one atom and where the adversary puts it.
+/// Mass of one atom and the adversary's destination for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TransportedMass {
     /// Log-return of the centre; an observed one, unless `problem.centre` says otherwise.
     pub atom: f64,
-    /// Log-return in the worst case; equal to `atom` where the mass stays.
+    /// Log-return in the worst case; equal to `atom` if the mass stays.
     pub moved_to: f64,
-    /// A probability.
+    /// The mass, a probability.
     pub mass: f64,
 }
 
-/// The worst-case law in figures, of log-returns.
+/// The figures of the worst-case law of log-returns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstLawSummary {
-    /// Per step.
+    /// Mean per step.
     pub mean: f64,
-    /// Per root of a step.
+    /// Standard deviation per square root of a step.
     pub standard_deviation: f64,
-    /// Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen.
+    /// Share of the probability that moves; absent if laws are normal, because none is a transport of the observed
+    /// returns.
     pub share_moved: Option<f64>,
-    /// Lowest log-return that mass moves to; absent where none moves.
+    /// Lowest log-return that mass moves to; absent if none moves.
     pub lowest_destination: Option<f64>,
 }
 
 impl WorstCase {
-    /// The worst law in figures; `None` where the robust step has no solution.
+    /// Returns the figures of the worst law; `None` if the robust step has no solution.
     pub fn summary(&self) -> Option<WorstLawSummary> {
         if let Some(normal) = self.normal {
             let (mean, standard_deviation) = (normal.mean, normal.variance.sqrt());
@@ -93,14 +95,14 @@ impl WorstCase {
         })
     }
 
-    /// Where the robust step has no finite solution.
+    /// Returns the result for a robust step without a finite solution.
     pub fn unknown() -> Self {
         let sentence =
             "The robust step has no finite solution at this state, or its wealth does not pay for what is withdrawn, so all of it stays in the bank.".to_owned();
         WorstCase { multiplier: 0.0, radius_cost: 0.0, transport: Vec::new(), normal: None, duality_gap: 0.0, sentence }
     }
 
-    /// The worst law of a solved step. `utility_scale` turns relative utility into utility.
+    /// Returns the worst law of a solved step. `utility_scale` turns relative utility into utility.
     pub fn of(
         solution: &RobustSolution,
         advice: &Advice,
@@ -130,14 +132,14 @@ impl WorstCase {
     }
 }
 
-/// The probability that a transport moves, and the lowest return that any of it moves to.
+/// Returns the probability that a transport moves, and the lowest return that any of it moves to.
 fn moved(transport: &[TransportedMass]) -> (f64, Option<f64>) {
     let moved = || transport.iter().filter(|mass| mass.atom != mass.moved_to);
     (moved().map(|mass| mass.mass).sum(), moved().map(|mass| mass.moved_to).reduce(f64::min))
 }
 
-/// Basis points of the certainty equivalent that a ball of this period alone, wider by `wider`, costs at most: the worth is convex in
-/// the radius, so it falls by no more than its slope says, and never below the floor.
+/// Returns the basis points of the certainty equivalent that a ball of this period alone, wider by `wider`, costs at
+/// most. The worth is convex in the radius, so it falls by no more than its slope, and never below the floor.
 /// Checked by: `tests/solver/bellman.rs::a_wider_ball_costs_at_most_what_is_said`.
 pub fn most_cost(wider: f64, radius_cost: f64, advice: &Advice) -> f64 {
     let above = (advice.certainty_equivalent / advice.floor).ln();

@@ -1,4 +1,4 @@
-//! The advice of other records, and where between them it changes.
+//! Computes the advice for other records, and finds the changes of advice between them.
 
 use super::{LeftOut, NextAdvice, NextReturn, Premium, Return, Sensitivity, WithoutOne};
 use crate::control::error::FieldError;
@@ -14,12 +14,12 @@ use crate::control::request::support::Interval;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::summary::interpolated_quantile;
 
-/// Returns that are left out in turn, at most: all of thirty years of months.
+/// Most returns that are left out in turn: all of thirty years of months.
 const MOST_LEFT_OUT: usize = 360;
-/// Returns that are left out in turn, at least, however long a step takes.
+/// Fewest returns that are left out in turn, however long a step takes.
 const FEWEST_LEFT_OUT: usize = 32;
-/// The product of the numbers of returns and of simulated bridges up to which [`MOST_LEFT_OUT`] returns are left out: a step then takes
-/// about 10 ms. A step that takes longer is solved without fewer returns.
+/// Largest product of the numbers of returns and of simulated bridges at which [`MOST_LEFT_OUT`] returns are left out.
+/// A step then takes about 10 ms. If a step takes longer, fewer returns are left out.
 const CHEAP_BRIDGED: usize = 2_880_000;
 /// The product of the numbers of returns and of design points that is as cheap: that of 250 returns at the default.
 const CHEAP_DESIGNED: usize = 250_000;
@@ -27,39 +27,40 @@ const CHEAP_DESIGNED: usize = 250_000;
 pub const MOST_DESIGNED: usize = 750_000;
 /// Quantiles of the record at which a next return is tried.
 const QUANTILES: [f64; 2] = [0.05, 0.95];
-/// How far a next return may lie beyond the extremes of the record, as a share of the distance between them.
+/// Distance of a next return beyond the extremes of the record, at most, as a share of the distance between them.
 const WIDENED: f64 = 0.5;
-/// Equal parts into which the next returns considered are cut.
+/// Number of equal parts of the range of next returns.
 const PARTS: usize = 48;
-/// Returns and shifts are told to this, in log-return.
+/// Resolution of reported returns and shifts, in log-return.
 const RESOLUTION: f64 = 1e-6;
-/// An allocation this near to an end of the action interval is at it: ten times what the search for the best leaves open.
+/// Distance within which an allocation counts as at an end of the action interval: ten times the tolerance of the
+/// search.
 const AT_AN_END: f64 = 1e-6;
-/// An advice that moves by more than this share of the action interval is another one.
+/// Share of the action interval beyond which a change of the advice counts as large.
 const FAR: f64 = 0.5;
-/// More periods than this are never: eight centuries of months.
+/// Most periods considered: eight centuries of months.
 const MOST_PERIODS: usize = 10_000;
 
-/// An advice, and the ways to ask for what stands beside it.
+/// An advice, and functions that compute the advice in other cases.
 struct Asked<'a> {
-    /// In the order in which the returns came.
+    /// The record, in the order in which the returns came.
     record: &'a [f64],
     advice: &'a Advice,
     problem: &'a ProblemSpecification,
     /// The highest allocation that may be advised.
     highest: f64,
-    /// Design points by which the step after is known.
+    /// Number of design points of the next step's value.
     design: usize,
-    /// The allocation were the record another.
+    /// Returns the allocation for another record.
     of: &'a (dyn Fn(&[f64]) -> f64 + Sync),
-    /// The allocation were the radius another.
+    /// Returns the allocation for another radius.
     within: &'a (dyn Fn(f64) -> f64 + Sync),
 }
 
 impl Advisor {
-    /// The sensitivity of `advice`, which was found by `mode` for the period after `step` observed periods in `state`, whose law
-    /// is that of `record`. Cost: as many pieces of advice as returns are left out, at most 360, and some 130 more, on the rayon pool
-    /// this is called from.
+    /// Returns the sensitivity of `advice`, which was found by `mode` for the period after `step` observed periods in
+    /// `state`, whose law is that of `record`. Cost: one advice for each return left out, at most 360, and some 130
+    /// more, on the rayon pool this is called from.
     pub fn sensitivity(
         &self,
         step: usize,
@@ -74,7 +75,7 @@ impl Advisor {
         self.sensitivity_by(step, state, record, advice, &of)
     }
 
-    /// The same where `of` says what is advised were the record another.
+    /// Returns the sensitivity, with `of` computing the advice for another record.
     pub(in crate::control::policy) fn sensitivity_by(
         &self,
         step: usize,
@@ -90,13 +91,13 @@ impl Advisor {
         Asked { record, advice, problem, highest, design, of, within: &within }.sensitivity()
     }
 
-    /// Design points by which the value after a step is known; none where the step is the last.
+    /// Returns the number of design points of the value after a step; 0 if the step is the last.
     fn designed(&self) -> usize {
         let Specification { problem, design, .. } = self.specification();
         if problem.horizon == 1 { 0 } else { design.count.unwrap_or_default() }
     }
 
-    /// Checks that the sensitivity of advice from `returns` returns can be told at a bounded cost.
+    /// Checks that the sensitivity of advice from `returns` returns has a bounded cost.
     ///
     /// # Errors
     /// Under the name `sensitivity`: the framework does not learn from returns; too many of them times design points.
@@ -138,7 +139,7 @@ impl Asked<'_> {
         Sensitivity { without_one, next_return, premium, caution }
     }
 
-    /// Where all weigh the same, equal returns leave equal records: each is left out once.
+    /// Leaves out each return in turn. With equal weights, equal returns leave equal records and are left out once.
     fn without_one(&self) -> Option<WithoutOne> {
         let mut order: Vec<usize> = (0..self.record.len()).collect();
         order.sort_by(|&one, &other| self.record[one].total_cmp(&self.record[other]).then(one.cmp(&other)));
@@ -159,9 +160,9 @@ impl Asked<'_> {
         Some(WithoutOne { lowest, highest, tried })
     }
 
-    /// Picks the returns that move the advice the most, where leaving out each would take too long: half of them are furthest from
-    /// the mean by their weight, and the others lie evenly between by their rank, since the advice changes smoothly with the return
-    /// left out. `order` is ascending by return, and so is what is left of it.
+    /// Picks the returns that move the advice the most, if leaving out each would take too long. Half of them are
+    /// furthest from the mean by their weight. The others are spread evenly by rank, because the advice changes
+    /// smoothly with the return left out. `order` is ascending by return, and so is the result.
     fn telling(&self, order: Vec<usize>) -> Vec<usize> {
         let most = self.most_left_out();
         if order.len() <= most {
@@ -179,7 +180,7 @@ impl Asked<'_> {
         ranks.into_iter().map(|rank| order[rank]).collect()
     }
 
-    /// Returns that are left out in turn: fewer where a step takes longer.
+    /// Returns how many returns are left out in turn: fewer if a step takes longer.
     fn most_left_out(&self) -> usize {
         let returns = self.record.len() as f64;
         let bridged = returns * self.problem.radius_rule().paths() as f64 / CHEAP_BRIDGED as f64;
@@ -192,7 +193,8 @@ impl Asked<'_> {
         self.problem.learning.mean(self.record, |log_return| log_return)
     }
 
-    /// The end of the range that is further from the advice, where that is far, or one of the two is the bank alone.
+    /// Warns of the end of the range that is further from the advice, if it is far, or if exactly one of the two is the
+    /// bank alone.
     fn hangs_on_one(&self, WithoutOne { lowest, highest, .. }: WithoutOne) -> Option<Caution> {
         let told = self.advice.allocation;
         let change = |left_out: &LeftOut| (left_out.allocation - told).abs();
@@ -238,7 +240,7 @@ impl Asked<'_> {
         }
     }
 
-    /// The allocation were `log_return` seen as well.
+    /// Returns the allocation after one more return, `log_return`.
     fn after(&self, log_return: f64) -> f64 {
         (self.of)(&[self.record, &[log_return]].concat())
     }
@@ -247,7 +249,7 @@ impl Asked<'_> {
         self.premium(0.0)
     }
 
-    /// The mean simple return of the record, every log-return shifted by as much, less what the bank pays.
+    /// Returns the mean simple return of the record with every log-return shifted by `shift`, less the bank's rate.
     fn premium(&self, shift: f64) -> f64 {
         self.problem.learning.mean(self.record, |log_return| (log_return + shift).exp_m1()) - self.problem.rate_per_step
     }
@@ -293,7 +295,7 @@ impl Asked<'_> {
         [of(f64::min), of(f64::max)]
     }
 
-    /// Between which returns any may be supposed.
+    /// Returns the interval of admissible returns.
     fn bounds(&self) -> [f64; 2] {
         let Interval { min, max } =
             self.problem.support_rule().given().unwrap_or(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
@@ -301,12 +303,12 @@ impl Asked<'_> {
     }
 }
 
-/// Whether an allocation is more than the bank alone.
+/// Returns true if an allocation is more than the bank alone.
 fn is_invested(allocation: f64) -> bool {
     allocation > AT_AN_END
 }
 
-/// Halves an interval, of whose ends the upper one alone is above, down to one as narrow as can be told that is so too.
+/// Bisects an interval, of which only the upper end is above, down to the resolution; the result has the same property.
 fn parted([mut below, mut above]: [f64; 2], is_above: impl Fn(f64) -> bool) -> [f64; 2] {
     while above - below > RESOLUTION {
         let between = f64::midpoint(below, above);
