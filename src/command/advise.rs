@@ -1,5 +1,5 @@
-//! `ballast advise`: what to hold through the coming period, from a file of returns or prices. No server runs; the answer is
-//! that of `POST /advise`.
+//! `ballast advise`: the allocation for the coming period, from a file of returns or prices. No server runs; the answer
+//! is that of `POST /advise`.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -26,30 +26,30 @@ pub struct AdviseArgs {
     record: Record,
     #[command(flatten)]
     caution: CautionArgs,
-    /// Of the simulations
+    /// Seed of the simulations
     #[arg(long, default_value_t = default_seed())]
     seed: u64,
-    /// Periods in which the weight of a return halves; all weigh the same unless given
+    /// Periods in which the weight of a return halves; all returns weigh the same unless given
     #[arg(long)]
     half_life: Option<f64>,
     /// Wealth now, in any currency
     #[arg(long, default_value_t = 100.0)]
     wealth: f64,
-    /// Share of wealth in the risky asset now; of several columns COLUMN=SHARE, given again for each
+    /// Share of wealth in the risky asset now; for several columns COLUMN=SHARE, repeated for each
     #[arg(long = "holding", value_name = "SHARE", value_parser = Holding::read)]
     holdings: Vec<Holding>,
-    /// Lost of what is bought or sold, as a fraction: 0.001 is 0.1 %
+    /// Cost of each trade as a fraction of the amount traded: 0.001 is 0.1 %
     #[arg(long, default_value_t = 0.0)]
     trading_cost: f64,
-    /// Say as well how near the advice is to changing
+    /// Report also how close the advice is to changing
     #[arg(long)]
     sensitivity: bool,
-    /// Print what POST /advise answers, and what was read on the standard error
+    /// Print the answer of POST /advise as JSON, and what was read on the standard error
     #[arg(long)]
     json: bool,
 }
 
-/// What is held already, of one of several columns where it is named.
+/// Current holding, in one of several columns if it is named.
 #[derive(Debug, Clone, PartialEq)]
 struct Holding {
     column: Option<String>,
@@ -76,7 +76,7 @@ impl fmt::Display for Holding {
     }
 }
 
-/// The option that says what a field of the question is.
+/// The command-line option for each field of the question.
 const OPTIONS: [(&str, &str); 7] = [
     ("problem.learning.half_life", "--half-life"),
     ("problem.trading_cost", "--trading-cost"),
@@ -133,7 +133,7 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
 }
 
 impl AdviseArgs {
-    /// That of the one asset.
+    /// Returns the holding of the only asset.
     fn one_holding(&self) -> Result<f64, FieldError> {
         match &self.holdings[..] {
             [] => Ok(0.0),
@@ -145,7 +145,7 @@ impl AdviseArgs {
         }
     }
 
-    /// That of each of these columns: nothing of those that are not named.
+    /// Returns the holding of each of these columns: 0 for those that are not named.
     fn holdings_of(&self, columns: &[String]) -> Result<BTreeMap<String, f64>, FieldError> {
         let mut by_name = BTreeMap::new();
         for holding in &self.holdings {
@@ -178,10 +178,10 @@ impl AdviseArgs {
     }
 }
 
-/// The error of a question about `count` returns, under the name by which the user knows the field.
+/// Renames the field of an error about `count` returns to the option that the user knows.
 fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
     if error.field == "problem.radius.paths" {
-        // Of one step: the returns and one more.
+        // For one step: the returns and one more.
         let most = error.value.parse().map_or(0, |paths: usize| BRIDGE_NUMBERS / paths.max(1) - 1);
         let rule = format!(
             "must be at most {most}, as the radius is not simulated for more: --window {most} uses the last ones"

@@ -1,4 +1,4 @@
-//! A JSON client of the service: what a program of yours would do, over a real socket.
+//! A JSON client of the service over a real socket, as a user's program would be.
 
 use std::net::SocketAddr;
 
@@ -50,7 +50,7 @@ impl ApiClient {
         self.json(Method::POST, path, body.to_string().into()).await
     }
 
-    /// Reads the answer at `path` to its end, whatever it is.
+    /// Reads the answer at `path` to its end and ignores it.
     pub async fn touch(&self, path: &str) -> Result<(), ApiError> {
         let (call, response) = self.send(Method::GET, path, Bytes::new()).await?;
         whole_body(&call, response).await.map(drop)
@@ -93,7 +93,8 @@ async fn whole_body(call: &str, response: Response<Incoming>) -> Result<Bytes, A
 }
 
 impl Events {
-    /// The data of the next event as JSON; `None` when the stream has ended. Comments and other fields are skipped.
+    /// Returns the data of the next event as JSON; `None` when the stream has ended. Comments and other fields are
+    /// skipped.
     pub async fn next(&mut self) -> Result<Option<Value>, ApiError> {
         loop {
             while let Some(event) = next_block(&mut self.unread) {
@@ -111,14 +112,14 @@ impl Events {
     }
 }
 
-/// Takes the first event off `unread`: everything up to an empty line.
+/// Removes the first event from `unread`: everything up to an empty line.
 fn next_block(unread: &mut Vec<u8>) -> Option<String> {
     let end = unread.windows(2).position(|pair| pair == b"\n\n")?;
     let block: Vec<u8> = unread.drain(..end + 2).collect();
     Some(String::from_utf8_lossy(&block).into_owned())
 }
 
-/// The `data` lines of an event, joined; `None` where it has none.
+/// Returns the `data` lines of an event, joined; `None` if it has none.
 fn event_data(event: &str) -> Option<String> {
     let lines: Vec<&str> = event
         .lines()

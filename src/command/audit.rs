@@ -1,4 +1,4 @@
-//! `ballast audit`: who did what, from the store itself, whether or not a service runs.
+//! `ballast audit`: shows who changed what, from the store itself, whether or not a service runs.
 
 use std::io::Write;
 
@@ -8,24 +8,26 @@ use clap::Args;
 use super::store_location::StoreArgs;
 use super::{keys, moments};
 
-/// Entries read at a time.
+/// Number of entries read at a time.
 const PAGE: usize = 1000;
 
 #[derive(Debug, Args)]
 pub struct Audit {
-    /// Of this tenant alone.
+    /// Show the entries of this tenant only.
     #[arg(long)]
     tenant: Option<Tenant>,
-    /// What was done to this session, job, policy or key alone; a session's observations are shown too.
+    /// Show only what was done to this session, job, policy or key; a session's observations are included.
     #[arg(long)]
     object: Option<String>,
-    /// Entries shown at most.
+    /// Maximum number of entries shown.
     #[arg(long, default_value_t = 1000)]
     limit: usize,
     #[command(flatten)]
     store: StoreArgs,
 }
 
+/// Prints the entries of the audit.
+///
 /// # Errors
 /// The store is not reached, or an entry is not what was written.
 pub async fn run(arguments: Audit) -> Result<(), Box<dyn std::error::Error>> {

@@ -1,9 +1,9 @@
 //! `ballast backtest`: the walk-forward report on real returns.
 //!
-//! Every so many periods, a year of them unless chosen otherwise, a policy is trained on the window before and lived by
-//! until the next one; nothing later than a period is used for its allocation. A file of several assets is walked through
-//! by the one-step problem and by rules that people use (`assets`). What comes out is a page to read, and the same as JSON
-//! and CSV.
+//! Every `--every` periods, by default a year of them, a policy is trained on the window before and followed until the
+//! next training. Nothing later than the start of a period is used for its allocation. A file of several assets is
+//! tested with the one-step problem and with common rules (`assets`). The result is a page to read, and the same as
+//! JSON and CSV.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -39,38 +39,41 @@ pub struct BacktestArgs {
     /// Folder for report.html, report.json, periods.csv and strategies.csv; made if absent
     #[arg(long)]
     out: PathBuf,
-    /// Periods of history that each policy is trained on; 20 years of them unless given. Of several assets: periods that
-    /// strategies know, several of them or `all`; 10 years, 20 years and all unless given
+    /// Periods of history that each policy is trained on; 20 years of them unless given. For several assets: periods
+    /// that strategies know, several numbers or `all`; 10 years, 20 years and all unless given
     #[arg(long, value_delimiter = ',')]
     window: Vec<Window>,
-    /// Periods from one training to the next, of several assets from one measuring of the radius; a year of them unless given
+    /// Periods from one training to the next, or for several assets from one measurement of the radius; a year of them
+    /// unless given
     #[arg(long)]
     every: Option<usize>,
     /// Periods that a policy looks ahead; those to the next training unless given
     #[arg(long)]
     horizon: Option<usize>,
-    /// Levels of the adaptive strategies, 0.05, 0.1 and 0.5 unless given; the static one takes the second, or the first of one.
-    /// Of several assets one level, 0.1 unless given
+    /// Levels of the adaptive strategies, 0.05, 0.1 and 0.5 unless given; the static one takes the second, or the first
+    /// if there is only one. For several assets one level, 0.1 unless given
     #[arg(long, value_delimiter = ',')]
     alpha: Vec<f64>,
     /// Multiple of the radius of every ball; 1 unless given
     #[arg(long)]
     scale: Option<f64>,
-    /// Share of every radius that is acted on: bold, balanced, cautious, found anew for every training, or paper, all of it
+    /// Share of every radius that is used: bold, balanced or cautious, computed anew for every training, or paper, all
+    /// of it
     #[arg(long, value_parser = caution::level)]
     caution: Option<CautionLevel>,
-    /// Returns that are thought possible: so many times the worst and the best seen, or none for any at all, which is the default
+    /// Returns that are considered possible: a multiple of the worst and the best observed, or none for any at all,
+    /// which is the default
     #[arg(long, value_parser = caution::support)]
     support: Option<Support>,
-    /// What the balls are centred on, as `problem.centre` of a request: '{"kind": "smoothed", "bandwidth": 0.01}'; the returns seen
-    /// unless given
+    /// Centre of the balls, as `problem.centre` of a request: '{"kind": "smoothed", "bandwidth": 0.01}'; the observed
+    /// returns unless given
     #[arg(long, value_parser = centre)]
     centre: Option<CentreSpecification>,
     /// Relative risk aversion: 1 is log utility
     #[arg(long, default_value_t = defaults::risk_aversion())]
     risk_aversion: f64,
-    /// Trading cost, in hundredths of a per cent of what is traded; policies are trained with it, strategies of several
-    /// assets do not know of it
+    /// Trading cost, in hundredths of a per cent of the amount traded; policies are trained with it, strategies of
+    /// several assets do not take it into account
     #[arg(long, default_value_t = 0.0)]
     cost_bp: f64,
     /// Train every policy as if trading were free
@@ -81,7 +84,7 @@ pub struct BacktestArgs {
     count: Option<usize>,
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Threads that train; every core unless given
+    /// Number of training threads; every core unless given
     #[arg(long)]
     threads: Option<usize>,
 }
@@ -107,7 +110,7 @@ pub enum BacktestError {
 /// How much of the past is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Window {
-    /// The last so many periods.
+    /// The last `n` periods.
     Last(usize),
     All,
 }
@@ -136,11 +139,11 @@ impl fmt::Display for Window {
 pub struct Shown {
     pub walked: Walked,
     pub report: BacktestReport,
-    /// As they were read.
+    /// The returns as they were read.
     pub returns: Returns,
 }
 
-/// A report and what was read for it, in a sentence.
+/// A report, and a sentence on the returns that were read for it.
 #[derive(Serialize)]
 pub struct Read<'a, R> {
     #[serde(flatten)]
@@ -161,7 +164,7 @@ fn page(
     report::html(dashboard::embedded, module, &title, read, sentences)
 }
 
-/// Walks, counts and writes.
+/// Runs the walk-forward and writes the files.
 pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
     let sentences = match args.returns.read_any()? {
         AnyReturns::One(returns) => {
@@ -185,7 +188,7 @@ pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
 }
 
 impl BacktestArgs {
-    /// The request that these arguments are.
+    /// Builds the request from these arguments.
     fn request(&self, returns: &Returns) -> Result<BacktestRequest, BacktestError> {
         let window = match self.window[..] {
             [] => None,
@@ -219,7 +222,7 @@ impl BacktestArgs {
         })
     }
 
-    /// As a share of what is traded.
+    /// Returns the cost as a share of the amount traded.
     fn trading_cost(&self) -> Result<f64, BacktestError> {
         if (0.0..=1000.0).contains(&self.cost_bp) {
             return Ok(1e-4 * self.cost_bp);
@@ -245,10 +248,10 @@ fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
     BacktestError::Option { option: option.into(), value: value.to_string(), rule: rule.into() }
 }
 
-/// A field of the request is an option, or the file.
+/// Names the option, or the file, for a field of the request.
 impl From<FieldError> for BacktestError {
     fn from(FieldError { field, value, rule }: FieldError) -> Self {
-        // Fields of an object are those of its option.
+        // Fields of an object belong to its option.
         let field = if field.starts_with("centre.") { field.replacen('.', " ", 1) } else { field };
         let option = match (field.strip_prefix("simple_returns"), field.strip_prefix("assets")) {
             (Some(at), _) => format!("the file{at}"),
@@ -260,20 +263,20 @@ impl From<FieldError> for BacktestError {
 }
 
 impl Shown {
-    /// The report as a page.
+    /// Renders the report as a page.
     fn page(&self) -> Result<String, FileError> {
         let (report, read) = (&self.report, self.returns.sentence());
         let dates = report.dates.as_deref().unwrap_or_default();
         page("backtest.js", "Backtest", dates, &Read { report, read: &read }, &report.sentences)
     }
 
-    /// The periods decided about, after the first window.
+    /// Returns the periods that are decided, after the first window.
     pub fn rows(&self) -> &[Row] {
         &self.returns.rows()[self.walked.backtest.walk.window..]
     }
 }
 
-/// Decides every period, keeps the books, and measures them.
+/// Decides every period, and computes the accounts and the figures.
 fn walk(args: &BacktestArgs, returns: Returns) -> Result<Shown, BacktestError> {
     let backtest = args.backtest(&returns)?;
     let steps = Parts::new(backtest.steps(), "steps of trainings");
@@ -335,7 +338,7 @@ mod tests {
         assert!(page.contains("The whole years are 1, fewer than 30"), "{page}");
     }
 
-    /// Two trainings make the year after the window; figures of a year count its four quarters.
+    /// Checks that two trainings cover the year after the window, and that yearly figures count its four quarters.
     #[test]
     fn quarters_are_walked_through_and_told_as_quarters() {
         let args = arguments(&["--every", "2", "--horizon", "3", "--alpha", "0.5"]);
@@ -359,7 +362,7 @@ mod tests {
             let choices = |Backtest { walk, .. }: Backtest| (walk.window, walk.every, walk.horizon);
             backtest.map(choices).map_err(|error| error.to_string())
         };
-        // Twenty years and one beside are not there: half of the record is.
+        // The file has fewer than twenty-one years, so half of the record is used.
         assert_eq!(said(&[]), Ok((14, 4, 4)));
         assert_eq!(said(&["--window", "20"]), Ok((20, 4, 4)));
         assert_eq!(said(&["--window", "20", "--every", "6"]), Ok((20, 6, 6)));

@@ -1,4 +1,5 @@
-//! `ballast backup` and `ballast restore`: a folder's database as one verified file, and back; `ballast move`: into PostgreSQL.
+//! `ballast backup` and `ballast restore`: a folder's database as one verified file, and back; `ballast move`: into
+//! PostgreSQL.
 
 use std::path::PathBuf;
 
@@ -13,17 +14,17 @@ use super::store_location::{Password, StoreArgs};
 pub struct Backup {
     #[command(flatten)]
     store: StoreArgs,
-    /// The file to write; it may not exist.
+    /// The file to write; it must not exist.
     #[arg(long)]
     out: PathBuf,
     #[command(flatten)]
     damage: DamageArgs,
 }
 
-/// How damage of single things is treated.
+/// Treatment of damaged objects.
 #[derive(Debug, Args)]
 struct DamageArgs {
-    /// Go on over damaged things, which are reported and copied as they are.
+    /// Continue past damaged objects, which are reported and copied as they are.
     #[arg(long)]
     skip_damaged: bool,
 }
@@ -36,9 +37,9 @@ impl From<DamageArgs> for Damage {
 
 #[derive(Debug, Args)]
 pub struct Repair {
-    /// A session, a policy or a key, as `check` and the log name it; or `totals`, which are summed anew.
+    /// A session, a policy or a key, as `check` and the log name it; or `totals`, which are recomputed.
     thing: String,
-    /// A file made by `ballast backup` while the thing was sound.
+    /// A file made by `ballast backup` while the object was sound.
     #[arg(long)]
     from: Option<PathBuf>,
     #[command(flatten)]
@@ -50,7 +51,7 @@ pub struct Restore {
     /// A file made by `ballast backup`.
     #[arg(long)]
     from: PathBuf,
-    /// `--data` names the folder to make; it may not hold a database.
+    /// `--data` names the folder to make; it must not hold a database.
     #[command(flatten)]
     store: StoreArgs,
     #[command(flatten)]
@@ -59,7 +60,7 @@ pub struct Restore {
 
 #[derive(Debug, Args)]
 pub struct Move {
-    /// The folder of a service that is stopped; it stays as it is.
+    /// The folder of a stopped service; it is not changed.
     #[arg(long)]
     from: PathBuf,
     /// The PostgreSQL database to move to, which has no rows: postgres://user:password@host:port/database.
@@ -67,14 +68,18 @@ pub struct Move {
     store: Password,
 }
 
+/// Moves the database of a folder to PostgreSQL.
+///
 /// # Errors
-/// A process holds the folder, a thing in it is damaged, or the database has rows or is not reached.
+/// A process holds the folder, an object in it is damaged, or the database has rows or is not reached.
 pub async fn relocate(arguments: Move) -> Result<(), Box<dyn std::error::Error>> {
     store::relocate(&arguments.from, &arguments.store.url()?, &mut |line| println!("{line}")).await?;
     println!("moved, and sound; start the service with --store, and never again on {}", arguments.from.display());
     Ok(())
 }
 
+/// Writes the database of a folder to a backup file.
+///
 /// # Errors
 /// The store is PostgreSQL, the file exists, or the database, its copy or the disk is damaged.
 pub async fn run(arguments: Backup) -> Result<(), Box<dyn std::error::Error>> {
@@ -87,6 +92,8 @@ pub async fn run(arguments: Backup) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
+/// Restores a folder from a backup file.
+///
 /// # Errors
 /// The store is PostgreSQL, the folder holds a database, or the backup or the disk is damaged.
 pub async fn restore(arguments: Restore) -> Result<(), Box<dyn std::error::Error>> {
@@ -99,8 +106,10 @@ pub async fn restore(arguments: Restore) -> Result<(), Box<dyn std::error::Error
     Ok(())
 }
 
+/// Repairs one object of a folder's database.
+///
 /// # Errors
-/// The store is PostgreSQL, a process holds the folder, or the backup has not what would make the thing sound.
+/// The store is PostgreSQL, a process holds the folder, or the backup lacks what would make the object sound.
 pub async fn repair(arguments: Repair) -> Result<(), Box<dyn std::error::Error>> {
     let StoreLocation::Folder(folder) = arguments.store.location()? else {
         return Err("PostgreSQL is repaired by its own tools (docs/operating.md)".into());
@@ -116,7 +125,7 @@ pub async fn repair(arguments: Repair) -> Result<(), Box<dyn std::error::Error>>
     Ok(())
 }
 
-/// Prints lines, and counts the damaged things among them.
+/// Prints lines, and counts the damaged objects among them.
 #[derive(Default)]
 struct Report {
     damaged: usize,

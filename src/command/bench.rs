@@ -23,9 +23,10 @@ pub enum Bench {
     Accuracy(accuracy::AccuracyBench),
     /// Compare policies for one history with brute force, in basis points and in allocation.
     Horizons(horizons::HorizonsBench),
-    /// Time the robust step of several assets, from nothing and near that of the month before.
+    /// Time the robust step of several assets, from a cold start and from a warm start at the solution of the month
+    /// before.
     Assets(assets::AssetsBench),
-    /// Time GET /action on loopback beside GET /livez.
+    /// Time GET /action on loopback, next to GET /livez.
     Action(action::ActionBench),
 }
 

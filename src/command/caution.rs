@@ -1,4 +1,4 @@
-//! How much of the statistical doubt is acted on, as options.
+//! Command-line options for the share of the statistical doubt that is used.
 
 use ballast::control::error::FieldError;
 use ballast::control::request::caution::CautionLevel;
@@ -10,22 +10,22 @@ use clap::Args;
 
 #[derive(Debug, Clone, Args)]
 pub struct CautionArgs {
-    /// How careful: bold, balanced, cautious, or paper, which acts on the whole radius
+    /// Level of caution: bold, balanced, cautious, or paper, which uses the whole radius
     #[arg(long, value_parser = level, conflicts_with = "scale")]
     caution: Option<CautionLevel>,
-    /// Share of the radius that is acted on, in the place of a level: 0 takes the record for the truth
+    /// Share of the radius that is used, instead of a level: 0 takes the record as true
     #[arg(long)]
     scale: Option<f64>,
     /// Probability that the ball of the whole radius misses the true law
     #[arg(long, default_value_t = 0.1)]
     alpha: f64,
-    /// Returns that are thought possible: so many times the worst and the best seen, or none for any at all
+    /// Returns that are considered possible: a multiple of the worst and the best observed, or none for any at all
     #[arg(long, value_parser = support)]
     support: Option<Support>,
 }
 
 impl CautionArgs {
-    /// The problem at this caution.
+    /// Returns the problem at this caution.
     pub fn applied(&self, problem: ProblemSpecification) -> ProblemSpecification {
         let given = self.scale.map(CautionLevel::Scale).or(self.caution);
         ProblemSpecification {
@@ -37,7 +37,7 @@ impl CautionArgs {
     }
 }
 
-/// The options that say what a field of the problem is.
+/// The option for each field of the problem.
 pub const OPTIONS: [(&str, &str); 4] = [
     ("problem.caution.scale", "--scale"),
     ("problem.caution", "--caution"),

@@ -1,4 +1,4 @@
-//! `ballast check`: whether what a store holds is what was written.
+//! `ballast check`: checks that a store holds what was written.
 
 use std::path::PathBuf;
 
@@ -17,8 +17,10 @@ pub struct Check {
     backup: Option<PathBuf>,
 }
 
+/// Checks the store or the backup.
+///
 /// # Errors
-/// How much is damaged, or what kept it from being looked for.
+/// The number of damaged objects, or what prevented the check.
 pub async fn run(arguments: Check) -> Result<(), Box<dyn std::error::Error>> {
     let inspection = match (arguments.backup, arguments.store.location()?) {
         (Some(file), _) => Inspection::of_backup(&file).await?,

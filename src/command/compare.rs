@@ -1,4 +1,4 @@
-//! A comparison of strategies in this process, with its progress on the screen: a bar on a terminal, a line a stage
+//! A comparison of strategies in this process, with its progress on the screen: a bar on a terminal, a line per stage
 //! elsewhere.
 
 use std::error::Error;
@@ -14,21 +14,21 @@ use ballast::control::pool::TrainingPool;
 use ballast::control::progress::{Phase, StepProgress, Watch};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Positions of the bar.
+/// Number of positions of the bar.
 const TICKS: u64 = 1000;
 
-/// The threads that work, and the screen that shows how far they are.
+/// The worker threads, and the screen that shows their progress.
 pub struct Workshop {
     pool: TrainingPool,
     stop: AtomicBool,
     bar: Option<ProgressBar>,
-    /// The stage last announced where there is no terminal.
+    /// The stage last announced if there is no terminal.
     announced: Mutex<String>,
     started: Instant,
 }
 
 impl Workshop {
-    /// On every core: nobody else is being served.
+    /// Starts threads on every core, because this process serves no clients.
     ///
     /// # Errors
     /// The system gives no more threads.
@@ -83,7 +83,7 @@ impl Workshop {
         }
     }
 
-    /// Takes the bar off the screen.
+    /// Removes the bar from the screen.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -1,5 +1,5 @@
-//! `ballast coverage`: how often balls hold the law that records were drawn from, how wide they are, and what advice that fears
-//! them loses.
+//! `ballast coverage`: how often balls hold the law that records were drawn from, how wide they are, and how much their
+//! robust advice loses.
 
 use std::error::Error;
 
@@ -18,20 +18,20 @@ use clap::Args;
 use super::bench::paper;
 use super::returns::{Returns, ReturnsError};
 
-/// Of the paper's mixture, and of the laws that have its mean and variance.
+/// Interest rate for the paper's mixture, and for the laws that have its mean and variance.
 const RATE: f64 = 0.002;
 const DEGREES_OF_FREEDOM: f64 = 4.0;
-/// Months of the market that are drawn together.
+/// Months of the market in one block of draws.
 const BLOCK: usize = 12;
-/// Of the intervals.
+/// Confidence level of the intervals.
 const LEVEL: f64 = 0.9;
-/// Behind the quantiles of the bridge.
+/// Number of simulated paths behind the quantiles of the bridge.
 const PATHS: usize = 2000;
-/// Deviation of the error that smooths, in that of the law.
+/// Deviation of the smoothing error, as a share of the law's deviation.
 const SMOOTHED: f64 = 0.25;
 /// Periods in which the weight of a return in the volatility halves.
 const HALF_LIFE: f64 = 12.0;
-/// Returns that a law without premium counts as.
+/// Number of returns that a law without premium counts as.
 const ASSUMED: f64 = 60.0;
 
 #[derive(Debug, Clone, Args)]
@@ -52,18 +52,19 @@ pub struct CoverageArgs {
     seed: u64,
 }
 
-/// A law, what it is called, and what the bank pays beside it.
+/// A law with its name, and the bank's rate used with it.
 struct Named {
     name: &'static str,
     law: DrawnLaw,
-    /// Of its log-returns.
+    /// Standard deviation of its log-returns.
     deviation: f64,
     rate_per_step: f64,
 }
 
 impl Named {
-    /// Centres to compare: the returns seen, those smoothed, those at the volatility of now, and those beside a normal law of the
-    /// right spread by which the asset pays on average what the bank does, which it does not.
+    /// Returns the centres to compare. They are the observed returns, these smoothed, these scaled to the current
+    /// volatility, and these mixed with a normal law of the right deviation. Under the normal law the asset's mean
+    /// return is the bank's, which is wrong.
     fn centres(&self) -> Vec<CentreSpecification> {
         let variance = self.deviation * self.deviation;
         let without_premium =
@@ -155,7 +156,7 @@ fn laws() -> Result<Vec<Named>, ReturnsError> {
     ])
 }
 
-/// The same error under the option by which the user knows the field.
+/// Renames the field of an error to the option that the user knows.
 fn by_option(error: FieldError) -> FieldError {
     let option = match error.field.as_str() {
         "problem.radius.alpha" => "--alpha",

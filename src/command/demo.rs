@@ -1,8 +1,8 @@
-//! `ballast demo`: the whole way once, on real returns, over HTTP.
+//! `ballast demo`: the whole procedure once, on real returns, over HTTP.
 //!
-//! Starts the service in this process on a free loopback port with a data folder of its own, trains on the 240 months
-//! before 2008, and lives through 2008 as an investor's program would: ask, hold, report. A second act does the same with
-//! four industries.
+//! Starts the service in this process on a free loopback port with its own data folder, and trains on the 240 months
+//! before 2008. It then goes through 2008 as an investor's program would: ask, hold, report. A second act does the same
+//! with four industries.
 
 use std::net::SocketAddr;
 use std::time::Instant;
@@ -25,7 +25,7 @@ pub struct DemoArgs {
     /// Leave the service up afterwards, until Ctrl-C
     #[arg(long)]
     stay: bool,
-    /// Leave it up, and open its page in the browser of this desktop
+    /// Leave the service up, and open its page in the browser of this desktop
     #[arg(long)]
     open: bool,
     /// Design points per step: more is more accurate and slower

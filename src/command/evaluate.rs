@@ -24,7 +24,7 @@ pub struct Evaluate {
     out: PathBuf,
 }
 
-/// Returns of the history and steps where no request is given: the paper's t0 and T.
+/// Returns of the history, and steps, if no request is given: the paper's t0 and T.
 const SAMPLE_SIZE: usize = 20;
 const HORIZON: usize = 10;
 

@@ -1,5 +1,5 @@
-//! `ballast frontier`: what multiples of the radius would lose on records like the one in a file. No server runs; the report is
-//! that of `POST /frontier`.
+//! `ballast frontier`: the loss at multiples of the radius on records like the one in a file. No server runs; the
+//! report is that of `POST /frontier`.
 
 use std::error::Error;
 use std::fmt::Write;
@@ -27,15 +27,15 @@ pub struct FrontierArgs {
     /// Multiples of the radius, ascending
     #[arg(long, value_delimiter = ',', default_values_t = default_scales())]
     scales: Vec<f64>,
-    /// Records drawn from each law; 400 of one asset unless given, 60 of several
+    /// Records drawn from each law; unless given, 400 for one asset and 60 for several
     #[arg(long)]
     resamples: Option<usize>,
-    /// Periods in a row that are drawn together; the cube root of the number of returns unless given
+    /// Consecutive periods that are drawn together; the cube root of the number of returns unless given
     #[arg(long)]
     block: Option<usize>,
     #[arg(long, default_value_t = default_seed())]
     seed: u64,
-    /// Print the report of POST /frontier, and what was read on the standard error
+    /// Print the report of POST /frontier as JSON, and what was read on the standard error
     #[arg(long)]
     json: bool,
 }
@@ -69,7 +69,7 @@ impl FrontierArgs {
     }
 }
 
-/// Names the option by which the user knows the field; `source` says how many returns are used.
+/// Renames the field of an error to the option that the user knows; `source` determines how many returns are used.
 fn by_option(error: FieldError, source: &'static str) -> FieldError {
     let option = match error.field.as_str() {
         "resamples" => "--resamples",
@@ -83,7 +83,7 @@ fn by_option(error: FieldError, source: &'static str) -> FieldError {
     FieldError { field: option.into(), ..error }
 }
 
-/// A table for each law that records were drawn from, and what the figures say.
+/// Returns a table for each law that records were drawn from, and the sentences about the figures.
 fn told(report: &FrontierReport) -> String {
     let mut text = String::new();
     for resampled in &report.resampled {

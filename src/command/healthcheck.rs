@@ -1,4 +1,4 @@
-//! `ballast healthcheck`: asks a running service whether it is ready; for containers without a shell.
+//! `ballast healthcheck`: checks that a running service is ready; for containers without a shell.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -11,7 +11,7 @@ use rustls::{ClientConnection, StreamOwned};
 
 use super::tls_client;
 
-/// Below the 3 s that the image gives the check: killed by then, it could not say why.
+/// Below the image's limit of 3 s for the check: a killed check could not report the reason.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Args)]
@@ -19,10 +19,10 @@ pub struct Healthcheck {
     /// Address the service listens on.
     #[arg(long, env = "BALLAST_LISTEN", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// Address it keeps for its operator, asked instead where given: no crowd of callers reaches it.
+    /// Address it keeps for its operator, used instead if given: clients cannot use up its connections.
     #[arg(long, env = "BALLAST_OPERATIONS_LISTEN")]
     operations_listen: Option<SocketAddr>,
-    /// Its certificate, where it has one: asks over TLS. The check sends no secret and judges no certificate.
+    /// Its certificate, if it has one: the check uses TLS. It sends no secret and verifies no certificate.
     #[arg(long, env = "BALLAST_TLS_CERT")]
     tls_cert: Option<PathBuf>,
     /// Its address as `http://host:port` or `https://host:port`, instead of all of these.
@@ -50,13 +50,15 @@ impl Healthcheck {
     }
 }
 
+/// Checks that the service is ready.
+///
 /// # Errors
 /// The service is not reached or not ready.
 pub fn run(arguments: &Healthcheck) -> Result<(), Box<dyn std::error::Error>> {
     let target = arguments.target();
     let host = &target.host;
     let answer = ask(&target).map_err(|error| match error.kind() {
-        // What Unix calls a socket's time-out.
+        // The error kind of a socket's time-out on Unix.
         ErrorKind::WouldBlock => format!("{host} did not answer within {} s", TIMEOUT.as_secs()),
         _ => format!("cannot ask {host}: {error}"),
     })?;
@@ -83,14 +85,14 @@ fn exchange(mut stream: impl Read + Write, host: &str) -> io::Result<String> {
     stream.flush()?;
     let mut answer = Vec::new();
     match stream.read_to_end(&mut answer) {
-        // A peer that ends TLS without saying so has answered all the same.
+        // A peer that ends TLS without a closing message has answered all the same.
         Err(error) if error.kind() == ErrorKind::UnexpectedEof && !answer.is_empty() => {}
         read => drop(read?),
     }
     Ok(String::from_utf8_lossy(&answer).into_owned())
 }
 
-/// A service bound to every address is asked on loopback.
+/// Returns the loopback address for a service bound to every address.
 fn reachable(listen: SocketAddr) -> SocketAddr {
     match listen {
         SocketAddr::V4(address) if address.ip().is_unspecified() => ([127, 0, 0, 1], address.port()).into(),

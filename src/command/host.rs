@@ -1,4 +1,4 @@
-//! The service in this process, as `serve` runs it, on a free loopback port with a data folder of its own.
+//! The service in this process, as `serve` runs it, on a free loopback port with its own data folder.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -16,11 +16,11 @@ pub enum HostError {
     Start { source: Box<dyn std::error::Error + Send + Sync> },
 }
 
-/// A data folder that is removed with everything in it.
+/// A data folder that is removed with all its contents.
 pub struct DataFolder(PathBuf);
 
 impl DataFolder {
-    /// Makes one in `parent`, named after `purpose`.
+    /// Makes a folder in `parent`, named after `purpose`.
     pub fn make_in(parent: &Path, purpose: &str) -> Result<Self, HostError> {
         let path = parent.join(format!("ballast-{purpose}-{}", std::process::id()));
         std::fs::create_dir(&path).map_err(|source| HostError::Folder { path: path.clone(), source })?;
@@ -34,7 +34,7 @@ impl DataFolder {
 
 impl Drop for DataFolder {
     fn drop(&mut self) {
-        // Left behind where it cannot be removed: it is in the system's temporary folder.
+        // A folder that cannot be removed stays behind in the system's temporary folder.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
@@ -43,12 +43,12 @@ impl Drop for DataFolder {
 pub struct Host {
     pub address: SocketAddr,
     running: Running,
-    // The service lets go of the folder before the folder goes.
+    // Declared last: the service releases the folder before it is removed.
     folder: DataFolder,
 }
 
 impl Host {
-    /// Starts it over a new folder named after `purpose`.
+    /// Starts the service over a new folder named after `purpose`.
     pub async fn start(purpose: &str) -> Result<Self, HostError> {
         let folder = DataFolder::make_in(&std::env::temp_dir(), purpose)?;
         let mut config = Config::new(folder.path());
@@ -62,7 +62,7 @@ impl Host {
         self.folder.path()
     }
 
-    /// Drains it and waits for its end.
+    /// Drains the service and waits for its end.
     pub async fn stop(self) {
         if let Err(error) = self.running.stop().await {
             tracing::error!(error = &error as &dyn std::error::Error, "the store failed at the end");

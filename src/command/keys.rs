@@ -1,4 +1,4 @@
-//! `ballast keys`: who may call a service, kept in its store, whether or not it runs.
+//! `ballast keys`: the keys that may call a service, kept in its store, whether or not it runs.
 
 use std::io::Write;
 use std::time::Duration;
@@ -17,9 +17,9 @@ use super::store_location::StoreArgs;
 pub enum Keys {
     /// Make a key and print it, once.
     Create(Create),
-    /// Make a key in the place of another, which stays in force for a while, and print it, once.
+    /// Make a key that replaces another, which stays valid for a while, and print it, once.
     Rotate(Rotate),
-    /// List keys: name, tenant, roles, since when, until when, and whether revoked.
+    /// List keys: name, tenant, roles, creation, expiry, and whether revoked.
     List(List),
     /// Revoke a key for good, by its name.
     Revoke(Revoke),
@@ -27,29 +27,29 @@ pub enum Keys {
 
 #[derive(Debug, Args)]
 pub struct Create {
-    /// Whose jobs, policies and sessions its holder sees and makes.
+    /// Tenant whose jobs, policies and sessions the key's holder sees and makes.
     #[arg(long, default_value_t)]
     tenant: Tenant,
-    /// What its holder may do; may be given several times.
+    /// Roles of the key; may be given several times.
     #[arg(long = "role", value_enum, required = true)]
     roles: Vec<RoleName>,
     #[command(flatten)]
     expiry: Expiry,
     #[command(flatten)]
     store: StoreArgs,
-    /// Make the database of the folder too, before the first start of its service.
+    /// Make the folder's database also, before the first start of its service.
     #[arg(long)]
     new: bool,
 }
 
-/// Until when a new key is in force.
+/// Expiry of a new key.
 #[derive(Debug, Args)]
 #[group(multiple = false)]
 struct Expiry {
-    /// So long, as 90d or 12h.
+    /// Length of validity, as 90d or 12h.
     #[arg(long, value_name = "TIME", value_parser = moments::length)]
     expires_in: Option<Duration>,
-    /// Until the start of this day (UTC), as 2027-01-31, or until this moment, as 2027-01-31T12:00:00Z.
+    /// Valid until the start of this day (UTC), as 2027-01-31, or until this moment, as 2027-01-31T12:00:00Z.
     #[arg(long, value_name = "DAY", value_parser = moments::moment)]
     expires_on: Option<i64>,
 }
@@ -67,12 +67,12 @@ impl Expiry {
 
 #[derive(Debug, Args)]
 pub struct Rotate {
-    /// As `list` shows it: key_...
+    /// Name of the key, as `list` shows it: key_...
     key: String,
     /// The old key expires after this time.
     #[arg(long, value_name = "TIME", default_value = "1d", value_parser = moments::length)]
     overlap: Duration,
-    /// Unless given, the new key is in force for as long as the old one was made for.
+    /// Expiry of the new key; unless given, it is valid for as long as the old one was made for.
     #[command(flatten)]
     expiry: Expiry,
     #[command(flatten)]
@@ -87,7 +87,7 @@ pub struct List {
 
 #[derive(Debug, Args)]
 pub struct Revoke {
-    /// As `list` shows it: key_...
+    /// Name of the key, as `list` shows it: key_...
     key: String,
     #[command(flatten)]
     store: StoreArgs,
@@ -102,7 +102,7 @@ enum RoleName {
     Operate,
     /// Queue and cancel jobs, import and delete policies.
     Train,
-    /// All of it, and /health and /metrics.
+    /// All of these, and /health and /metrics.
     Admin,
 }
 
@@ -117,6 +117,8 @@ impl From<RoleName> for KeyRole {
     }
 }
 
+/// Runs the subcommand.
+///
 /// # Errors
 /// The store is not reached, or there is no such key.
 pub async fn run(keys: Keys) -> Result<(), Box<dyn std::error::Error>> {
@@ -128,7 +130,7 @@ pub async fn run(keys: Keys) -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
-/// The keys of a store that is there: a wrong folder is told of, and nothing is made in it.
+/// Opens the keys of an existing store: a wrong folder is reported, and nothing is made in it.
 pub(super) async fn open(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
     Ok(match store.location()? {
         StoreLocation::Folder(folder) => KeyRing::open_existing(&folder).await?,
@@ -136,7 +138,7 @@ pub(super) async fn open(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error
     })
 }
 
-/// The keys of a store, which is made if there is none.
+/// Opens the keys of a store, which is made if there is none.
 async fn open_new(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
     match store.location()? {
         StoreLocation::Folder(folder) => Ok(KeyRing::open(&folder).await?),
@@ -170,7 +172,7 @@ fn until(expires_ms: Option<i64>) -> String {
     expires_ms.map_or(String::new(), |_| format!(", in force until {}", moments::shown(expires_ms)))
 }
 
-/// Alone on standard output, so that a program can take it from there.
+/// Prints the secret alone on standard output, so that a program can read it.
 fn reveal(secret: &Secret) -> Result<(), Box<dyn std::error::Error>> {
     eprintln!("this is the only time its text is shown:");
     writeln!(std::io::stdout(), "{}", secret.reveal())?;

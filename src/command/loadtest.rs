@@ -1,8 +1,8 @@
-//! `ballast loadtest`: what the live service bears on this machine, beside what the machine itself does.
+//! `ballast loadtest`: the load that the live service bears on this machine, next to the machine's own limits.
 //!
-//! Runs `ballast serve` as a process of its own over a new data folder, gives it a policy of the paper's
-//! problem with a small design, and drives it from one thread over keep-alive connections; or does so at a service that is up already.
-//! The server is ended by killing it, as a crash would: what it acknowledged must be there when it is started again.
+//! Runs `ballast serve` as a separate process over a new data folder, or uses a service that is already up. Gives it a
+//! policy of the paper's problem with a small design, and drives it from one thread over keep-alive connections. The
+//! server is ended by killing it, as a crash would: everything it acknowledged must be there when it is started again.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -25,13 +25,13 @@ use server::Server;
 
 #[derive(Debug, Args)]
 pub struct LoadTest {
-    /// What to run; everything unless given
+    /// Scenarios to run; all of them unless given
     #[arg(value_enum)]
     scenarios: Vec<Scenario>,
     /// Drive the service at http://host:port or https://host:port instead of starting one
     #[arg(long)]
     url: Option<String>,
-    /// Authorities in PEM, one of which the certificate of an https service must be by
+    /// Certificate authorities in PEM, one of which must have issued the certificate of an https service
     #[arg(long, requires = "url")]
     ca: Option<PathBuf>,
     /// Start the service over this PostgreSQL database, which keeps what is written to it, instead of SQLite
@@ -40,16 +40,16 @@ pub struct LoadTest {
     /// Replicas over the PostgreSQL database, which share the clients
     #[arg(long, default_value_t = 1, requires = "store", value_parser = clap::value_parser!(u8).range(1..=16))]
     replicas: u8,
-    /// Where the temporary data folder is made: the file system measured
+    /// Parent of the temporary data folder, which decides the file system that is measured
     #[arg(long, default_value_os_t = std::env::temp_dir())]
     folder: PathBuf,
-    /// Connections that ask at the same time
+    /// Number of concurrent connections
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=1000))]
     clients: u16,
-    /// Sessions that are asked
+    /// Number of sessions
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     sessions: u32,
-    /// Observations of `observe` in one call, each of another session
+    /// Observations of `observe` in one call, each of a different session
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
     batch: u16,
     /// How often `observe` is run, each time with new sessions
@@ -61,7 +61,7 @@ pub struct LoadTest {
     /// Periods of a session
     #[arg(long, default_value_t = 20)]
     horizon: usize,
-    /// Design points a step of the policy asked
+    /// Design points per step of the policy
     #[arg(long, default_value_t = 60)]
     count: usize,
     /// Seconds that each measurement of `/action`, of `/livez` and of the disk takes
@@ -74,15 +74,15 @@ pub struct LoadTest {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Scenario {
-    /// Every session through all its periods, one observation after the other, as fast as they are acknowledged.
+    /// Takes every session through all its periods, one observation after the other, as fast as they are acknowledged.
     Observe,
-    /// The advice at a low rate, nothing else going on.
+    /// Requests the advice at a low rate, without other load.
     ActionIdle,
-    /// The same while a training of 1,000 design points saturates its pool.
+    /// Requests the advice at a low rate while a training of 1,000 design points saturates its pool.
     ActionWhileTraining,
-    /// The advice as fast as it comes, in turns with `/livez`.
+    /// Requests the advice as fast as possible, alternating with `/livez`.
     ActionVsLivez,
-    /// A node with 100,000 sessions: start, memory, and the first two again.
+    /// Runs a node with 100,000 sessions: start, memory, and the first two scenarios again.
     #[value(name = "sessions-100k")]
     Sessions100k,
 }
@@ -93,14 +93,16 @@ impl LoadTest {
     }
 }
 
+/// Runs the scenarios and prints the report.
+///
 /// # Errors
 /// The service cannot be started or reached, or refuses a request.
 pub fn run(arguments: &LoadTest) -> Result<(), Box<dyn Error>> {
-    // One thread: the generator shares the cores with what it measures.
+    // One thread, because the generator shares the cores with the service it measures.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let report = runtime.block_on(async {
         let mut terminate = signal(SignalKind::terminate())?;
-        // What was started ends with this process, and its folder goes.
+        // On a stop signal the started processes end with this one, and the folder is removed.
         tokio::select! {
             report = measure(arguments) => report,
             _ = terminate.recv() => Err("stopped".into()),
@@ -125,7 +127,7 @@ async fn measure(arguments: &LoadTest) -> Result<Report, Box<dyn Error>> {
     Ok(report)
 }
 
-/// Says on standard error what takes long.
+/// Prints on standard error which slow work is under way.
 fn tell(line: &str) {
     eprintln!("{line}");
 }

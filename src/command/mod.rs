@@ -1,4 +1,4 @@
-//! What the binary can be asked to do.
+//! The commands of the binary.
 
 pub mod advise;
 mod api_client;
@@ -27,7 +27,7 @@ mod tables;
 mod tls_client;
 mod traces;
 
-/// An error and its causes on one line.
+/// Formats an error and its causes on one line.
 pub fn with_causes(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |cause| cause.source());
     causes.fold(error.to_string(), |line, cause| format!("{line}: {cause}"))

@@ -1,4 +1,4 @@
-//! Times and lengths of time as people write them.
+//! Moments and durations as people write them.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use jiff::civil::Date;
 use jiff::tz::TimeZone;
 use jiff::{Span, SpanRelativeTo, Timestamp};
 
-/// A length of time such as `90d`, `12h` or `1w 2d`; a day has 24 hours.
+/// Parses a duration such as `90d`, `12h` or `1w 2d`; a day has 24 hours.
 pub fn length(text: &str) -> Result<Duration, String> {
     let rule = || format!("'{text}' must be a length of time above zero, such as 90d or 12h");
     let span: Span = text.parse().map_err(|_| rule())?;
@@ -14,14 +14,14 @@ pub fn length(text: &str) -> Result<Duration, String> {
     Duration::try_from(length).ok().filter(|length| !length.is_zero()).ok_or_else(rule)
 }
 
-/// A day, from whose start in UTC on something holds, or a moment with its zone; in milliseconds since 1970.
+/// Parses a day, meaning its start in UTC, or a moment with its zone; returns milliseconds since 1970.
 pub fn moment(text: &str) -> Result<i64, String> {
     let midnight = |day: Date| day.to_zoned(TimeZone::UTC).map(|start| start.timestamp());
     let moment = text.parse::<Timestamp>().or_else(|_| text.parse().and_then(midnight));
     moment.map(Timestamp::as_millisecond).map_err(|_| format!("'{text}' must be as 2027-01-31 or 2027-01-31T12:00:00Z"))
 }
 
-/// A moment in UTC, to the second; `-` where there is none.
+/// Formats a moment in UTC, to the second; `-` if there is none.
 pub fn shown(milliseconds: Option<i64>) -> String {
     let moment = milliseconds.and_then(|milliseconds| Timestamp::from_second(milliseconds.div_euclid(1000)).ok());
     moment.map_or("-".to_owned(), |moment| moment.to_string())

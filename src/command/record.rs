@@ -1,4 +1,4 @@
-//! A record in a file, and the investor who asks about it for one period.
+//! A record in a file, and the options of an investor with one period.
 
 use std::error::Error;
 
@@ -16,7 +16,7 @@ use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, SeveralRetu
 pub struct Record {
     #[command(flatten)]
     file: ReturnsFile,
-    /// Use the last so many returns; all of them unless given
+    /// Number of the latest returns to use; all of them unless given
     #[arg(long)]
     window: Option<usize>,
     /// Relative risk aversion: 1 is log utility, more is more careful
@@ -25,6 +25,8 @@ pub struct Record {
 }
 
 impl Record {
+    /// Reads the returns of one asset.
+    ///
     /// # Errors
     /// An option breaks a rule, or the file cannot be read.
     pub fn read(&self) -> Result<Returns, Box<dyn Error>> {
@@ -32,7 +34,7 @@ impl Record {
         Ok(self.last(self.file.read()?)?)
     }
 
-    /// Several columns are an asset each where they are named, and else it is asked which is meant.
+    /// Reads each named column as an asset. Without names, an ambiguous file is an error that asks for the column.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -40,7 +42,7 @@ impl Record {
         if self.file.names_columns() { self.read_any() } else { self.read().map(AnyReturns::One) }
     }
 
-    /// Columns that nothing tells apart are an asset each.
+    /// Reads each column as an asset if the file does not show which one is meant.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -60,7 +62,7 @@ impl Record {
         Err(FieldError::new("--risk-aversion", self.risk_aversion, "must lie in [1, 100]"))
     }
 
-    /// What says how many returns are used: an option if it is given, else the file.
+    /// Returns the source of the number of returns: the option if it is given, or else the file.
     pub fn source(&self) -> &'static str {
         if self.window.is_some() { "--window" } else { "the file" }
     }
@@ -69,13 +71,13 @@ impl Record {
         self.window.map_or(Ok(returns.clone()), |window| returns.last(window))
     }
 
-    /// Of the returns read.
+    /// Builds the problem from the returns that were read.
     pub fn problem(&self, returns: &Returns) -> ProblemSpecification {
         let history = returns.rows().iter().map(|row| row.period().log_return).collect();
         self.asked(history, returns.rate(), returns.periods_per_year)
     }
 
-    /// Of several assets; `completed` says what else is asked.
+    /// Builds the problem of several assets; `completed` adds the other choices.
     pub fn assets_problem(
         &self,
         returns: &SeveralReturns,
@@ -96,7 +98,7 @@ impl Record {
     }
 }
 
-/// The last `count` periods.
+/// Keeps the last `count` periods.
 fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralReturns, ReturnsError> {
     let SeveralReturns { record, sentence } = &mut returns;
     let found = record.rows.len();
@@ -111,7 +113,7 @@ fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralR
     Ok(returns)
 }
 
-/// Prints what was read and what is `told` of the answer; as JSON the answer alone, and what was read on the standard error.
+/// Prints what was read, followed by `told`. As JSON, prints the answer alone, and what was read on the standard error.
 ///
 /// # Errors
 /// The answer cannot be written as JSON.

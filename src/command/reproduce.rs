@@ -1,4 +1,4 @@
-//! `ballast reproduce`: the paper's section 3, computed anew, with everything it prints beside it.
+//! `ballast reproduce`: computes the paper's section 3 anew, and shows every printed figure next to it.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -22,16 +22,17 @@ pub struct Reproduce {
     /// Folder for reproduction.html, reproduction.json and the CSV files, created if absent
     #[arg(long)]
     out: PathBuf,
-    /// A small run that shows that everything works: tiny designs, few histories; too little for a verdict on the paper
+    /// Run a small version that shows that everything works: tiny designs, few histories; too little for a verdict on
+    /// the paper
     #[arg(long)]
     quick: bool,
 }
 
-/// How much is computed.
+/// The sizes of the computation.
 #[derive(Debug, Clone, Serialize)]
 pub struct Plan {
     pub horizon: usize,
-    /// Design points of the learning framework; of the others the same up to the paper's 200.
+    /// Design points of the learning framework; the others use as many, up to the paper's 200.
     pub count: usize,
     /// Simulated bridges behind a quantile.
     pub bridges: usize,
@@ -39,7 +40,7 @@ pub struct Plan {
     pub paths: usize,
     /// Histories simulated for each of the paper's two cases.
     pub close_histories: usize,
-    /// Histories drawn in search of them, at most.
+    /// Most histories drawn in search of them.
     pub most_drawn: usize,
     pub study_sizes: Vec<usize>,
     pub study_count: usize,
@@ -82,7 +83,8 @@ impl Plan {
         }
     }
 
-    /// Tells whether so much is computed that what differs from the paper differs by more than chance and coarse designs make it.
+    /// Returns true if the run is large enough that differences from the paper exceed chance and the error of coarse
+    /// designs.
     fn decides(&self) -> bool {
         let Plan { count, bridges, histories, close_histories, study_histories, .. } = Plan::full();
         let least = [count, bridges, histories, close_histories, study_histories];
@@ -91,7 +93,7 @@ impl Plan {
     }
 }
 
-/// Everything found.
+/// All results.
 #[derive(Debug, Serialize)]
 struct Reproduction {
     plan: Plan,
@@ -121,7 +123,7 @@ pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Everything found, and what the page puts beside it.
+/// All results, and the additions of the page.
 #[derive(Serialize)]
 struct Shown<'a> {
     #[serde(flatten)]

@@ -1,7 +1,7 @@
-//! Returns of a risky asset and of the bank: those bundled, of the US stock market and Treasury bills, or a file's.
+//! Returns of a risky asset and of the bank: the bundled ones, of the US stock market and Treasury bills, or a file's.
 //!
-//! A file is read by the one reader of returns ([`ballast::returns`]); what it asks is answered by options. How far apart its
-//! dates are says what a period is ([`Frequency`]).
+//! A file is read by the one reader of returns ([`ballast::returns`]); its questions are answered by options. The
+//! spacing of its dates determines the length of a period ([`Frequency`]).
 
 use std::path::PathBuf;
 
@@ -24,15 +24,15 @@ mod tests;
 
 const CSV: &str = include_str!("../../data/us_market_monthly.csv");
 
-/// Where the returns of a command come from.
+/// The source of a command's returns.
 #[derive(Debug, Clone, Args)]
 pub struct ReturnsFile {
-    /// File of dates beside returns or prices: CSV, or what a spreadsheet or a person writes
+    /// File of dates with returns or prices: CSV, or what a spreadsheet or a person writes
     file: PathBuf,
-    /// What the bank pays a period, as a fraction; in place of a column such as risk_free_return
+    /// Interest of the bank per period, as a fraction; instead of a column such as risk_free_return
     #[arg(long)]
     rate: Option<f64>,
-    /// Periods that make a year; the dates say so unless given
+    /// Periods per year; determined by the dates unless given
     #[arg(long)]
     periods_per_year: Option<usize>,
     #[command(flatten)]
@@ -42,7 +42,8 @@ pub struct ReturnsFile {
 /// One period: returns as fractions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Of the end of the period, in ISO 8601, as fine as the frequency: `2008-01` of a month; the number of the row without dates.
+    /// End of the period, in ISO 8601, with the precision of the frequency: `2008-01` for a month. The number of the
+    /// row if there are no dates.
     pub date: String,
     pub log_return: f64,
     pub risky_return: f64,
@@ -53,15 +54,15 @@ pub struct Row {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Returns {
     rows: Vec<Row>,
-    /// `None` if the dates do not tell one.
+    /// `None` if the dates do not determine one.
     pub frequency: Option<Frequency>,
     pub periods_per_year: usize,
-    /// What the column of the risky asset holds, and its name.
+    /// Content of the risky asset's column, and its name.
     what: &'static str,
     column: String,
-    /// Where it is said what the bank pays.
+    /// Source of the bank's interest.
     bank: String,
-    /// What was changed or passed over, in sentences.
+    /// Sentences on what was changed or skipped.
     remarks: Vec<String>,
 }
 
@@ -69,16 +70,16 @@ pub struct Returns {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralReturns {
     pub record: AssetsRecord,
-    /// What was read, for a reader to see whether it is what he meant.
+    /// Description of what was read, so that users can check it.
     pub sentence: String,
 }
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyReturns {
-    /// Of one asset.
+    /// Returns of one asset.
     One(Returns),
-    /// Of several.
+    /// Returns of several assets.
     Several(SeveralReturns),
 }
 
@@ -89,13 +90,15 @@ impl Row {
 }
 
 impl ReturnsFile {
+    /// Reads the returns of one asset.
+    ///
     /// # Errors
-    /// The file cannot be read, a place in it or an option breaks a rule, or an option must say what the file does not.
+    /// The file cannot be read, a cell or an option breaks a rule, or an option must settle what the file leaves open.
     pub fn read(&self) -> Result<Returns, ReturnsError> {
         Returns::parse(&self.text()?, &self.choices, self.rate, self.periods_per_year)
     }
 
-    /// Columns that nothing tells apart are an asset each.
+    /// Reads each column as an asset if the file does not show which one is meant.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -103,7 +106,7 @@ impl ReturnsFile {
         AnyReturns::parse(&self.text()?, &self.choices, self.rate, self.periods_per_year)
     }
 
-    /// Whether options say which columns are read.
+    /// Returns true if options name the columns to read.
     pub fn names_columns(&self) -> bool {
         !self.choices.columns.is_empty()
     }
@@ -116,15 +119,15 @@ impl ReturnsFile {
 }
 
 impl Returns {
-    /// The file embedded in the binary.
+    /// Returns the returns of the file embedded in the binary.
     pub fn bundled() -> Result<Self, ReturnsError> {
         Self::parse(CSV, &Choices::default(), None, None)
     }
 
-    /// Of the text of a file, with what is said of it; `rate` and `periods_per_year` take the place of what it says.
+    /// Parses the text of a file; `rate` and `periods_per_year` replace what the text gives.
     ///
     /// # Errors
-    /// A place or an option breaks a rule, or an option must say what the text does not.
+    /// A cell or an option breaks a rule, or an option must settle what the text leaves open.
     pub fn parse(
         text: &str,
         choices: &Choices,
@@ -157,15 +160,15 @@ impl Returns {
         &self.rows
     }
 
-    /// One period, in a word.
+    /// Returns the noun for one period.
     pub fn noun(&self) -> &'static str {
         self.frequency.map_or("period", Frequency::noun)
     }
 
-    /// The last `count` periods.
+    /// Keeps the last `count` periods.
     ///
     /// # Errors
-    /// There are not so many.
+    /// There are fewer.
     pub fn last(mut self, count: usize) -> Result<Self, ReturnsError> {
         let found = self.rows.len();
         let rule = "must be at most the returns of the file, and 2 or more";
@@ -176,7 +179,7 @@ impl Returns {
         Ok(self)
     }
 
-    /// The `count` periods before `date`, oldest first.
+    /// Returns the `count` periods before `date`, oldest first.
     pub fn before(&self, date: &str, count: usize) -> Result<&[Row], ReturnsError> {
         let end = self.rows.partition_point(|row| row.date.as_str() < date);
         let noun = self.noun();
@@ -185,14 +188,14 @@ impl Returns {
         Ok(&self.rows[start..end])
     }
 
-    /// The periods of a calendar year.
+    /// Returns the periods of a calendar year.
     pub fn year(&self, year: &str) -> &[Row] {
         let start = self.rows.partition_point(|row| row.date.as_str() < year);
         let length = self.rows[start..].iter().take_while(|row| row.date.starts_with(year)).count();
         &self.rows[start..start + length]
     }
 
-    /// What the bank paid in the last period, and is taken to go on paying.
+    /// Returns the bank's rate in the last period, which is assumed to continue.
     pub fn rate(&self) -> f64 {
         self.rows.last().map_or(0.0, |row| row.risk_free_return)
     }
@@ -203,7 +206,7 @@ impl Returns {
         Annual::of(&risky, &bank, self.periods_per_year as f64)
     }
 
-    /// What was read, for a reader to see whether it is what he meant.
+    /// Describes what was read, so that users can check it.
     pub fn sentence(&self) -> String {
         let (Annual { mean, volatility, .. }, periods) = (self.annual(), self.periods_per_year as f64);
         let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
@@ -230,7 +233,7 @@ impl Returns {
 }
 
 impl AnyReturns {
-    /// As [`Returns::parse`]; where it would be asked which column is meant, all of them are.
+    /// Parses as [`Returns::parse`] does, but takes all columns if it is unclear which one is meant.
     ///
     /// # Errors
     /// As [`Returns::parse`].
@@ -275,7 +278,7 @@ impl AnyReturns {
     }
 }
 
-/// What is read, or why nothing is.
+/// Returns the record that is read, or the reason why there is none.
 fn record(
     text: &str,
     choices: &Choices,
@@ -301,7 +304,8 @@ fn record(
     }
 }
 
-/// Whether the first answer to each question gives a record of which the dates do not say what a period is.
+/// Returns true if the first answer to each question gives a record whose dates do not determine the length of a
+/// period.
 fn leaves_frequency_open(text: &str, choices: &Choices, questions: &[Question]) -> bool {
     let answers = questions.iter().filter_map(|question| question.options.first());
     let choices = answers.fold(choices.clone(), |choices, answer| choices.with(&answer.choices));

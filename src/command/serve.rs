@@ -23,39 +23,39 @@ pub struct Serve {
     /// Address to listen on; port 0 picks a free one.
     #[arg(long, env = "BALLAST_LISTEN", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// Another address for /livez, /readyz, /health, /metrics, /audit and the description alone, which no caller of the
-    /// first can fill.
+    /// Another address for only /livez, /readyz, /health, /metrics, /audit and the description; clients of the first
+    /// address cannot use up its connections.
     #[arg(long, env = "BALLAST_OPERATIONS_LISTEN")]
     operations_listen: Option<SocketAddr>,
     #[command(flatten)]
     tls: TlsArgs,
-    /// Names the service answers to beside its own while it asks for no key, separated by commas.
+    /// Host names the service answers to besides its own while it needs no key, separated by commas.
     #[arg(long = "host", env = "BALLAST_HOSTS", value_delimiter = ',')]
     hosts: Vec<String>,
     #[command(flatten)]
     store: StoreArgs,
-    /// Listen where others reach it even while the store holds no key.
+    /// Listen on an address that others reach even while the store holds no key.
     #[arg(long, env = "BALLAST_ALLOW_ANONYMOUS", value_parser = FalseyValueParser::new())]
     allow_anonymous: bool,
-    /// Do not start while the store holds no key, as if its folder is lost or its database rolled back. A folder that had
-    /// keys is always one that needs them.
+    /// Do not start while the store holds no key, as if its folder were lost or its database rolled back. A folder that
+    /// ever had keys always needs them.
     #[arg(long, env = "BALLAST_REQUIRE_KEYS", value_parser = FalseyValueParser::new())]
     require_keys: bool,
-    /// What this replica does.
+    /// Role of this replica.
     #[arg(long, env = "BALLAST_ROLE", value_enum, default_value_t = RoleName::All)]
     role: RoleName,
-    /// A job whose worker has been silent this long is taken over by another.
+    /// Lease of a job: one whose worker has been silent this long is taken over by another.
     #[arg(long, env = "BALLAST_LEASE_SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=3600))]
     lease_seconds: u16,
-    /// Seconds between a stop signal and the end of accepting: the service is not ready and answers still, until whoever
-    /// balances callers has seen it.
+    /// Seconds between a stop signal and the end of accepting. Meanwhile the service is not ready but still answers,
+    /// until load balancers have noticed.
     #[arg(long, env = "BALLAST_DRAIN_DELAY", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=600))]
     drain_delay: u16,
-    /// Threads that train, at the lowest priority. Default: every core.
+    /// Training threads, at the lowest priority. Default: every core.
     #[arg(long, env = "BALLAST_TRAINING_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
     training_threads: Option<u16>,
-    /// The most memory to take, as in 4GB or 512MiB. Default: 80 % of the container's limit, of the address space's or of
-    /// the machine's memory, whichever is least.
+    /// The most memory to use, as in 4GB or 512MiB. Default: 80 % of the container's limit, of the address space's or
+    /// of the machine's memory, whichever is least.
     #[arg(long, env = "BALLAST_MEMORY_LIMIT", value_parser = str::parse::<Size>)]
     memory_limit: Option<Size>,
     #[command(flatten)]
@@ -66,71 +66,71 @@ pub struct Serve {
     quotas: QuotaArgs,
 }
 
-/// What is kept of who did what.
+/// Retention of the audit.
 #[derive(Debug, Args)]
 struct AuditArgs {
     /// Days that an entry of the audit is kept.
     #[arg(long, env = "BALLAST_AUDIT_DAYS", default_value_t = 400, value_parser = clap::value_parser!(u16).range(1..))]
     audit_days: u16,
-    /// Changes that one key may make within these days: their entries are kept, so further changes are refused; 0: any
-    /// number.
+    /// Changes that one key may make within these days; 0: any number. Their entries are kept, so further changes are
+    /// refused.
     #[arg(long, env = "BALLAST_AUDIT_ENTRIES", default_value_t = Quotas::default().audit_entries)]
     audit_entries: u32,
 }
 
-/// What one tenant may keep, and for how long.
+/// Quotas and retention of one tenant.
 #[derive(Debug, Args)]
 struct QuotaArgs {
-    /// Jobs of one tenant that wait; 0: any number.
+    /// Queued jobs of one tenant; 0: any number.
     #[arg(long, env = "BALLAST_QUOTA_QUEUED_JOBS", default_value_t = Quotas::default().queued_jobs)]
     quota_queued_jobs: u32,
     /// Sessions of one tenant; 0: any number.
     #[arg(long, env = "BALLAST_QUOTA_SESSIONS", default_value_t = Quotas::default().sessions)]
     quota_sessions: u32,
-    /// Bytes that one tenant's requests, reports, policies and sessions take; 0: any number.
+    /// Bytes of one tenant's requests, reports, policies and sessions; 0: any number.
     #[arg(long, env = "BALLAST_QUOTA_BYTES", default_value_t = Quotas::default().bytes)]
     quota_bytes: u64,
-    /// Ended jobs are deleted after so many days, with their reports and idempotency keys; 0: never.
+    /// Days after which ended jobs are deleted, with their reports and idempotency keys; 0: never.
     #[arg(long, env = "BALLAST_RETAIN_JOBS_DAYS", default_value_t = 30)]
     retain_jobs_days: u16,
 }
 
-/// How connections are encrypted.
+/// Encryption of connections.
 #[derive(Debug, Args)]
 struct TlsArgs {
-    /// Certificate chain in PEM: connections are encrypted by TLS 1.2 or 1.3. Read anew when it changes.
+    /// Certificate chain in PEM: connections are encrypted by TLS 1.2 or 1.3. Read again when it changes.
     #[arg(long, env = "BALLAST_TLS_CERT", requires = "tls_key")]
     tls_cert: Option<PathBuf>,
     /// Its private key, in PEM.
     #[arg(long, env = "BALLAST_TLS_KEY", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
-    /// Listen where others reach it without encryption: something in front of it encrypts.
+    /// Listen on an address that others reach without encryption: a proxy in front encrypts.
     #[arg(long, env = "BALLAST_ALLOW_PLAINTEXT", value_parser = FalseyValueParser::new())]
     allow_plaintext: bool,
 }
 
-/// What one tenant may ask.
+/// Rate limits of one tenant.
 #[derive(Debug, Args)]
 struct LimitArgs {
-    /// Advice, observations and sessions opened or deleted, a second, of one tenant; 0: any number.
+    /// Advice, observations, and sessions opened or deleted, per second and tenant; 0: any number.
     #[arg(long, env = "BALLAST_RATE_LIVE", default_value_t = 50_000)]
     rate_live: u32,
-    /// Robust steps solved on request, jobs queued and policies imported, a second, of one tenant; 0: any number.
+    /// Robust steps solved on request, jobs queued and policies imported, per second and tenant; 0: any number.
     #[arg(long, env = "BALLAST_RATE_HEAVY", default_value_t = 500)]
     rate_heavy: u32,
-    /// Other calls, a second, of one tenant; 0: any number.
+    /// Other calls, per second and tenant; 0: any number.
     #[arg(long, env = "BALLAST_RATE_READ", default_value_t = 10_000)]
     rate_read: u32,
-    /// Calls of the heavy class under way at a time; a tenant gets half.
+    /// Concurrent calls of the heavy class; a tenant gets half.
     #[arg(long, env = "BALLAST_HEAVY_CALLS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
     heavy_calls: u16,
-    /// Event streams of one tenant open at a time.
+    /// Open event streams of one tenant.
     #[arg(long, env = "BALLAST_STREAMS", default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..))]
     streams: u16,
-    /// Connections held at a time, as far as the process may open files.
+    /// Open connections, as far as the process may open files.
     #[arg(long, env = "BALLAST_CONNECTIONS", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     connections: u32,
-    /// Those of one address; a quarter of all unless given. All of them where a proxy stands in front.
+    /// Open connections of one address; a quarter of all unless given. Set it to all of them behind a proxy.
     #[arg(long, env = "BALLAST_CONNECTIONS_PER_ADDRESS", value_parser = clap::value_parser!(u32).range(1..))]
     connections_per_address: Option<u32>,
 }
@@ -156,9 +156,9 @@ impl From<RoleName> for Role {
     }
 }
 
-/// What the process ends with where its store failed: an input or output error, by `sysexits.h`.
+/// Exit code if the store failed: an input or output error, by `sysexits.h`.
 const STORE_FAILED: i32 = 74;
-/// What the process ends with where a second signal cuts its drain short: that of a process ended by SIGTERM.
+/// Exit code if a second signal cuts the drain short: that of a process ended by SIGTERM.
 const ASKED_TWICE: i32 = 143;
 
 pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
@@ -205,7 +205,7 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
             signalled.begin();
             std::future::pending::<()>().await;
         };
-        // Whoever asks twice waits for nothing.
+        // A second signal ends the process at once.
         tokio::select! {
             () = drained => {}
             () = asked() => std::process::exit(ASKED_TWICE),
@@ -216,7 +216,7 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     if let Some(address) = running.operations {
         told += &format!("for operators on {}://{address}\n", running.scheme);
     }
-    // Nobody has to read it: the log says it too.
+    // An error is ignored: nobody has to read this line, and the log has it also.
     let _ = std::io::stdout().write_all(told.as_bytes());
     if let Err(error) = running.ended().await {
         tracing::error!(error = &error as &dyn std::error::Error, "the store failed; exiting");

@@ -1,4 +1,4 @@
-//! Where the durable facts are, as the command line says it.
+//! The location of the durable data, from the command line.
 
 use std::path::PathBuf;
 
@@ -27,6 +27,8 @@ impl std::fmt::Debug for Password {
 }
 
 impl Password {
+    /// Parses the address.
+    ///
     /// # Errors
     /// The address cannot be read.
     pub fn url(&self) -> Result<PostgresUrl, UrlError> {
@@ -41,6 +43,8 @@ impl From<&str> for Password {
 }
 
 impl StoreArgs {
+    /// Returns the location of the store.
+    ///
     /// # Errors
     /// The address of the database cannot be read.
     pub fn location(self) -> Result<StoreLocation, UrlError> {

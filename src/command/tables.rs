@@ -6,7 +6,7 @@ use ballast::control::evaluation::report::{EvaluationReport, StrategyReport};
 use ballast::numerics::summary::Estimate;
 use ballast::report::Csv;
 
-/// The estimates of a strategy, by name.
+/// Returns the estimates of a strategy, by name.
 pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
     let utility = &strategy.utility;
     let mut found = vec![
@@ -27,12 +27,12 @@ pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
     found
 }
 
-/// A figure without an interval.
+/// Returns a figure without an interval.
 fn extreme(value: f64) -> Estimate {
     Estimate { value, low: f64::NAN, high: f64::NAN }
 }
 
-/// Terminal wealth, and what it went through.
+/// Returns the estimates of terminal wealth and of its course.
 fn wealth(strategy: &StrategyReport) -> [(&'static str, Estimate); 8] {
     let wealth = &strategy.wealth;
     [
@@ -47,13 +47,14 @@ fn wealth(strategy: &StrategyReport) -> [(&'static str, Estimate); 8] {
     ]
 }
 
-/// Decimals by which six digits of the initial wealth are written.
+/// Returns the number of decimals that shows six digits of the initial wealth.
 fn decimals(report: &EvaluationReport) -> usize {
     let whole = report.request.problem.initial_wealth.log10().floor() as i32 + 1;
     (6 - whole).clamp(0, 12) as usize
 }
 
-/// One line a strategy: what its terminal wealth is worth for certain and how it spreads, and the difference to the reference.
+/// Returns one line per strategy: certainty equivalent and spread of terminal wealth, and the difference from the
+/// reference.
 pub fn screen(report: &EvaluationReport) -> String {
     let heads = ["certain", "mean", "20 %", "90 %", "least", "most", "worst 5 %"];
     let heads: String = heads.iter().map(|head| format!("{head:>13}")).collect();
@@ -83,12 +84,12 @@ pub fn screen(report: &EvaluationReport) -> String {
     text + "\n" + &report.sentences.join("\n") + "\n"
 }
 
-/// A figure as CSV has it, nothing where there is none.
+/// Formats a figure for CSV, empty if there is none.
 pub fn shown(figure: f64) -> String {
     if figure.is_nan() { String::new() } else { figure.to_string() }
 }
 
-/// One row a strategy and statistic.
+/// Returns one row per strategy and statistic.
 pub fn csv(report: &EvaluationReport) -> String {
     let mut csv = Csv::new(&["strategy", "statistic", "value", "low", "high"]);
     for strategy in &report.strategies {
@@ -100,7 +101,7 @@ pub fn csv(report: &EvaluationReport) -> String {
     csv.into_text()
 }
 
-/// One row a framework and period; no radius where the framework has no ball.
+/// Returns one row per framework and period, without a radius if the framework has no ball.
 pub fn periods_csv(report: &EvaluationReport) -> String {
     let mut csv = Csv::new(&[
         "strategy",

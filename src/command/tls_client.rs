@@ -1,4 +1,4 @@
-//! TLS as a client: for the health check, which asks its own service and sends no secret, and for the load test.
+//! TLS as a client: for the health check, which calls its own service and sends no secret, and for the load test.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,10 +19,10 @@ pub enum TlsClientError {
     Setup { source: Error },
 }
 
-/// Trusts the authorities in the PEM file alone.
+/// Returns a configuration that trusts only the authorities in the PEM file.
 ///
 /// # Errors
-/// The file cannot be read, or holds what is no certificate.
+/// The file cannot be read, or contains something that is no certificate.
 pub fn trusting(authorities: &Path) -> Result<Arc<ClientConfig>, TlsClientError> {
     let failed = |source| TlsClientError::Authority { path: authorities.to_owned(), source };
     let mut roots = RootCertStore::empty();
@@ -35,8 +35,9 @@ pub fn trusting(authorities: &Path) -> Result<Arc<ClientConfig>, TlsClientError>
     Ok(Arc::new(builder.with_root_certificates(roots).with_no_client_auth()))
 }
 
-/// Judges no certificate: for who asks his own service on his own machine whether it is ready, and says nothing that
-/// somebody else could use. A certificate for the service's public name would not fit the address asked either.
+/// Returns a configuration that verifies no certificate. It is for a readiness check of one's own service on one's own
+/// machine, which sends nothing that others could use. A certificate for the service's public name would not match the
+/// local address either.
 ///
 /// # Errors
 /// Never with the provider built in.

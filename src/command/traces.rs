@@ -1,10 +1,10 @@
-//! Where logs and traces go.
+//! Output of logs and traces.
 //!
-//! Logs go to standard error. Traces leave by OpenTelemetry's own protocol over HTTP where `OTEL_EXPORTER_OTLP_ENDPOINT`
-//! says where to; its other variables (`OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER`, `OTEL_EXPORTER_OTLP_HEADERS` and so
-//! on) hold as its documents have them. They are sent from a thread of their own, in batches; where the collector does not
-//! answer, spans are dropped and nothing waits. Whose trace a request belongs to is not taken from its caller, who could
-//! otherwise have all of his kept.
+//! Logs go to standard error. Traces are sent by OpenTelemetry's own protocol over HTTP if
+//! `OTEL_EXPORTER_OTLP_ENDPOINT` gives an address. Its other variables (`OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER`,
+//! `OTEL_EXPORTER_OTLP_HEADERS` and so on) apply as documented there. Traces are sent from their own thread, in
+//! batches; if the collector does not answer, spans are dropped and nothing waits. A request's trace is never taken
+//! from its caller, because callers could then have all of their traces kept.
 
 use std::io::IsTerminal;
 
@@ -23,10 +23,10 @@ use tracing_subscriber::{EnvFilter, Layer, fmt};
 const ENDPOINT: &str = "OTEL_EXPORTER_OTLP_ENDPOINT";
 const SERVICE_NAME: &str = "OTEL_SERVICE_NAME";
 
-/// Sends what is left when it ends.
+/// The exporter of traces; sends what is left when it ends.
 pub struct Traces(Option<SdkTracerProvider>);
 
-/// Starts both. `RUST_LOG` chooses what is logged: for people on a terminal, as JSON elsewhere.
+/// Starts logs and traces. `RUST_LOG` chooses what is logged: for people on a terminal, as JSON elsewhere.
 ///
 /// # Errors
 /// The variables of OpenTelemetry contradict themselves.
@@ -57,7 +57,7 @@ fn logging<S: Subscriber + for<'span> LookupSpan<'span>>() -> Box<dyn Layer<S> +
 }
 
 impl Traces {
-    /// Sends what is left, for as long as OpenTelemetry gives it.
+    /// Sends what is left, for as long as OpenTelemetry allows.
     pub async fn end(self) {
         let Some(provider) = self.0 else { return };
         let ended = tokio::task::spawn_blocking(move || provider.shutdown()).await;

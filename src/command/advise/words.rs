@@ -14,10 +14,10 @@ use ballast::service::advise::Advised;
 
 pub use several::told_of_several;
 
-/// Less than this is not traded: what is printed would not show it.
+/// Smallest trade worth doing: the printed digits would not show a smaller one.
 const SMALLEST_TRADE: f64 = 5e-4;
 
-/// What to do, why, and the figures, those of the caution a year of so many `periods`.
+/// Describes the trade, the reason and the figures. The figures of the caution are per year of `periods` periods.
 pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String {
     let advice = &advised.advice;
     let mut text = format!("{} {}\n", hold(advice, noun), trade(advice, wealth));
@@ -38,7 +38,7 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
     text.trim_end().to_owned()
 }
 
-/// The same with what the record would advise by longer periods, where it was asked, or why there is none.
+/// Appends the advice by longer periods if it was computed, or why there is none.
 pub fn told_of_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)]) -> String {
     if coarser.is_empty() {
         return text;
@@ -51,7 +51,7 @@ pub fn told_of_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)]
     format!("{text}\n\nThe same record would say {}. Give returns as far apart as you decide.", shares.join(", "))
 }
 
-/// How near the advice is to changing, where that was asked for, and what to be careful about.
+/// Lists the warnings and, if requested, how close the advice is to changing.
 fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: &str) -> Vec<String> {
     let mut told: Vec<String> = warnings.iter().map(|warning| warning.message.clone()).collect();
     told.extend(caution.iter().map(|caution| caution.sentence.clone()));
@@ -122,7 +122,7 @@ fn why(Advised { advice, worst_case, why_nothing, .. }: &Advised, noun: &str) ->
     )
 }
 
-/// What the worst law makes of the returns seen.
+/// Describes how the worst law changes the observed returns.
 fn worst(worst: &WorstCase, noun: &str) -> String {
     let moved = worst.summary().and_then(|summary| Some((summary.share_moved?, summary.lowest_destination?)));
     let Some((share, lowest)) = moved.filter(|(share, _)| *share > 0.0) else {
@@ -139,7 +139,7 @@ fn worst(worst: &WorstCase, noun: &str) -> String {
     format!("That law makes {often} worse than it was: the worst of them loses {size}.")
 }
 
-/// Name, figure and meaning.
+/// Returns rows of name, figure and meaning.
 fn figures(Advised { advice, levels, .. }: &Advised, wealth: f64, noun: &str) -> Vec<(&'static str, String, String)> {
     let error = levels.as_ref().and_then(|levels| levels.levels.iter().find_map(|level| level.allocation_error));
     let (decimals, known) = match error.filter(|error| *error >= 5e-5) {
@@ -171,7 +171,7 @@ fn figures(Advised { advice, levels, .. }: &Advised, wealth: f64, noun: &str) ->
     rows
 }
 
-/// To four digits after the point where wealth is small, else to two.
+/// Formats an amount with four decimals if it is small, or else with two.
 fn money(amount: f64) -> String {
     let decimals = if amount.abs() < 1000.0 { 4 } else { 2 };
     format!("{amount:.decimals$}")
@@ -181,7 +181,7 @@ fn percent(share: f64, decimals: usize) -> String {
     format!("{} %", digits::fixed(100.0 * share, decimals))
 }
 
-/// Two shares in the digits that tell them apart, `least` decimals or more.
+/// Formats two shares with enough decimals to tell them apart, at least `least`.
 fn apart(shares: [f64; 2], least: usize) -> [String; 2] {
     let decimals = digits::deciding(100.0 * shares[0], 100.0 * shares[1], least);
     shares.map(|share| percent(share, decimals))

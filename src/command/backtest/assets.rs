@@ -1,4 +1,4 @@
-//! A file of several assets, walked through by the one-step problem and by rules that people use.
+//! Walk-forward of a file of several assets, by the one-step problem and by common rules.
 
 use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsChoices};
 use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsWalked};
@@ -15,12 +15,12 @@ pub mod files;
 pub struct Shown {
     pub walked: AssetsWalked,
     pub report: AssetsBacktestReport,
-    /// What was read, in a sentence.
+    /// Sentence on the returns that were read.
     pub read: String,
 }
 
 impl Shown {
-    /// The report as a page.
+    /// Renders the report as a page.
     pub fn page(&self) -> Result<String, FileError> {
         let (report, read) = (&self.report, &self.read);
         let name = format!("Backtest of {} assets", report.assets.len());
@@ -29,7 +29,7 @@ impl Shown {
 }
 
 impl BacktestArgs {
-    /// The walk that these arguments ask for.
+    /// Builds the walk-forward that these arguments request.
     fn of_assets(&self, record: AssetsRecord) -> Result<AssetsBacktest, BacktestError> {
         let of_training = [
             ("--horizon", self.horizon.map(|horizon| horizon.to_string())),
@@ -84,7 +84,7 @@ impl BacktestArgs {
     }
 }
 
-/// Decides every period, keeps the books, and measures them.
+/// Decides every period, and computes the accounts and the figures.
 pub fn walk(args: &BacktestArgs, returns: SeveralReturns) -> Result<Shown, BacktestError> {
     let SeveralReturns { record, sentence } = returns;
     let backtest = args.of_assets(record)?;

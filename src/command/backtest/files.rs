@@ -11,7 +11,7 @@ use super::{BacktestError, Shown, file};
 
 pub const PAGE: &str = "report.html";
 
-/// A figure of a strategy, with its interval where it has one.
+/// A figure of a strategy, with its interval if it has one.
 pub type Figure = (&'static str, f64, Option<[f64; 2]>);
 
 pub fn write(
@@ -37,7 +37,7 @@ pub fn plain(name: &'static str, value: f64) -> Figure {
     (name, value, None)
 }
 
-/// One line a strategy and figure.
+/// Returns one line per strategy and figure.
 pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> String {
     let mut csv = Csv::new(&["strategy", "figure", "value", "low", "high"]);
     for (strategy, figures) in strategies {
@@ -50,7 +50,7 @@ pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> S
     csv.into_text()
 }
 
-/// How a strategy varied, what it traded, and what it lost in bad years.
+/// Returns the figures of a strategy's variation, its trades, and its losses in bad years.
 pub fn of_returns(performance: &Performance) -> [Figure; 6] {
     [
         estimated("annual_mean", performance.annual_mean),
@@ -62,7 +62,7 @@ pub fn of_returns(performance: &Performance) -> [Figure; 6] {
     ]
 }
 
-/// What it came to, and what it held.
+/// Returns the figures of a strategy's wealth and holdings.
 pub fn of_wealth(performance: &Performance) -> [Figure; 3] {
     [
         plain("max_drawdown", performance.max_drawdown),
@@ -87,7 +87,7 @@ pub fn strategies(strategies: &[BacktestFigures]) -> String {
     figures(strategies.iter().map(of))
 }
 
-/// One line a period and strategy; wealth and drawdown at its end.
+/// Returns one line per period and strategy; wealth and drawdown at its end.
 pub fn periods(shown: &Shown) -> String {
     let mut csv =
         Csv::new(&["date", "strategy", "allocation", "low", "high", "radius", "traded", "wealth", "drawdown"]);

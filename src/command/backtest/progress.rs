@@ -1,4 +1,4 @@
-//! How many parts of the work are done, and how long the rest may take: a bar on a terminal, elsewhere a line now and then.
+//! Progress of the work, with an estimate of the time left: a bar on a terminal, elsewhere a line now and then.
 
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, PoisonError};
@@ -6,19 +6,19 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Until the first line with an estimate, which rests on what was done by then.
+/// Time until the first line, so that its estimate rests on finished parts.
 const FIRST: Duration = Duration::from_secs(5);
-/// From one line to the next.
+/// Time from one line to the next.
 const PAUSE: Duration = Duration::from_secs(30);
 
 pub struct Parts {
-    /// Draws itself on a terminal alone.
+    /// The bar, which draws only on a terminal.
     bar: ProgressBar,
-    /// What the parts are.
+    /// Noun for the parts.
     noun: &'static str,
     is_terminal: bool,
     started: Instant,
-    /// When the next line is written.
+    /// Time at which the next line is written.
     next: Mutex<Instant>,
 }
 
@@ -45,13 +45,13 @@ impl Parts {
         eprintln!("  {}", line(self.started.elapsed(), done, all, self.noun));
     }
 
-    /// Takes the bar off the screen.
+    /// Removes the bar from the screen.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// Time spent, parts done, and what the others take if they take as long each.
+/// Returns the time spent, the number of parts done, and the time left if the others take as long each.
 fn line(spent: Duration, done: u64, all: u64, noun: &str) -> String {
     let left = spent.as_secs_f64() / done.max(1) as f64 * all.saturating_sub(done) as f64;
     format!("{:>6.0} s  {done} of {all} {noun}, about {} left", spent.as_secs_f64(), in_words(left))

@@ -1,7 +1,7 @@
-//! How far the surrogates are from direct solves at states they were not trained on.
+//! Errors of the surrogates against direct solves, at states they were not trained on.
 //!
 //! Errors are in basis points, 1e-4 of log certainty equivalent. The truth at the last step is the robust step itself;
-//! at the step before it is the robust step over the exact value of the last. Regret is what an allocation loses
+//! at the step before it is the robust step over the exact value of the last. Regret is the loss of an allocation
 //! against the best one under the same worst-case criterion.
 
 use std::error::Error;
@@ -37,7 +37,8 @@ pub struct AccuracyBench {
     /// Design points per step, one row each
     #[arg(long, value_delimiter = ',', default_values_t = [1000])]
     counts: Vec<usize>,
-    /// Basis points asked for in the place of a number of points, one row each; the largest of --counts is then the most
+    /// Accuracies in basis points, instead of numbers of points, one row each; the largest of --counts is then the most
+    /// points
     #[arg(long, value_delimiter = ',')]
     accuracies: Vec<f64>,
     #[arg(long, default_value_t = 0.1)]
@@ -47,16 +48,16 @@ pub struct AccuracyBench {
     sample_size: usize,
     #[arg(long, default_value_t = 10)]
     horizon: usize,
-    /// Power utility of this risk aversion instead of the paper's exponential one
+    /// Use power utility of this risk aversion instead of the paper's exponential one
     #[arg(long)]
     power: Option<f64>,
-    /// As a share of what is traded; fresh states then hold anything
+    /// Trading cost as a share of the amount traded; fresh states then hold any share
     #[arg(long, default_value_t = 0.0)]
     trading_cost: f64,
-    /// Added at the end of each period, to a wealth of 100 at the start; withdrawn where negative
+    /// Amount added at the end of each period, to a wealth of 100 at the start; withdrawn if negative
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     contribution: f64,
-    /// Of the design and the surrogates; fresh states have one of their own
+    /// Seed of the design and the surrogates; fresh states have their own
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Fresh states at the last step
@@ -65,15 +66,15 @@ pub struct AccuracyBench {
     /// Fresh states at the step before
     #[arg(long, default_value_t = 0)]
     nested_states: usize,
-    /// Compare the surrogate targets and feature maps as well
+    /// Compare the surrogate targets and feature maps also
     #[arg(long)]
     variants: bool,
 }
 
-/// Seed of the fresh states: another than the design's.
+/// Seed of the fresh states, different from the design's.
 const FRESH_SEED: u64 = 1_000_003;
 pub(super) const BASIS_POINTS: f64 = 1e4;
-/// Holdings at which the exact value is known, where trading costs: four times as many as a surrogate has.
+/// Number of holdings at which the exact value is known if trading costs: four times as many as a surrogate has.
 const EXACT_HOLDINGS: usize = 65;
 
 /// A state with its direct solution.
@@ -133,7 +134,7 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     Ok(())
 }
 
-/// States of the design's own law, under another seed.
+/// Draws states from the design's own law, with another seed.
 fn fresh_states(specification: &Specification, step: usize, count: usize) -> Vec<State> {
     let mut fresh = specification.clone();
     fresh.seed = FRESH_SEED;
@@ -153,7 +154,7 @@ fn last_truth(problem: &Problem, count: usize) -> Vec<Truth> {
     solved(problem, problem.specification.problem.horizon - 1, &NextValue::Terminal, count)
 }
 
-/// The value of the last step, solved anew at every state asked.
+/// Returns the value of the last step, solved anew at every requested state.
 pub(super) fn exact_last_value(specification: &Specification) -> NextValue {
     let problem = Problem::new(specification);
     let step = specification.problem.horizon - 1;
@@ -170,7 +171,7 @@ fn nested_truth(problem: &Problem, count: usize) -> Vec<Truth> {
     solved(problem, problem.specification.problem.horizon - 2, &next, count)
 }
 
-/// A policy whose last `steps` steps are solved; the ones before are not asked and hold nothing.
+/// Returns a policy whose last `steps` steps are solved. The steps before are never used and hold nothing.
 fn trained(specification: &Specification, steps: usize) -> Result<Advisor, TrainError> {
     let training = Training::new(specification)?;
     let watch = Watch::unwatched();
@@ -235,11 +236,11 @@ fn report(problem: &Problem, advisor: &Advisor, step: usize, truths: &[Truth]) {
     );
 }
 
-/// What an advice is off by at one state.
+/// The errors of an advice at one state.
 struct Judged {
     /// Predicted minus true log certainty equivalent, in basis points.
     error: f64,
-    /// In basis points, at least 0.
+    /// Loss against the best allocation, in basis points, at least 0.
     regret: f64,
     /// Predicted standard deviation, in log certainty equivalent.
     deviation: f64,

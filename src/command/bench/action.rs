@@ -1,4 +1,4 @@
-//! How long `GET /action` takes for one client on loopback, and `POST /observe` before it.
+//! Latency of `GET /action` for one client on loopback, and of `POST /observe` before it.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -15,16 +15,16 @@ use crate::command::host::Host;
 
 #[derive(Debug, Args)]
 pub struct ActionBench {
-    /// Design points per step of the policy asked
+    /// Design points per step of the policy
     #[arg(long, default_value_t = 1000)]
     count: usize,
     #[arg(long, default_value_t = 2)]
     horizon: usize,
-    /// Sessions asked
+    /// Number of sessions called
     #[arg(long, default_value_t = 1000)]
     calls: usize,
-    /// Assets: of 1 the paper's configuration, of more a power of wealth over their first 240 months, whose composition
-    /// `/observe` chooses anew
+    /// Number of assets: 1 is the paper's configuration; more use power utility over their first 240 months, and
+    /// `/observe` chooses their composition anew
     #[arg(long, default_value_t = 1)]
     assets: usize,
     /// CSV file of simple returns of several assets: dates, assets, and the bank in the last column
@@ -32,7 +32,7 @@ pub struct ActionBench {
     file: PathBuf,
 }
 
-/// Months seen of several assets before the first period.
+/// Months of history of several assets before the first period.
 const MONTHS: usize = 240;
 
 pub async fn run(bench: &ActionBench) -> Result<(), Box<dyn Error>> {
@@ -42,7 +42,7 @@ pub async fn run(bench: &ActionBench) -> Result<(), Box<dyn Error>> {
     measured
 }
 
-/// What is trained, and what is reported of a session's first period.
+/// The training specification, and the returns reported for a session's first period.
 struct Case {
     specification: Value,
     returns: Vec<Value>,
@@ -52,7 +52,7 @@ impl Case {
     fn of(bench: &ActionBench) -> Result<Self, Box<dyn Error>> {
         if bench.assets == 1 {
             let specification = paper::specification(20, bench.horizon, bench.count, InitialLaws::Given);
-            // Returns spread evenly over what the mixture gives nine times in ten.
+            // Returns spread evenly over the range that holds nine in ten draws of the mixture.
             let spread = |call: usize| -0.15 + 0.3 * (call as f64 * 0.618_033_988_75).fract();
             let returns = (0..bench.calls).map(|call| json!({ "log_return": spread(call), "confirm": true })).collect();
             return Ok(Case { specification: serde_json::to_value(&specification)?, returns });

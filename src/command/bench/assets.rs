@@ -1,5 +1,5 @@
-//! `ballast bench assets`: the robust step of several assets on windows of twelve US industries, from nothing and near that of
-//! the month before.
+//! `ballast bench assets`: the robust step of several assets on windows of twelve US industries, from a cold start and
+//! from a warm start at the solution of the month before.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -33,14 +33,15 @@ pub struct AssetsBench {
     json: bool,
 }
 
-/// Of wealth.
+/// Risk aversion in wealth.
 pub const RISK_AVERSION: f64 = 3.0;
-/// A month of bills, about what they paid on average.
+/// Interest rate per month, about the average of bills.
 pub const RATE: f64 = 0.003;
-/// Radii are this times the mean deviation of the assets, over the root of the months: about half of that of all funds at once.
+/// Radius as a multiple of the assets' mean deviation over the square root of the months: about half of that for all
+/// funds at once.
 const RADIUS: f64 = 1.3;
 
-/// What was found on the windows.
+/// The measurements over the windows.
 #[derive(Debug, Serialize)]
 struct Found {
     ground_norm: &'static str,
@@ -48,14 +49,14 @@ struct Found {
     months: usize,
     rate: f64,
     risk_aversion: f64,
-    /// Medians of seconds.
+    /// Median seconds.
     cold: f64,
     warm: f64,
-    /// Points at which the adversary's answer was found, on average over windows.
+    /// Number of points at which the adversary's problem was solved, on average over windows.
     evaluations: f64,
     /// The widest gap between a value and its bound, in basis points.
     gap: f64,
-    /// Of the last window.
+    /// Radius and solution of the last window.
     radius: f64,
     allocation: Vec<f64>,
     value: f64,
@@ -85,7 +86,7 @@ pub fn run(bench: &AssetsBench) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Log-returns, month by month.
+/// Reads log-returns, month by month.
 pub fn read(file: &Path) -> Result<Vec<Vec<f64>>, Box<dyn Error>> {
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(file)?;
     let mut rows = Vec::new();

@@ -1,7 +1,7 @@
-//! How far a trained policy is from brute force where one history is given: value and allocation at the start.
+//! Errors of a trained policy against brute force, given one history: value and allocation at the start.
 //!
-//! Over two steps the truth is the robust step over the exact value of the last, solved anew wherever it is asked for.
-//! Over three it is read from a file of references computed elsewhere, nested grids in plain Python.
+//! Over two steps the truth is the robust step over the exact value of the last, solved anew at every state. Over three
+//! it is read from a file of references, computed elsewhere by nested grids in plain Python.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -36,11 +36,12 @@ pub struct HorizonsBench {
     references: Option<PathBuf>,
 }
 
-/// Radii of the histories drawn, in turn, times the root of the sample size: from hardly any doubt to mostly all-bank.
+/// Radii of the drawn histories, in turn, times the square root of the sample size: from hardly any doubt to mostly
+/// all-bank.
 const KAPPAS: [f64; 5] = [0.0, 0.02, 0.05, 0.1, 0.15];
 const SAMPLE_SIZE: usize = 20;
 
-/// Where a state stands at the start: log certainty equivalent over all-bank, and what is held.
+/// The result at the start: log certainty equivalent over all-bank, and the allocation.
 struct Start {
     gain: f64,
     allocation: f64,
@@ -71,7 +72,7 @@ pub fn run(bench: &HorizonsBench) -> Result<(), Box<dyn Error>> {
         let mut specification = paper::specification(SAMPLE_SIZE, 2, bench.count, InitialLaws::Given);
         specification.problem.history = paper::history(SAMPLE_SIZE, draw + 2);
         specification.problem.radius = Some(RadiusRule::RootN { kappa });
-        // Where the paper's investor is all in or all out, a more averse one is in between.
+        // If the paper's investor holds all or nothing, a more averse one holds something in between.
         let risk_aversion = if draw % 2 == 0 { 0.01 } else { 0.05 };
         specification.problem.utility = UtilitySpecification::exponential(risk_aversion);
         let specification = specification.completed()?;
@@ -104,7 +105,7 @@ fn trained(specification: &Specification) -> Result<Start, TrainError> {
     Ok(Start { gain: (advice.certainty_equivalent / advice.floor).ln(), allocation: advice.allocation })
 }
 
-/// The first of two steps by brute force.
+/// Solves the first of two steps by brute force.
 fn nested(specification: &Specification) -> Result<Start, TrainError> {
     let problem = &specification.problem;
     let state = State::new(&problem.history, problem.initial_wealth, problem.learning)?;

@@ -1,4 +1,4 @@
-//! The parts a training spends its time on, each by itself, on one thread.
+//! The parts that take most of a training, each timed alone, on one thread.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -29,7 +29,7 @@ pub struct KernelsBench {
     inputs: usize,
     #[arg(long, default_value_t = 3)]
     runs: usize,
-    /// Write the rows there (inputs, target last, header line), for another program to fit
+    /// Write the rows to this file (inputs, target last, header line), for another program to fit
     #[arg(long)]
     csv: Option<PathBuf>,
 }
@@ -39,9 +39,9 @@ const QUERIES: usize = 1000;
 const ATOMS: usize = 30;
 const SUPPORT: usize = 120;
 const SOLVES: usize = 2000;
-/// Numbers read from memory: far more than any cache holds.
+/// Count of numbers read from memory: far more than any cache holds.
 const NUMBERS: usize = 32 << 20;
-/// Exponentials timed: an array that stays in the first-level cache, this often.
+/// Size of the array of exponentials, which stays in the first-level cache, and how often it is computed.
 const EXPONENTIALS: (usize, usize) = (1000, 2000);
 
 pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
@@ -50,7 +50,7 @@ pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
         write_csv(path, &inputs, &targets)?;
     }
     let (inputs, targets) = standardized(&inputs, &targets);
-    // Those of the scikit-learn program it is raced against.
+    // The bounds of the scikit-learn program that it is compared with.
     let bounds = Bounds { lengthscale: [0.1, 1e3], signal_variance: [1e-3, 1e3], noise_variance: [1e-8, 1.0] };
     let fitted = || fit(&inputs, std::slice::from_ref(&targets), &bounds, None, &AtomicBool::new(false));
     let found = fitted()?;
@@ -97,7 +97,7 @@ fn normals(generator: &mut impl Rng, count: usize) -> Vec<f64> {
     (0..count).map(|_| generator.sample(StandardNormal)).collect()
 }
 
-/// A smooth function of normal inputs with a kink, and noise of a hundredth of its size.
+/// Returns a smooth function of normal inputs with a kink, and noise of a hundredth of its size.
 fn smooth_function(rows: usize, inputs: usize) -> (DMatrix<f64>, Vec<f64>) {
     let mut generator = stream(1, "bench-rows", 0, 0);
     let points: Vec<Vec<f64>> = (0..rows).map(|_| normals(&mut generator, inputs)).collect();
@@ -110,7 +110,7 @@ fn smooth_function(rows: usize, inputs: usize) -> (DMatrix<f64>, Vec<f64>) {
     (DMatrix::from_row_iterator(rows, inputs, points.into_iter().flatten()), targets)
 }
 
-/// Columns and targets of mean 0 and variance 1.
+/// Scales columns and targets to mean 0 and variance 1.
 fn standardized(inputs: &DMatrix<f64>, targets: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
     let standard = |values: &[f64]| -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -146,7 +146,7 @@ fn exponentials_per_second(runs: usize) -> f64 {
     (size * passes) as f64 / seconds
 }
 
-/// Seconds of one factorisation, n^3/6 products and as many sums.
+/// Returns the seconds of one factorisation, n^3/6 products and as many sums.
 fn cholesky_seconds(rows: usize, runs: usize) -> f64 {
     let entry = |row: usize, column: usize| (-(row as f64 - column as f64).abs() / rows as f64).exp();
     let mut matrices = vec![DMatrix::from_fn(rows, rows, entry); runs.max(1)];
@@ -180,7 +180,7 @@ impl InnerProblem {
     }
 }
 
-/// Seconds of one exact inner solve, over radii from 0 to half the spread of the atoms.
+/// Returns the seconds of one exact inner solve, over radii from 0 to half the spread of the atoms.
 fn inner_solve_seconds(runs: usize) -> f64 {
     let inner = InnerProblem::new();
     let seconds = timed(runs, || {

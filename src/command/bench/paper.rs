@@ -8,7 +8,7 @@ use ballast::control::request::specification::{
 use ballast::numerics::law::ContinuousLaw;
 use ballast::numerics::streams::stream;
 
-/// The law of the paper's section 3.
+/// Returns the law of the paper's section 3.
 pub fn mixture() -> SamplingLaw {
     SamplingLaw::GaussianMixture {
         components: vec![
@@ -18,14 +18,14 @@ pub fn mixture() -> SamplingLaw {
     }
 }
 
-/// `count` log-returns drawn from the mixture.
+/// Draws `count` log-returns from the mixture.
 pub fn history(count: usize, seed: u64) -> Vec<f64> {
     let law: ContinuousLaw = continuous_law(&mixture(), &ProblemSpecification::of(Vec::new(), 0.0));
     let mut generator = stream(seed, "bench-history", 0, 0);
     (0..count).map(|_| law.draw(&mut generator)).collect()
 }
 
-/// The paper's investor after `sample_size` returns: exponential utility, a bank that pays 0.2 % a step.
+/// Returns the paper's problem after `sample_size` returns: exponential utility, a bank that pays 0.2 % per step.
 pub fn problem(sample_size: usize, horizon: usize) -> ProblemSpecification {
     ProblemSpecification {
         horizon,
@@ -35,7 +35,7 @@ pub fn problem(sample_size: usize, horizon: usize) -> ProblemSpecification {
     .as_in_the_paper()
 }
 
-/// The request of the paper with a history of `sample_size` draws.
+/// Returns the request of the paper with a history of `sample_size` draws.
 pub fn specification(sample_size: usize, horizon: usize, count: usize, initial_laws: InitialLaws) -> Specification {
     let mut specification = Specification {
         problem: problem(sample_size, horizon),

@@ -1,4 +1,4 @@
-//! A measurement in figures.
+//! Summary figures of a measurement.
 
 use ballast::numerics::summary::quantile;
 
@@ -6,7 +6,7 @@ pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Largest resident memory of this process so far, in MB; `None` where the system does not tell.
+/// Returns the largest resident memory of this process so far, in MB; `None` if the system does not report it.
 pub fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! How long a whole training takes, and where the time goes.
+//! The duration of a whole training, by phase.
 
 use std::error::Error;
 use std::sync::Mutex;
@@ -19,7 +19,7 @@ pub struct TrainingBench {
     /// Design points per step
     #[arg(long, default_value_t = 1000)]
     count: usize,
-    /// Basis points to be reached, with at most so many design points
+    /// Accuracy to reach in basis points, with at most `--count` design points
     #[arg(long)]
     accuracy: Option<f64>,
     #[arg(long, default_value_t = 10)]
@@ -30,7 +30,7 @@ pub struct TrainingBench {
     /// Moments of the law among the features
     #[arg(long, default_value_t = 4)]
     moments: usize,
-    /// Give every design point a history of its own
+    /// Give every design point its own history
     #[arg(long)]
     resampled: bool,
     /// Threads to train with, one figure each
@@ -75,7 +75,7 @@ pub fn run(bench: &TrainingBench) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Books the time since the last report to the phase that was running.
+/// Adds the time since the last report to the phase that was running.
 fn note_phase(phases: &Mutex<(Spent, Phase, Instant)>, phase: Phase) {
     let Ok(mut noted) = phases.lock() else { return };
     let now = Instant::now();

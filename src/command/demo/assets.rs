@@ -16,13 +16,13 @@ use crate::command::returns::{AnyReturns, ReturnsError};
 
 const CSV: &str = include_str!("../../../data/us_industries_monthly.csv");
 const INDUSTRIES: [&str; 4] = ["energy", "finance", "health", "utilities"];
-/// Of the design points of the first act, the second has one in so many: its laws start resampled, which takes longer.
+/// Divisor of the design points of the first act: the laws of the second act start resampled, which takes longer.
 const FEWER: usize = 4;
 const FEWEST: usize = 10;
-/// Of what is traded, in what is told of trading.
+/// Trading cost, as a share of the amount traded, in the lines about trading.
 const COST: f64 = 0.001;
 
-/// Trains for the four, tells what they are held for, and lives through the year.
+/// Trains for the four industries, explains their holdings, and goes through the year.
 pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let record = industries()?;
     let start = record.dates.partition_point(|date| date.as_str() < FIRST_MONTH);
@@ -44,7 +44,7 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     live_through(api, &session, &record, start, &first).await
 }
 
-/// Those of the bundled file.
+/// Reads the four industries of the bundled file.
 fn industries() -> Result<AssetsRecord, ReturnsError> {
     let columns = INDUSTRIES.map(str::to_owned).to_vec();
     match AnyReturns::parse(CSV, &Choices { columns, ..Choices::default() }, None, None)? {
@@ -74,7 +74,7 @@ fn tell_first(told: &AssetsAdvice, rate: f64) {
     tell_worst_case("this", told.worst_case.as_ref());
 }
 
-/// One line a month, beside equal shares in the four with all wealth; then what it cost.
+/// Prints one line per month, next to all wealth in equal shares of the four; then the cost of trading.
 async fn live_through(
     api: &ApiClient,
     session: &str,

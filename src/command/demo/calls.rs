@@ -1,4 +1,4 @@
-//! What the demo asks of the service, and what it reads in the answers.
+//! The demo's calls to the service, and the parts of the answers it reads.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -15,7 +15,7 @@ use crate::command::api_client::ApiClient;
 /// Pause before an event stream that ended early is opened again.
 const BEFORE_REOPENING: Duration = Duration::from_millis(250);
 
-/// What the demo reads of `GET /action`.
+/// Fields that the demo reads from `GET /action`.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Advice {
     pub period: usize,
@@ -27,7 +27,7 @@ pub struct Advice {
     pub worst_case: Option<WorstCase>,
 }
 
-/// The same of several assets, by their names.
+/// Fields for several assets, by their names.
 #[derive(Debug, Clone, Deserialize)]
 pub struct AssetsAdvice {
     pub period: usize,
@@ -46,7 +46,7 @@ pub struct OneStep {
     pub worst_means: BTreeMap<String, WorstMean>,
 }
 
-/// Of an asset's log-return.
+/// Mean of an asset's log-return, estimated and under the worst law.
 #[derive(Debug, Clone, Deserialize)]
 pub struct WorstMean {
     pub seen: f64,
@@ -67,7 +67,7 @@ pub struct Move {
 }
 
 impl Move {
-    /// Its share of the radius.
+    /// Returns the move's share of the radius.
     pub fn cost(&self) -> f64 {
         self.mass * (self.moved_to - self.atom).abs()
     }
@@ -77,8 +77,8 @@ fn read<T: for<'a> Deserialize<'a>>(call: &'static str, value: Value) -> Result<
     serde_json::from_value(value).map_err(|source| DemoError::Shape { call, source })
 }
 
-/// Queues the training of the demo's investor for what `record` says of returns, follows its events to the end, and returns the
-/// policy's name.
+/// Queues the training of the demo's investor for the returns in `record`, follows its events to the end, and returns
+/// the policy's name.
 pub async fn train(api: &ApiClient, record: Value, horizon: usize, count: usize) -> Result<String, DemoError> {
     let mut problem = json!({
         "horizon": horizon,
@@ -96,7 +96,7 @@ pub async fn train(api: &ApiClient, record: Value, horizon: usize, count: usize)
     let path = format!("/jobs/{}", job.job);
     let mut view = ProgressView::new(horizon);
     while !job.is_over() {
-        // A stream that ends early is opened again; the job itself says whether there is more to come.
+        // A stream that ends early is opened again; the job itself shows whether there is more to come.
         let mut events = api.events(&format!("{path}/events")).await?;
         while let Some(event) = events.next().await? {
             job = read("GET /jobs/{id}/events", event)?;
@@ -128,7 +128,8 @@ pub async fn advice<T: DeserializeOwned>(api: &ApiClient, session: &str, explain
     read("GET /action", api.get(&format!("/action?session={session}{explain}")).await?)
 }
 
-/// Reports what came of a period, `returns` by the name that they have in the call, as it is on record; the wealth it led to.
+/// Reports the returns of a period, `returns` by the names that they have in the call, and returns the recorded wealth
+/// after it.
 pub async fn observe(
     api: &ApiClient,
     session: &str,

@@ -1,4 +1,4 @@
-//! The investor of the story: what he wants, and what was known before a month.
+//! The investor of the story: the goals, and the information before a month.
 
 use serde_json::{Value, json};
 
@@ -11,11 +11,11 @@ pub const INITIAL_WEALTH: f64 = 100.0;
 pub const RISK_AVERSION: f64 = 3.0;
 pub const ALPHA: f64 = 0.1;
 
-/// What was known before a month.
+/// The information available before a month.
 pub struct Past {
     pub month: String,
     log_returns: Vec<f64>,
-    /// Bank return per month: that of the last month known.
+    /// Bank return per month, equal to that of the last known month.
     pub rate: f64,
     mean_return: f64,
 }
@@ -31,12 +31,12 @@ impl Past {
         })
     }
 
-    /// What is known, as a request says it.
+    /// Returns the known record as part of a request.
     pub fn record(&self) -> Value {
         json!({ "framework": "adaptive", "rate_per_step": self.rate, "history": self.log_returns })
     }
 
-    /// How much more than the bank the average month paid.
+    /// Returns the mean monthly return beyond the bank.
     pub fn edge(&self) -> f64 {
         self.mean_return - self.rate
     }

@@ -1,4 +1,4 @@
-//! A training's progress on the screen: a bar on a terminal, a line a step elsewhere.
+//! A training's progress on the screen: a bar on a terminal, a line per step elsewhere.
 
 use std::io::{IsTerminal, stderr};
 
@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// What the demo reads of a job, from `GET /jobs/{id}` and from each of its events.
+/// Fields that the demo reads of a job, from `GET /jobs/{id}` and from each of its events.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Job {
     pub job: String,
@@ -16,7 +16,7 @@ pub struct Job {
     pub error: Option<Value>,
 }
 
-/// Steps finished, and where the running one is: absent between two steps.
+/// Steps finished, and progress of the running one, which is absent between two steps.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Progress {
     pub steps_done: usize,
@@ -40,7 +40,7 @@ pub enum ProgressView {
     Lines {
         last_step: Option<usize>,
     },
-    /// For a training too short to watch.
+    /// Shows nothing, for a training too short to watch.
     Nothing,
 }
 
@@ -86,7 +86,7 @@ fn position(progress: &Progress) -> usize {
     progress.steps_done * TICKS_PER_STEP + done * TICKS_PER_STEP / total.max(1)
 }
 
-/// Where the running step is; `None` between two steps.
+/// Describes the progress of the running step; `None` between two steps.
 fn sentence(progress: &Progress) -> Option<String> {
     let Progress { step, seconds_left, .. } = progress;
     let (done, total) = (progress.points_done.unwrap_or(0), progress.points_total.unwrap_or(0));

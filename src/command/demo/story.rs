@@ -1,4 +1,4 @@
-//! The story the demo tells: what was known before 2008, what the investor was told, what became of him.
+//! The story that the demo tells: the information before 2008, the advice, and its results.
 
 use ballast::control::evaluation::names::StrategyKind;
 use serde_json::json;
@@ -11,14 +11,14 @@ use crate::command::returns::{Returns, Row};
 
 pub const YEAR: &str = "2008";
 pub const FIRST_MONTH: &str = "2008-01";
-/// Januaries in which the same rule, looking one month ahead, is asked for comparison.
+/// Januaries in which the same rule, looking one month ahead, is computed for comparison.
 const JANUARIES: [&str; 4] = ["1947-01", "1975-01", "1987-01", FIRST_MONTH];
 pub const HORIZON: usize = 12;
 const LINE_WIDTH: usize = 108;
-/// Moves of the worst-case law that are told one by one.
+/// Number of moves of the worst-case law that are listed singly.
 const MOVES_TOLD: usize = 3;
 
-/// Trains, tells why, and lives through the year.
+/// Trains, explains the advice, and goes through the year.
 pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let market = Returns::bundled()?;
     let past = Past::before(&market, FIRST_MONTH)?;
@@ -66,7 +66,7 @@ fn tell_why(past: &Past, advice: &Advice) {
     );
 }
 
-/// Why a month's allocation is what it is, in the figures of its line.
+/// Returns the reason for a month's allocation, from the figures of its line.
 fn reason(edge: f64, radius: f64) -> &'static str {
     match () {
         () if edge <= 0.0 => "stocks paid less than the bank",
@@ -75,7 +75,7 @@ fn reason(edge: f64, radius: f64) -> &'static str {
     }
 }
 
-/// The same rule, one month ahead, in several Januaries. Cheap: each is a single robust solve.
+/// Computes the one-month-ahead advice in several Januaries. Cheap: each is a single robust solve.
 async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> Result<(), DemoError> {
     println!("\nThe same rule, looking one month ahead, in four Januaries:");
     println!("{:<8} {:>8} {:>11}  stocks beyond the bank", "month", "radius", "allocation");
@@ -90,7 +90,7 @@ async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> R
     Ok(())
 }
 
-/// One line a month; the advice of the last month, explained.
+/// Prints one line per month, and returns the explained advice of the last month.
 async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row]) -> Result<Option<Advice>, DemoError> {
     println!("\nThe year {YEAR}, month by month (the bank pays {:.2} % throughout):", 100.0 * past.rate);
     println!(
@@ -121,7 +121,7 @@ async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row])
     Ok(last)
 }
 
-/// The worst law behind an advice, in words, and its largest moves.
+/// Prints the worst law behind an advice in words, with its largest moves.
 pub fn tell_worst_case(whose: &str, worst_case: Option<&WorstCase>) {
     let Some(worst_case) = worst_case else { return };
     println!("The worst law for {whose} advice:");
@@ -136,7 +136,7 @@ pub fn tell_worst_case(whose: &str, worst_case: Option<&WorstCase>) {
     }
 }
 
-/// A sentence in lines of at most `width` characters, where its words allow.
+/// Breaks a sentence into lines of at most `width` characters, unless a word is longer.
 fn wrapped(sentence: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in sentence.split_whitespace() {
@@ -151,7 +151,7 @@ fn wrapped(sentence: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// The moves that use most of the radius, largest first.
+/// Returns the moves that use most of the radius, largest first.
 fn largest_moves(transport: &[Move]) -> Vec<Move> {
     let mut moves: Vec<Move> = transport.iter().filter(|one| one.cost() > 0.0).cloned().collect();
     moves.sort_by(|one, other| other.cost().total_cmp(&one.cost()));

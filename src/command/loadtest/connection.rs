@@ -1,5 +1,5 @@
-//! One keep-alive connection that costs its machine as little as HTTP/1.1 allows: prepared bytes out, the end of the
-//! answer found in what comes back.
+//! One keep-alive connection that costs its machine as little as HTTP/1.1 allows: it sends prepared bytes and only
+//! searches the answer for its end.
 
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
@@ -22,7 +22,7 @@ pub struct Connection {
     received: Vec<u8>,
 }
 
-/// Where an answer's body lies in what was received.
+/// The position of an answer's body in the received bytes.
 struct Extent {
     status: u16,
     head: usize,
@@ -99,7 +99,7 @@ impl Connection {
     }
 }
 
-/// `None` until the head is there.
+/// Locates the body; `None` until the head has arrived.
 fn extent(received: &[u8]) -> Result<Option<Extent>, ConnectionError> {
     let Some(end) = received.windows(4).position(|four| four == b"\r\n\r\n") else { return Ok(None) };
     let head = String::from_utf8_lossy(&received[..end]);

@@ -1,4 +1,4 @@
-//! What was measured, as a table and as JSON.
+//! The measurements, as a table and as JSON.
 
 use std::fmt;
 
@@ -16,12 +16,12 @@ pub struct Report {
 #[derive(Debug, Serialize)]
 struct Figure {
     what: String,
-    /// A second.
+    /// Rate per second.
     rate: Option<f64>,
     p50_ms: Option<f64>,
     p99_ms: Option<f64>,
     max_ms: Option<f64>,
-    /// Of the service's processors, for one of the things asked for.
+    /// Microseconds of the service's processors per operation.
     processor_us: Option<f64>,
     bounds: Vec<Bound>,
 }
@@ -42,7 +42,7 @@ impl Bound {
     }
 }
 
-/// What must hold of a load.
+/// Bounds that a load must keep.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Must {
     pub rate: Option<f64>,
@@ -65,12 +65,12 @@ impl Report {
         });
     }
 
-    /// Something done so many times a second.
+    /// Adds the rate of something, per second.
     pub fn rate(&mut self, what: impl Into<String>, rate: f64) {
         self.line(what, Some(rate), Vec::new());
     }
 
-    /// A figure that its bound speaks of.
+    /// Adds a figure whose text its bound refers to.
     pub fn bounded(&mut self, what: impl Into<String>, bound: Bound) {
         self.line(what, None, vec![bound]);
     }

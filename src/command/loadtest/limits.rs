@@ -1,4 +1,4 @@
-//! What the machine itself does, whoever asks.
+//! Limits of the machine itself, independent of the service.
 
 use std::error::Error;
 use std::fs::File;
@@ -12,10 +12,10 @@ use super::stored;
 
 /// A page of SQLite.
 const PAGE: [u8; 4096] = [7; 4096];
-/// The file is written from its start again after so many pages: a log that is checkpointed.
+/// Number of pages after which the file is written from its start again, as a checkpointed log is.
 const PAGES: usize = 1000;
 
-/// Pages written and synced a second, one after the other, to a file in `folder`.
+/// Returns how many pages per second can be written and synced, one after the other, to a file in `folder`.
 ///
 /// # Errors
 /// The file cannot be made, written or synced.
@@ -37,15 +37,15 @@ pub fn syncs_per_second(folder: &Path, time: Duration) -> io::Result<f64> {
     Ok(rate)
 }
 
-/// Connections of one replica to its database, and of `pgbench` in its place.
+/// Connections of one replica to its database, and of `pgbench` instead.
 pub const CONNECTIONS: usize = 10;
-/// Rows of the size of an observation's, under a key as spread as a session's name.
+/// Table with rows of the size of an observation's, under keys as random as a session's name.
 const TABLE: &str =
     "CREATE TABLE ballast_loadtest (session TEXT, period BIGINT, row TEXT, PRIMARY KEY (session, period))";
 const INSERT: &str = "INSERT INTO ballast_loadtest VALUES (md5(random()::text), 1, repeat('x', 560));\n";
 const DROP: &str = "DROP TABLE IF EXISTS ballast_loadtest";
 
-/// Rows that `pgbench` inserts a second, each in a transaction of its own; `None` where it is not installed.
+/// Returns how many rows per second `pgbench` inserts, each in its own transaction; `None` if it is not installed.
 ///
 /// # Errors
 /// The database cannot be reached, or `pgbench` fails.
@@ -68,7 +68,7 @@ pub async fn inserts_per_second(folder: &Path, store: &str, time: Duration) -> R
     }
 }
 
-/// Among the newest of Debian's, else on the path.
+/// Finds `pgbench` in the newest of Debian's versions, or else on the path.
 fn pgbench() -> Option<PathBuf> {
     let versions = std::fs::read_dir("/usr/lib/postgresql").into_iter().flatten();
     let mut folders: Vec<PathBuf> = versions.filter_map(|entry| Some(entry.ok()?.path().join("bin"))).collect();

@@ -1,4 +1,4 @@
-//! Load, and how it was borne.
+//! Load on the service, and its latency and rate.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use futures_util::future::{join_all, try_join_all};
 use super::connection::{Connection, ConnectionError};
 use super::server::Server;
 
-/// Milliseconds from the first byte sent to the last received, one a request.
+/// Milliseconds from the first byte sent to the last received, one per request.
 #[derive(Debug, Default)]
 pub struct Load {
     milliseconds: Vec<f64>,
-    /// What was asked for: as many things as requests, unless a request asks for several.
+    /// Number of operations: one per request, unless a request contains several.
     asked: usize,
     seconds: f64,
-    /// Processor time of the service, where it is known.
+    /// Processor time of the service, if it is known.
     processor_seconds: Option<f64>,
 }
 
@@ -24,7 +24,7 @@ impl Load {
         Load { asked: milliseconds.len(), milliseconds, seconds, processor_seconds: None }
     }
 
-    /// What `driving` gives, with the processor time that the service takes for it.
+    /// Runs `driving`, and adds the processor time that the service takes for it.
     pub async fn on(
         server: &Server,
         driving: impl Future<Output = Result<Load, ConnectionError>>,
@@ -35,12 +35,12 @@ impl Load {
         Ok(Load { processor_seconds, ..load })
     }
 
-    /// The same, where its requests asked for so many things together.
+    /// Sets the number of operations, if requests contained several.
     pub fn asking(self, asked: usize) -> Self {
         Load { asked, ..self }
     }
 
-    /// Microseconds of the service's processors for one of the things asked for.
+    /// Returns the microseconds of the service's processors per operation.
     pub fn processor_us(&self) -> Option<f64> {
         self.processor_seconds.map(|seconds| 1e6 * seconds / self.asked as f64)
     }
@@ -49,12 +49,12 @@ impl Load {
         self.asked
     }
 
-    /// Things answered a second.
+    /// Returns the operations answered per second.
     pub fn rate(&self) -> f64 {
         self.asked as f64 / self.seconds
     }
 
-    /// The quantiles at `shares` and the largest, in milliseconds.
+    /// Returns the latency quantiles at `shares` and the largest, in milliseconds.
     pub fn latency<const N: usize>(&self, shares: [f64; N]) -> [f64; N] {
         let mut sorted = self.milliseconds.clone();
         sorted.sort_by(f64::total_cmp);
@@ -73,8 +73,8 @@ impl Load {
     }
 }
 
-/// Each of `clients` connections, spread over the replicas at `addresses`, sends its requests one after the other, the next
-/// once the last is answered.
+/// Drives `clients` connections, spread over the replicas at `addresses`. Each sends its requests one after the other,
+/// the next once the last is answered.
 pub async fn saturate<R: Iterator<Item = Vec<u8>>>(
     addresses: &[SocketAddr],
     clients: usize,
@@ -105,10 +105,10 @@ async fn timed(connection: &mut Connection, request: &[u8]) -> Result<f64, Conne
     Ok(1e3 * sent.elapsed().as_secs_f64())
 }
 
-/// Connections that share a paced load: one that waits for a slow answer leaves the others on time.
+/// Number of connections that share a paced load: if one waits for a slow answer, the others stay on time.
 const PACED: u32 = 16;
 
-/// `rate` requests a second for `time`, whether or not earlier ones are answered.
+/// Sends `rate` requests per second for `time`, whether or not earlier ones are answered.
 pub async fn paced(
     address: SocketAddr,
     rate: f64,
@@ -133,7 +133,7 @@ pub async fn paced(
     Ok(Load::of(answered?.concat(), seconds))
 }
 
-/// The bodies of the answers to `requests`, in their order, from `clients` connections.
+/// Returns the bodies of the answers to `requests`, in their order, from `clients` connections.
 pub async fn bodies(
     address: SocketAddr,
     clients: usize,

@@ -1,4 +1,4 @@
-//! What a scenario needs to be there: a policy, and sessions that live by it.
+//! The prerequisites of a scenario: a policy, and sessions that follow it.
 
 use std::error::Error;
 use std::path::Path;
@@ -21,14 +21,14 @@ use super::{LoadTest, tell};
 use crate::command::api_client::ApiClient;
 use crate::command::bench::paper;
 
-/// Returns that sessions see, in turn: enough that no two sessions see the same.
+/// Number of returns that sessions cycle through: enough that no two sessions see the same.
 const RETURNS: usize = 4093;
-/// Returns before a session starts, as in the paper.
+/// Number of returns before a session starts, as in the paper.
 const HISTORY: usize = 20;
-/// Sessions that wait for the store's commits at a time.
+/// Number of sessions that wait for the store's commits at a time.
 const IN_FLIGHT: usize = 1024;
 
-/// A policy and the returns its sessions live through.
+/// A policy, and the returns of its sessions.
 pub struct World {
     pub policy: String,
     pub horizon: usize,
@@ -36,13 +36,13 @@ pub struct World {
     returns: Vec<f64>,
 }
 
-/// The paper's problem with `horizon` steps and `count` design points a step.
+/// Returns the paper's problem with `horizon` steps and `count` design points per step.
 fn specification(horizon: usize, count: usize) -> Specification {
     paper::specification(HISTORY, horizon, count, InitialLaws::Given)
 }
 
 impl World {
-    /// Trains the policy here, on every core, and hands it to the service.
+    /// Trains the policy here, on every core, and imports it into the service.
     pub async fn train(server: &Server, arguments: &LoadTest) -> Result<Self, Box<dyn Error>> {
         let LoadTest { horizon, count, .. } = *arguments;
         tell(&format!("training {horizon} steps of {count} design points"));
@@ -65,13 +65,13 @@ impl World {
         opened.iter().map(|body| text(&serde_json::from_slice(body)?, "session")).collect()
     }
 
-    /// A session's `period`; `index` is the session's place among those of the scenario.
+    /// Returns the report of a session's `period`; `index` is the session's index in the scenario.
     fn report(&self, session: &str, index: usize, period: usize) -> String {
         let log_return = self.returns[(index + 61 * period) % RETURNS];
         format!(r#"{{"session":"{session}","period":{period},"log_return":{log_return},"confirm":true}}"#)
     }
 
-    /// The call that reports `period` of these sessions: one of them as it is, several as a list.
+    /// Returns the call that reports `period` of these sessions: a single one as an object, several as a list.
     pub fn observation(&self, sessions: &[(usize, &String)], period: usize) -> Vec<u8> {
         let reports: Vec<String> =
             sessions.iter().map(|&(index, session)| self.report(session, index, period)).collect();
@@ -81,7 +81,7 @@ impl World {
         }
     }
 
-    /// Writes `count` sessions straight into the store of a service that is down, many to a commit.
+    /// Writes `count` sessions directly into the store of a stopped service, many per commit.
     pub async fn fill(&self, folder: &Path, store: Option<&str>, count: u32) -> Result<Vec<String>, Box<dyn Error>> {
         tell(&format!("writing {count} sessions into the store"));
         let store = match store {
@@ -109,7 +109,7 @@ impl World {
         let problem = &self.specification.problem;
         Ok(SessionRow {
             tenant: Tenant::default(),
-            // As spread as the service's own, which are random.
+            // Spread like the service's own names, which are random.
             session: format!("session_{}", &content_hash(&index.to_le_bytes())[..32]),
             policy: self.policy.clone(),
             initial_wealth: problem.initial_wealth,
@@ -124,7 +124,7 @@ impl World {
     }
 }
 
-/// Starts a training of 1,000 design points; its job.
+/// Starts a training of 1,000 design points and returns its job.
 pub async fn long_training(server: &Server) -> Result<String, Box<dyn Error>> {
     let mut specification = specification(60, 1000);
     specification.seed = 2;
@@ -132,7 +132,7 @@ pub async fn long_training(server: &Server) -> Result<String, Box<dyn Error>> {
     text(&job, "job")
 }
 
-/// The coming period of each session.
+/// Returns the coming period of each session.
 pub async fn periods(server: &Server, clients: usize, sessions: &[String]) -> Result<Vec<u64>, Box<dyn Error>> {
     let requests: Vec<_> = sessions.iter().map(|session| get(&format!("/sessions/{session}"))).collect();
     let answers = bodies(server.addresses[0], clients, &requests).await?;

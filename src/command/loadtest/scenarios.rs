@@ -1,4 +1,4 @@
-//! The scenarios: what is asked of the service, and what must hold of its answers.
+//! The scenarios: the calls to the service, and the bounds on its answers.
 
 use serde_json::json;
 use std::error::Error;
@@ -20,9 +20,9 @@ const TRAINING_P99_MS: f64 = 10.0;
 const SHARE_OF_LIVEZ: f64 = 0.6;
 const START_SECONDS: f64 = 5.0;
 const MEMORY_MB: f64 = 1024.0;
-/// Requests a second that leave the service idle most of the time.
+/// Requests per second that leave the service idle most of the time.
 const LOW_RATE: f64 = 200.0;
-/// Turns that two loads take in one comparison.
+/// Number of turns that two loads take in one comparison.
 const TURNS: u32 = 6;
 
 pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
@@ -69,7 +69,7 @@ struct Test<'a> {
 }
 
 impl Test<'_> {
-    /// Every session through `periods`; each client has sessions of its own, of which it reports `batch` in a call.
+    /// Takes every session through `periods`; each client has its own sessions, and reports `batch` of them per call.
     async fn observed(
         &self,
         server: &Server,
@@ -104,7 +104,7 @@ impl Test<'_> {
                 return Err(format!("a session is at period {period} after {horizon} observations").into());
             }
         }
-        // The wait for a list is no wait for an observation.
+        // The latency of a list is not that of one observation.
         let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: (batch == 1).then_some(OBSERVE_P99_MS) };
         let lists = if batch == 1 { String::new() } else { format!(", lists of {batch}") };
         report.load(format!("observe: {} clients, {count} sessions{lists}", self.clients), &load, must);
@@ -139,7 +139,7 @@ impl Test<'_> {
         Ok(Load::on(server, paced(server.addresses[0], LOW_RATE, self.time, ask)).await?)
     }
 
-    /// In turns, so that what else the machine does meets both.
+    /// Alternates the two loads, so that other work on the machine affects both.
     async fn against_livez(
         &self,
         server: &Server,

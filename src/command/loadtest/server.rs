@@ -1,5 +1,5 @@
-//! The service under load: a process of its own over a data folder of its own, replicas over one database, or one that runs
-//! already.
+//! The service under load: its own process over its own data folder, replicas over one database, or a service that
+//! already runs.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
@@ -14,7 +14,7 @@ use super::connection::{Connection, get};
 use super::tunnel::{self, TunnelError};
 use crate::command::host::{DataFolder, HostError};
 
-/// A service that is not ready by then never will be.
+/// Time after which a service that is not ready counts as failed.
 const PATIENCE: Duration = Duration::from_secs(60);
 const POLL: Duration = Duration::from_millis(2);
 
@@ -37,15 +37,15 @@ pub enum ServerError {
 }
 
 pub struct Server {
-    /// Of each replica.
+    /// Addresses of the replicas.
     pub addresses: Vec<SocketAddr>,
     own: Option<Own>,
 }
 
-/// What is ours to end.
+/// The processes and the folder that this test must end.
 struct Own {
     replicas: Vec<Child>,
-    // After the processes: they let go of the folder before the folder goes.
+    // Declared after the processes: they release the folder before it is removed.
     folder: DataFolder,
     store: Option<String>,
 }
@@ -67,13 +67,13 @@ impl Own {
 
 impl Drop for Own {
     fn drop(&mut self) {
-        // An error means that they have ended already.
+        // An error means that they have already ended.
         let _ = self.end();
     }
 }
 
 impl Server {
-    /// The service at `url`.
+    /// Connects to the service at `url`.
     pub async fn at(url: &str, authorities: Option<&Path>) -> Result<Self, ServerError> {
         let encrypted = url.strip_prefix("https://");
         let host = encrypted.unwrap_or(url.trim_start_matches("http://")).trim_end_matches('/');
@@ -90,7 +90,8 @@ impl Server {
         Ok(Server { addresses: vec![address], own: None })
     }
 
-    /// Runs `ballast serve` over a new folder in `parent`, or so many over one database, and waits until all are ready.
+    /// Runs `ballast serve` over a new folder in `parent`, or `replicas` of them over one database, and waits until all
+    /// are ready.
     pub async fn start(parent: &Path, store: Option<&str>, replicas: usize) -> Result<Self, ServerError> {
         let folder = DataFolder::make_in(parent, "loadtest")?;
         let mut own = Own { replicas: Vec::new(), folder, store: store.map(str::to_owned) };
@@ -99,8 +100,8 @@ impl Server {
         Ok(server)
     }
 
-    /// Kills the processes, does `meanwhile` to what they left, and starts others; the time from start to ready.
-    /// `None` where they are not ours.
+    /// Kills the processes, runs `meanwhile` on their folder and store, and starts others. Returns the time from start
+    /// to ready, or `None` if the processes are not its own.
     pub async fn restart<E: From<ServerError>>(
         &mut self,
         meanwhile: impl AsyncFnOnce(&Path, Option<&str>) -> Result<(), E>,
@@ -118,18 +119,20 @@ impl Server {
         self.own.as_ref().map(|own| own.folder.path())
     }
 
-    /// The database that the service was started over, where it was one.
+    /// Returns the database that the service was started over, if there is one.
     pub fn store(&self) -> Option<&str> {
         self.own.as_ref()?.store.as_deref()
     }
 
-    /// Bytes of the SQLite database without its log, which is emptied as it goes; `None` where there is none of ours.
+    /// Returns the bytes of the SQLite database without its log, which is emptied regularly; `None` if there is none of
+    /// its own.
     pub fn database_bytes(&self) -> Option<u64> {
         let own = self.own.as_ref().filter(|own| own.store.is_none())?;
         Some(std::fs::metadata(own.folder.path().join("ballast.sqlite")).ok()?.len())
     }
 
-    /// Most resident memory of one process so far, in MB; `None` where none is ours or the system does not tell.
+    /// Returns the most resident memory of one process so far, in MB; `None` if no process is its own or the system
+    /// does not report it.
     pub fn peak_memory_mb(&self) -> Option<f64> {
         let peak = |child: &Child| {
             let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
@@ -139,7 +142,7 @@ impl Server {
         self.own.as_ref()?.replicas.iter().map(peak).try_fold(0.0, |most: f64, peak| Some(most.max(peak?)))
     }
 
-    /// Processor time all of it has taken, in seconds, to the hundredth that Linux counts in; `None` as above.
+    /// Returns the processor time of all processes, in seconds, to Linux's resolution of a hundredth; `None` as above.
     pub fn processor_seconds(&self) -> Option<f64> {
         self.own.as_ref()?.replicas.iter().map(processor_seconds).sum()
     }
@@ -166,13 +169,14 @@ async fn is_ready(address: SocketAddr) -> bool {
 fn processor_seconds(child: &Child) -> Option<f64> {
     const TICKS_PER_SECOND: f64 = 100.0;
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
-    // Past the name, which may hold anything: the state is the first field, user and system time are 12th and 13th.
+    // Skips the name, which may contain anything: the state is the first field, user and system time are the 12th and
+    // 13th.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
     let mut ticks = || fields.next()?.parse::<f64>().ok();
     Some((ticks()? + ticks()?) / TICKS_PER_SECOND)
 }
 
-/// Logs as it does in service, to a file of the folder.
+/// Starts a process that logs as in service, to a file in the folder.
 fn spawn(folder: &Path, store: Option<&str>) -> Result<(Child, SocketAddr), ServerError> {
     let failed = |doing| move |source| ServerError::Process { doing, source };
     let log: PathBuf = folder.join("log");

@@ -1,4 +1,4 @@
-//! What the facts of a service under load take in its store.
+//! Bytes in the store per session and per observation of a service under load.
 
 use std::error::Error;
 
@@ -8,7 +8,7 @@ use sqlx::{AssertSqlSafe, Connection};
 use super::figures::Report;
 use super::server::Server;
 
-/// Bytes by what they hold.
+/// Growth of the store by sessions and by observations.
 #[derive(Default)]
 pub struct Growth {
     last: u64,
@@ -17,18 +17,18 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// From here on.
+    /// Starts measuring from the current size.
     pub async fn start(&mut self, server: &Server) -> Result<(), Box<dyn Error>> {
         self.grown(server).await.map(drop)
     }
 
-    /// Sessions alone were opened since.
+    /// Counts the growth since the last call as sessions; only sessions were opened.
     pub async fn opened(&mut self, server: &Server) -> Result<(), Box<dyn Error>> {
         self.sessions += self.grown(server).await?;
         Ok(())
     }
 
-    /// They observed alone since.
+    /// Counts the growth since the last call as observations; only observations were made.
     pub async fn observed(&mut self, server: &Server) -> Result<(), Box<dyn Error>> {
         self.observations += self.grown(server).await?;
         Ok(())
@@ -50,7 +50,7 @@ impl Growth {
         Ok(grown)
     }
 
-    /// Tells of so many sessions and observations, where the store is known.
+    /// Reports the bytes per session and per observation, if the store is known.
     pub fn tell(&self, sessions: usize, observations: usize, report: &mut Report) {
         if self.last > 0 {
             let [session, observation] = [(self.sessions, sessions), (self.observations, observations)]

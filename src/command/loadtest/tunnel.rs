@@ -1,5 +1,5 @@
-//! A plain address on loopback in front of an encrypted service, so that the generator's connections stay as cheap as
-//! they are. The encryption of this side costs processor time too, on the generator's own thread.
+//! A plain address on loopback in front of an encrypted service, so that the generator's connections stay cheap. The
+//! encryption on this side also costs processor time, on the generator's own thread.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
@@ -22,7 +22,7 @@ pub enum TunnelError {
     Listen { source: std::io::Error },
 }
 
-/// Opens one to `target`, whose certificate must be for `name` and by an authority in the file.
+/// Opens a tunnel to `target`, whose certificate must be for `name` and issued by an authority in the file.
 pub async fn open(target: SocketAddr, name: &str, authorities: &Path) -> Result<SocketAddr, TunnelError> {
     let connector = TlsConnector::from(tls_client::trusting(authorities)?);
     let name = ServerName::try_from(name.trim_matches(['[', ']']).to_owned());

@@ -1,4 +1,4 @@
-//! What of the paper's section 3 holds here and what does not, as statements decided by the figures.
+//! Statements of the paper's section 3 and whether they hold here, decided by the figures.
 
 use std::fmt;
 
@@ -15,22 +15,22 @@ use super::runs::{CLOSENESS, Quantiles, Section, Slope, Study};
 /// Terminal utility of all wealth in the bank, 100 (1 - exp(-1.002^10)).
 const ALL_BANK: f64 = 63.947_03;
 
-/// Paths behind the paper's own figures, whose sampling error counts too.
+/// Number of paths behind the paper's own figures, whose sampling error counts also.
 const PRINTED_PATHS: f64 = 1000.0;
-/// An interval of a variance that reaches further than this share of the figure compared with shows nothing of it.
+/// Largest informative reach of a variance's interval, as a share of the figure compared with.
 const TELLING: f64 = 0.25;
 
-/// Whether figures bear out a statement.
+/// The verdict of the figures on a statement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     Agrees,
     Differs,
-    /// The intervals allow both.
+    /// Undecided: the intervals allow both.
     Undecided,
 }
 
-/// A statement of the paper, and what was found.
+/// A statement of the paper, and the result here.
 #[derive(Debug, Serialize)]
 pub struct Finding {
     pub verdict: Verdict,
@@ -49,7 +49,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// All parts of a statement must hold; one that does not decides.
+/// Combines the parts of a statement: all must hold, and one that does not decides.
 fn together(parts: &[Verdict]) -> Verdict {
     match () {
         () if parts.contains(&Verdict::Differs) => Verdict::Differs,
@@ -58,7 +58,7 @@ fn together(parts: &[Verdict]) -> Verdict {
     }
 }
 
-/// Whether an estimate lies above 0.
+/// Decides whether an estimate lies above 0.
 fn positive(estimate: Estimate) -> Verdict {
     match () {
         () if estimate.low > 0.0 => Verdict::Agrees,
@@ -67,13 +67,14 @@ fn positive(estimate: Estimate) -> Verdict {
     }
 }
 
-/// Whether one estimate lies above another, by intervals that do not overlap.
+/// Decides whether one estimate lies above another, by intervals that do not overlap.
 fn above(one: Estimate, other: Estimate) -> Verdict {
     let apart = Estimate { value: one.value - other.value, low: one.low - other.high, high: one.high - other.low };
     positive(apart)
 }
 
-/// Whether an estimate is a figure with a sampling error of its own; `within` is the reach beyond which it would show nothing.
+/// Decides whether an estimate equals a figure with standard error `error`. An interval that reaches further than
+/// `within` shows nothing.
 fn equals(estimate: Estimate, figure: f64, error: f64, within: f64) -> Verdict {
     let reach = 0.5 * (estimate.high - estimate.low);
     match () {
@@ -83,11 +84,12 @@ fn equals(estimate: Estimate, figure: f64, error: f64, within: f64) -> Verdict {
     }
 }
 
-/// Whether adaptive earns what the paper prints, each figure within a quarter of its size; that of a mean is a deviation.
+/// Decides whether adaptive earns what the paper prints. Intervals may reach a quarter of the figure, or of the
+/// deviation for the mean.
 fn mean_and_variance(ours: &UtilityReport, paper: &[f64; 6]) -> Verdict {
     let [mean, variance, ..] = *paper;
     let error = (variance / PRINTED_PATHS).sqrt();
-    // Of normal utilities, 2 variance^2 / N.
+    // For normal utilities the squared error is 2 variance^2 / N.
     let error_of_variance = variance * (2.0 / PRINTED_PATHS).sqrt();
     together(&[
         equals(ours.mean, mean, error, TELLING * variance.sqrt()),
@@ -99,7 +101,7 @@ fn shown(estimate: Estimate) -> String {
     format!("{:.4} [{:.4}, {:.4}]", estimate.value, estimate.low, estimate.high)
 }
 
-/// Every statement, in the order of the paper; a run that is too small for a verdict gives none.
+/// Returns every statement, in the order of the paper; none if the run is too small for a verdict.
 pub fn all(section: &Section, study: &Study, plan: &Plan) -> Vec<Finding> {
     let mut findings = compared(section, study);
     if !plan.decides() {
@@ -153,12 +155,12 @@ fn quantiles(section: &Section) -> Vec<Finding> {
     ]
 }
 
-/// The standard error of the paper's mean over as many histories as its figure shows, from the interval of ours.
+/// Returns the standard error of the paper's mean over as many histories as its figure shows, from the interval here.
 fn printed_error(found: &Quantiles) -> f64 {
     0.25 * (found.mean.high - found.mean.low) * (found.drawn as f64 / QUANTILES as f64).sqrt()
 }
 
-/// The same of its 1 % quantile.
+/// Returns the standard error of the paper's 1 % quantile in the same way.
 fn printed_error_of_low(found: &Quantiles) -> f64 {
     0.25 * (found.low.high - found.low.low) * (found.drawn as f64 / QUANTILES as f64).sqrt()
 }
@@ -169,7 +171,7 @@ fn table(index: usize, adaptive: &StrategyReport, known: &StrategyReport, fixed:
     let ordered = |estimate: &dyn Fn(&StrategyReport) -> f64| (estimate(adaptive), estimate(known), estimate(fixed));
     let (mean, variance) = (ordered(&|of| of.utility.mean.value), ordered(&|of| of.utility.variance.value));
     let (low, least) = (ordered(&|of| of.utility.quantile_20.value), ordered(&|of| of.utility.min));
-    // Differences are to adaptive, on the same returns.
+    // Differences are taken from adaptive, on the same returns.
     let more_than_adaptive = |strategy: &StrategyReport| {
         strategy.difference.as_ref().map_or(Verdict::Undecided, |difference| positive(difference.utility))
     };
@@ -227,8 +229,8 @@ fn all_bank(utility: &UtilityReport) -> Verdict {
     }
 }
 
-/// The paper states a speed for the value of the adaptive framework alone. Gaps of realised utility, and those of static, stand in
-/// the table of convergence without a verdict.
+/// Returns the findings on speed. The paper states one for the value of the adaptive framework alone. Gaps of realised
+/// utility, and those of static, are in the table of convergence without a verdict.
 fn slopes(study: &Study) -> Vec<Finding> {
     let stated = study.slopes.iter().filter(|slope| slope.framework == Framework::Adaptive && slope.gap == "value");
     let finding = |slope: &Slope| Finding {
@@ -263,10 +265,11 @@ mod tests {
             [above(at(2.0, 0.4), at(1.0, 0.4)), above(at(2.0, 0.6), at(1.0, 0.6))],
             [Verdict::Agrees, Verdict::Undecided]
         );
-        // A variance of 35 within 0 and 143 is no sign of one of 41.9.
+        // A variance of 35 within 0 and 143 is no evidence of one of 41.9.
         assert_eq!(equals(at(35.0, 108.0), 41.9, 1.9, 10.5), Verdict::Undecided);
         assert_eq!(equals(at(40.0, 3.0), 41.9, 1.9, 10.5), Verdict::Agrees);
-        // The paper's own error counts: 0.5 apart, where ours reaches 0.3 and its standard error is 0.2.
+        // The paper's own error counts: the figures differ by 0.5, the interval here reaches 0.3, and the paper's
+        // standard error is 0.2.
         assert_eq!(
             [equals(at(1.0, 0.3), 1.5, 0.2, 1.0), equals(at(1.0, 0.3), 1.5, 0.1, 1.0)],
             [Verdict::Agrees, Verdict::Differs]

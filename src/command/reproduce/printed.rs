@@ -1,13 +1,13 @@
-//! What the paper prints in its section 3.
+//! Figures that the paper prints in its section 3.
 
 use ballast::control::request::framework::Framework;
 use serde::Serialize;
 
 /// Mean of the simulated quantiles at t0 = 20, alpha = 0.1.
 pub const MEAN_QUANTILE: f64 = 0.200395;
-/// Their 1 % quantile.
+/// 1 % quantile of the simulated quantiles.
 pub const LOW_QUANTILE: f64 = 0.115721;
-/// Simulated quantiles in the left panel of its first figure.
+/// Number of simulated quantiles in the left panel of its first figure.
 pub const QUANTILES: usize = 1000;
 
 /// Names of the statistics, as in `tables::estimates`.
@@ -40,7 +40,7 @@ pub const TABLES: [PrintedTable; 2] = [
 ];
 
 impl PrintedTable {
-    /// The column of a strategy of ours.
+    /// Returns the paper's column for a framework.
     pub fn column(&self, framework: Option<Framework>) -> Option<&[f64; 6]> {
         match framework? {
             Framework::Adaptive => Some(&self.adaptive),

@@ -1,4 +1,4 @@
-//! What is computed anew for the paper's section 3.
+//! The computations that reproduce the paper's section 3.
 
 use std::error::Error;
 
@@ -25,13 +25,13 @@ use super::printed::{QUANTILES, TABLES};
 use crate::command::bench::paper;
 use crate::command::compare::Workshop;
 
-/// Returns of a history.
+/// Number of returns of a history.
 pub const SAMPLE_SIZE: usize = 20;
-/// A history belongs to a table where its quantile is this close to the table's, relatively.
+/// Relative distance within which a history's quantile must lie from a table's for the history to belong to it.
 pub const CLOSENESS: f64 = 0.02;
-/// Histories that share bridges; it divides a batch.
+/// Number of histories that share bridges; it divides a batch.
 const GROUP: usize = 50;
-/// Histories drawn before it is asked whether enough were found.
+/// Number of histories drawn between checks for having enough.
 const BATCH: usize = 2000;
 
 /// The simulated quantiles.
@@ -40,7 +40,7 @@ pub struct Quantiles {
     pub mean: Estimate,
     /// 1 % quantile.
     pub low: Estimate,
-    /// The first of them, as many as the paper shows.
+    /// The first quantiles, as many as the paper shows.
     pub shown: Vec<f64>,
     pub drawn: usize,
 }
@@ -49,22 +49,22 @@ pub struct Quantiles {
 #[derive(Debug, Serialize)]
 pub struct Case {
     pub quantile: f64,
-    /// Histories as close as [`CLOSENESS`], of those drawn.
+    /// Number of drawn histories that are as close as [`CLOSENESS`].
     pub found: usize,
-    /// The comparison over the first of them; absent where fewer than two were found.
+    /// The comparison over the first of them; absent if fewer than two were found.
     pub report: Option<EvaluationReport>,
 }
 
-/// The paper's tables and figures.
+/// Results for the paper's tables and figures.
 #[derive(Debug, Serialize)]
 pub struct Section {
     pub quantiles: Quantiles,
-    /// Over histories drawn from the true law.
+    /// Results over histories drawn from the true law.
     pub all: EvaluationReport,
     pub cases: Vec<Case>,
 }
 
-/// The request of the paper's problem, for drawn histories of `sample_size` returns.
+/// Returns the request of the paper's problem, for drawn histories of `sample_size` returns.
 pub fn request(plan: &Plan, sample_size: usize, frameworks: &[Framework]) -> Result<EvaluationRequest, Box<dyn Error>> {
     let mut request = json!({
         "problem": paper::problem(sample_size, plan.horizon),
@@ -92,14 +92,15 @@ pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Erro
     Ok(Section { quantiles, all: all.in_utility(), cases })
 }
 
-/// Draws histories until each table has enough of its own, or patience ends; the quantiles of all, and the histories.
+/// Draws histories until each table has enough of its own or the limit is reached. Returns the quantiles of all, and
+/// the histories.
 fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
     let specification = request.specification(Framework::Adaptive, None);
     let sets = Problem::new(&specification).sets;
     let law = continuous_law(&paper::mixture(), &request.problem);
-    // A history belongs to a table by the bridges that its policy has. For the law of Q each group of them has bridges of its own, and
-    // is the unit of the intervals.
+    // A history belongs to a table by the bridges of its policy. For the law of Q each group of histories has its own
+    // bridges, and is the unit of the intervals.
     let kept = Kept::default();
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
@@ -161,7 +162,7 @@ pub struct Study {
     pub slopes: Vec<Slope>,
 }
 
-/// One length of history.
+/// The results at one length of history.
 #[derive(Debug, Serialize)]
 pub struct StudyRow {
     pub sample_size: usize,
@@ -179,7 +180,7 @@ pub struct Slope {
     pub framework: Framework,
     pub gap: &'static str,
     pub all: f64,
-    /// Between the two longest histories alone, with its interval.
+    /// The slope between the two longest histories alone, with its interval.
     pub last: Estimate,
 }
 
@@ -209,7 +210,8 @@ fn realised_gap(row: &StudyRow) -> Estimate {
     row.realised_gap
 }
 
-/// The slope of ln gap between the two largest sizes, whose histories are independent: each gap adds the square of its reach.
+/// Returns the slope of ln gap between the two largest sizes. Their histories are independent, so the squared relative
+/// half-widths of the gaps add.
 fn last_slope(gaps: &[(f64, Estimate)]) -> Estimate {
     let last = &gaps[gaps.len().saturating_sub(2)..];
     let points: Vec<(f64, f64)> = last.iter().map(|(size, gap)| (*size, gap.value.ln())).collect();
@@ -234,7 +236,7 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
         Ok(workshop.compare(&stage, &evaluation, &followers, 0.0)?.1.in_utility())
     };
     let adaptive = sized(&[Framework::KnownLaw, Framework::Adaptive], plan.study_count)?;
-    // A ladder of one input needs few points, and every history has its own.
+    // A design over one input needs few points, and every history has its own.
     let fixed = sized(&[Framework::KnownLaw, Framework::Static], plan.study_ladder)?;
     let row = |report: &EvaluationReport, framework: Framework| {
         let sample = Clustered::new(1, report.histories.len(), report.request.level);
@@ -256,7 +258,7 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
     Ok(vec![row(&adaptive, Framework::Adaptive), row(&fixed, Framework::Static)])
 }
 
-/// Least squares.
+/// Returns the slope by least squares.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let count = points.len() as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));

@@ -1,32 +1,34 @@
-//! When the periods of a record ended, how many make a year, and what the bank paid in them.
+//! The dates of a record's periods, the number of periods per year, and the bank's interest in them.
 
 use ballast::control::request::frequency::Frequency;
 use ballast::returns::Record;
 
 use super::error::ReturnsError;
 
-/// What says how long a period is: of one asset, and of several.
+/// Information the user must give to determine the length of a period: for one asset, and for several.
 const ONE: &str =
     "give --periods-per-year, such as 12, or a column of dates that are daily, weekly, monthly, quarterly or yearly";
 pub const SEVERAL: &str = "several assets need a column of dates that are daily, weekly, monthly, quarterly or yearly";
-/// Of periods in a year: a day at the shortest.
+/// Accepted periods per year: a period is at least a day.
 const PERIODS_PER_YEAR: std::ops::RangeInclusive<usize> = 1..=366;
-/// Of what the bank pays a period; as `problem.rate_per_step`.
+/// Accepted interest of the bank per period, as for `problem.rate_per_step`.
 const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
 
-/// What is known of the periods themselves.
+/// The dates and rates of the periods.
 pub struct Calendar {
     pub dates: Vec<String>,
     pub frequency: Option<Frequency>,
     pub periods_per_year: usize,
-    /// What the bank paid, and where that is said.
+    /// The bank's interest, and its source.
     pub rates: Vec<f64>,
     pub bank: String,
 }
 
 impl Calendar {
+    /// Builds the calendar of a record.
+    ///
     /// # Errors
-    /// Neither the record nor an option says what a period is, or what the bank pays.
+    /// Neither the record nor an option gives the length of a period, or the bank's interest.
     pub fn of(record: &Record, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
         let Some(periods_per_year) = periods_per_year.or(record.periods_per_year) else {
             return Err(ReturnsError::NoFrequency { rule: ONE });
@@ -43,6 +45,8 @@ impl Calendar {
     }
 }
 
+/// Checks the options.
+///
 /// # Errors
 /// An option breaks its rule.
 pub fn check(rate: Option<f64>, periods_per_year: Option<usize>) -> Result<(), ReturnsError> {

@@ -1,13 +1,13 @@
-//! The periods of a record put together to longer ones.
+//! Combines the periods of a record into longer ones.
 
 use super::{Frequency, Returns, Row};
 
-/// Longer periods that are too few to say anything.
+/// Fewest longer periods that are informative.
 const LEAST: usize = 24;
 
 impl Returns {
-    /// The same by months and by quarters, where a period is a day or a week. The first and the last month or quarter may have begun
-    /// before the record or go on after it, and are left out; so is what leaves fewer than 24.
+    /// Returns the record by months and by quarters, if a period is a day or a week. The first and the last month or
+    /// quarter are left out, because they may be incomplete. A result with fewer than 24 periods is also left out.
     pub fn coarser(&self) -> Vec<Returns> {
         if !matches!(self.frequency, Some(Frequency::Daily | Frequency::Weekly)) {
             return Vec::new();
@@ -22,7 +22,7 @@ impl Returns {
     }
 }
 
-/// One row of every whole part of a year of so many months.
+/// Returns one row for every whole part of a year of `months` months.
 fn together(rows: &[Row], months: usize) -> Vec<Row> {
     let part = |row: &Row| {
         let month = row.date.get(5..7).and_then(|month| month.parse::<usize>().ok());
@@ -49,7 +49,8 @@ mod tests {
 
     #[test]
     fn weeks_are_put_together_to_whole_months_and_quarters() {
-        // Three years of Fridays from the middle of January 2010 on: 1.2 % and -0.8 % in turn, and 0.05 % of the bank.
+        // Three years of Fridays from the middle of January 2010: alternately 1.2 % and -0.8 %, and 0.05 % from the
+        // bank.
         let mut text = "date,market_return,risk_free_return\n".to_owned();
         let mut date = jiff::civil::date(2010, 1, 15);
         for week in 0.. {

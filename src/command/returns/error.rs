@@ -1,4 +1,5 @@
-//! What is wrong with a file of returns: where, what was found, and the rule that it breaks; or what it does not say.
+//! Errors of a file of returns: the position, the value found, and the rule that it breaks; or the information that is
+//! missing.
 
 use std::path::PathBuf;
 
@@ -30,7 +31,8 @@ pub enum ReturnsError {
 }
 
 impl ReturnsError {
-    /// Each question, and the options of the command that answer it; `needs_year` if they leave open what a period is.
+    /// Returns each question with the options of the command that answer it; `needs_year` if they leave the length of a
+    /// period open.
     pub fn asked(questions: &[Question], needs_year: bool) -> Self {
         let mut lines = Vec::new();
         for Question { question, options, .. } in questions {
@@ -47,7 +49,7 @@ impl ReturnsError {
     }
 }
 
-/// Choices as the options that make them, as a shell takes them.
+/// Formats choices as the options that make them, quoted for a shell.
 fn flags(choices: &Choices) -> String {
     let flag = |(name, value): (&String, &Value)| match value {
         Value::Array(columns) => columns.iter().map(|column| option("column", column)).collect::<Vec<_>>().join(" "),
@@ -62,7 +64,7 @@ fn flags(choices: &Choices) -> String {
 fn option(name: &str, value: &Value) -> String {
     let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     let is_plain = |letter: char| letter.is_alphanumeric() || "-_./:,%+=@".contains(letter);
-    // A value that begins with a hyphen would be an option of its own.
+    // A value that begins with a hyphen would be read as an option.
     let equals = if value.starts_with('-') { '=' } else { ' ' };
     if !value.is_empty() && value.chars().all(is_plain) {
         return format!("--{name}{equals}{value}");

@@ -17,7 +17,7 @@ fn the_bundled_file_is_whole() {
     assert_eq!(message, "240 months before 1927-01 are wanted: the file holds 6");
 }
 
-/// What is read otherwise than as fractions in a column is told so.
+/// Checks that the sentence reports every column that is not read as fractions.
 #[test]
 fn the_sentence_says_what_was_read() {
     for (text, said) in [
@@ -93,7 +93,7 @@ fn a_frequency_that_the_dates_do_not_say_is_an_option() {
 
 const YEAR: &str = "\n  with --periods-per-year, such as 12, as the dates do not say what a period is";
 
-/// What is printed can be typed: in quotes if a shell would part it.
+/// Checks that printed options can be typed: they are quoted if a shell would split them.
 #[test]
 fn an_option_is_printed_as_a_shell_takes_it() {
     let text = "date,S&P 500,Investor's own\n2020-01,0.01,0.02\n2020-02,-0.01,0.01\n2020-03,0.02,-0.03\n";
@@ -120,13 +120,13 @@ fn the_bank_is_a_column_or_an_option_and_never_left_out() {
     let reason =
         "\nColumn rf is not used: line 3: rf is \"2.1\": must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %.";
     assert!(percent.starts_with("the file does not say what the bank pays") && percent.ends_with(reason), "{percent}");
-    // What the bank paid before the first return is not asked.
+    // The bank's interest before the first return is not needed.
     assert!(read("date,close,rf\n2007-12,100,\n2008-01,101,0.002\n2008-02,102,0.002\n").is_ok());
     let option = Returns::parse(&file(",rf"), &Choices::default(), Some(f64::NAN), None).unwrap_err().to_string();
     assert_eq!(option, "--rate is NaN: must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %");
 }
 
-/// +1 % and -1 % by turns: mean 0, and a sample deviation of 0.01 sqrt(4/3) over four of them.
+/// Alternates +1 % and -1 %: mean 0, and a sample deviation of 0.01 sqrt(4/3) over four of them.
 #[test]
 fn figures_of_a_year_count_the_periods_of_the_frequency() {
     let file = |dates: [&str; 4]| {

@@ -12,9 +12,8 @@ use crate::control::evaluation::yearly_worth::CONFIDENCE;
 use crate::control::policy::advice::AdviceSource;
 use crate::numerics::digits::{fixed, signed};
 
-/// Fewer years say too little about the next one. A crash that comes once in ten years is missing from 35 % of the
-/// records of ten years, 12 % of those of twenty and 4 % of those of thirty. An interval counts only what is in the
-/// record.
+/// Fewer years say too little about the next one. A crash that comes once in ten years is missing from 35 % of ten-year
+/// records, 12 % of twenty-year ones and 4 % of thirty-year ones. An interval counts only what is in the record.
 const FEWEST_YEARS: usize = 30;
 /// A hundredth of a millionth of the initial wealth: a smaller difference is rounding.
 const ROUNDING: f64 = 1e-6;

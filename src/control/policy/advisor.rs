@@ -25,9 +25,9 @@ const PROMPT_COST: usize = 1 << 20;
 /// How an allocation is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AdviceMode {
-    /// From the policy surrogate, or by re-solving if the state lies outside the design.
+    /// Read from the policy surrogate, or re-solved if the state lies outside the design.
     Surrogate,
-    /// By solving the robust step at the exact state with the value surrogate of the next step.
+    /// Solved as the robust step at the exact state with the value surrogate of the next step.
     Resolve,
 }
 

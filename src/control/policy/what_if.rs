@@ -1,4 +1,4 @@
-//! What-if advice: for another wealth, another holding, another radius, another return.
+//! Hypothetical advice: for another wealth, another holding, another radius, another return.
 
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};

@@ -6,7 +6,8 @@ use ballast::control::policy::levels::{LevelAdvised, LevelsAdvised, WhyNothing};
 
 use super::percent;
 
-/// What a record paid beyond the bank, how well that is known, what the caution leaves of it, and what half of it would hold.
+/// Describes the record's mean return beyond the bank, its standard error, what the caution leaves of it, and the
+/// allocation at half the caution.
 pub fn why_nothing(record: &str, why: &WhyNothing, noun: &str) -> String {
     let [seen, error] = [why.premium_seen, why.standard_error].map(|premium| percent(premium.abs(), 2));
     let text = match why.premium_seen > 0.0 {
@@ -24,7 +25,7 @@ pub fn why_nothing(record: &str, why: &WhyNothing, noun: &str) -> String {
     if second.is_empty() { text } else { format!("{text}\n{}", second.join(" ")) }
 }
 
-/// What the level followed costs and spares in a year of so many periods, and what the others would.
+/// Describes the yearly cost and gain of the level followed and of the others, with `periods` periods in a year.
 pub fn told(levels: &LevelsAdvised, periods: f64) -> String {
     let a_year = |loss: f64| format!("{:.2} %", 100.0 * periods * loss.max(0.0));
     let mut text = String::new();
@@ -88,7 +89,7 @@ mod tests {
             ],
         };
         let told = told(&levels, 12.0);
-        // A regret of 0.0003 a month is 0.36 % a year, 0.0004 are 0.48 %.
+        // A regret of 0.0003 per month is 0.36 % per year, and 0.0004 is 0.48 %.
         assert!(told.contains("20 % of the radius") && told.contains("0.36 %") && told.contains("0.48 %"), "{told}");
         let line = told.lines().find(|line| line.contains("balanced  ")).unwrap();
         assert!(line.ends_with('<') && line.contains("60.0 %") && line.contains("0.12 %"), "{told}");

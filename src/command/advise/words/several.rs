@@ -6,7 +6,7 @@ use ballast::service::advise_assets::AssetsAdvised;
 
 use super::{caution, money, percent};
 
-/// What to hold of each, and what that rests on.
+/// Describes what to hold of each asset, and the basis of the advice.
 pub fn told_of_several(advised: &AssetsAdvised, wealth: f64, noun: &str, periods: f64) -> String {
     let advice = &advised.advice;
     let total = percent(advice.total, 1);

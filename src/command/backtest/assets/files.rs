@@ -20,7 +20,8 @@ pub fn strategies(report: &AssetsBacktestReport) -> String {
     figures(report.strategies.iter().map(of))
 }
 
-/// One line a period and strategy, with a column for what is held of each asset; wealth and drawdown at its end.
+/// Returns one line per period and strategy, with a column for the holding of each asset; wealth and drawdown at its
+/// end.
 pub fn periods(shown: &Shown) -> String {
     let assets = &shown.report.assets;
     let header = ["date", "strategy", "allocation", "radius", "traded", "wealth", "drawdown"];

@@ -32,7 +32,7 @@ pub enum Rule {
     MinimumVariance,
     /// All wealth, in inverse proportion to the deviations of the returns.
     InverseVolatility,
-    /// The same share in every asset.
+    /// An equal share in every asset.
     Equal {
         /// Share in all assets together.
         share: f64,
