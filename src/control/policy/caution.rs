@@ -29,7 +29,8 @@ pub enum CautionCode {
     /// Without one of its returns the advice would move by more than half of the action interval, or between the bank
     /// alone and holding something. Reported if the sensitivity is requested.
     OneReturn,
-    /// The search for the best allocation of several assets ended before its two bounds met within a hundredth of a basis point.
+    /// The search for the best allocation of several assets ended before its two bounds met within a hundredth of a
+    /// basis point.
     NotCertified,
     /// The next policy is not ready yet, and the one before it advises.
     Waiting,

@@ -101,7 +101,7 @@ impl AssetsRecord {
 }
 
 impl AssetsChoices {
-    /// Returns the default choices for a record of `found` periods with so many periods in a year. The windows are
+    /// Returns the default choices for a record of `found` periods with `periods_per_year` in a year. The windows are
     /// those that leave one year of the record, or else half of it.
     pub fn usual(periods_per_year: usize, found: usize) -> Self {
         let long = WINDOW_YEARS.map(|years| years * periods_per_year);
