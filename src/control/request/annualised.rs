@@ -1,4 +1,4 @@
-//! Rates and returns by the year.
+//! Annual rates and returns.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -7,19 +7,21 @@ use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::moments::CentralMoments;
 
-/// The problem's rate and record by the year, with p periods in one. Fractions, each at most the largest double.
+/// Annual rate and returns of a problem, with p periods in a year. All are fractions, capped at the largest double.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Annualised {
-    /// What the bank pays, compounded: `(1 + r)^p - 1`.
+    /// Annual return of the bank, compounded: `(1 + r)^p - 1`.
     pub rate: f64,
-    /// What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history.
+    /// Annual return of the asset, compounded: `m^p - 1`, with m the mean of `e^z` over the log-returns z of the
+    /// history.
     pub mean_return: f64,
-    /// Standard deviation of the history's simple returns, a sample's, of independent periods: `sqrt(p)` times that of one.
+    /// Annual standard deviation of the history's simple returns, for independent periods: `sqrt(p)` times the sample
+    /// standard deviation of one period.
     pub deviation: f64,
 }
 
 impl ProblemSpecification {
-    /// By the year, where it is said how many periods that has. Cost O(n ln n) for n returns.
+    /// Returns the annual figures if the number of periods in a year is given. Cost O(n ln n) for n returns.
     ///
     /// Checked by: `a_year_of_known_periods_is_what_its_prices_say`.
     pub fn annualised(&self) -> Option<Annualised> {
@@ -33,23 +35,24 @@ impl ProblemSpecification {
         })
     }
 
-    /// Mean of the history's simple returns, `e^z - 1`, of one period.
+    /// Returns the mean of the history's simple returns, `e^z - 1`, for one period.
     pub fn mean_return(&self) -> f64 {
         self.history.iter().map(|z| z.exp_m1()).sum::<f64>() / self.history.len() as f64
     }
 
-    /// Standard deviation of the history's log-returns, of one period, with the divisor n.
+    /// Returns the standard deviation of the history's log-returns, for one period, with the divisor n.
     pub fn deviation(&self) -> f64 {
         deviation(&self.history)
     }
 }
 
-/// Standard deviation of returns, with the divisor n.
+/// Returns the standard deviation of returns, with the divisor n.
 pub fn deviation(log_returns: &[f64]) -> f64 {
     CentralMoments::of(&EmpiricalDistribution::new(log_returns)).variance().sqrt()
 }
 
-/// Mean of simple returns `e^z - 1` beyond the bank's, and its standard error `s / sqrt(n)`, s the sample deviation.
+/// Returns the mean of the simple returns `e^z - 1` in excess of the bank's, and its standard error `s / sqrt(n)`, with
+/// s the sample standard deviation.
 ///
 /// Checked by: `a_premium_and_its_error_by_hand`.
 pub fn premium(log_returns: &[f64], rate: f64) -> (f64, f64) {
@@ -60,7 +63,7 @@ pub fn premium(log_returns: &[f64], rate: f64) -> (f64, f64) {
     (mean - rate, (square / count).sqrt())
 }
 
-/// A simple return earned `periods` times over.
+/// Returns a simple return compounded over `periods` periods.
 pub fn compounded(simple_return: f64, periods: f64) -> f64 {
     (periods * simple_return.ln_1p()).exp_m1().min(f64::MAX)
 }
@@ -69,22 +72,24 @@ pub fn compounded(simple_return: f64, periods: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Of 0.2 and -0.1 the mean is 0.05, and the squares about it sum to 0.045: the sample variance, of which half is under the root.
+    /// The mean of 0.2 and -0.1 is 0.05, and the squares about it sum to 0.045. This is the sample variance; half of it
+    /// is under the root.
     #[test]
     fn a_premium_and_its_error_by_hand() {
         let (premium, error) = premium(&[1.2_f64.ln(), 0.9_f64.ln()], 0.01);
         assert!((premium - 0.04).abs() < 1e-15 && (error - 0.0225_f64.sqrt()).abs() < 1e-15);
     }
 
-    /// Prices that go up by a fifth or down by a tenth, each half of the time: 5 % on average. In two periods wealth grows by
-    /// 1.05^2, the bank's by 1.01^2; a return lies 15 % off its mean, so that a sample of two deviates by sqrt(2) as much.
+    /// Prices rise by a fifth or fall by a tenth, each half of the time: 5 % on average. In two periods wealth grows by
+    /// 1.05^2, and in the bank by 1.01^2. Each return lies 15 % from the mean, so the sample deviation of two is
+    /// sqrt(2) times as large.
     #[test]
     fn a_year_of_known_periods_is_what_its_prices_say() {
         let mut problem = ProblemSpecification::of(vec![1.2_f64.ln(), 0.9_f64.ln()], 0.01);
         assert_eq!(problem.annualised(), None);
         problem.periods_per_year = Some(2.0);
         let Annualised { rate, mean_return, deviation } = problem.annualised().unwrap();
-        // Roundings of numbers near 1.
+        // Rounding of numbers near 1.
         assert!((rate - 0.0201).abs() < 1e-15 && (mean_return - 0.1025).abs() < 1e-15, "{rate} {mean_return}");
         assert!((deviation - 0.3).abs() < 1e-15, "{deviation}");
     }

@@ -1,4 +1,4 @@
-//! A question about several assets: what is known of their returns, and how far the adversary may move them.
+//! A request about several assets: what is known of their returns, and how far the adversary may move them.
 
 use std::collections::BTreeSet;
 
@@ -20,70 +20,75 @@ use crate::control::error::FieldError;
 use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
 
-/// Assets at most.
+/// Largest number of assets.
 pub const MOST_ASSETS: usize = 30;
-/// Assets of a question.
+/// Allowed number of assets in a request.
 pub const ASSETS: std::ops::RangeInclusive<usize> = 2..=MOST_ASSETS;
-/// Dates of a history: so many of the most assets are some seconds of search.
+/// Allowed number of dates in a history. The most dates of the most assets take some seconds of search.
 pub const DATES: std::ops::RangeInclusive<usize> = 2..=2000;
-/// Characters of the name of an asset.
+/// Allowed number of characters in an asset's name.
 pub const NAME_LENGTH: std::ops::RangeInclusive<usize> = 1..=100;
 
-/// What is known of several assets, and the investor who may hold them.
+/// The investor, several assets, and what is known of their returns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetsProblem {
-    /// Names of the assets, each another, in the order of the columns of `history`.
+    /// Names of the assets, 2 to 30, all different, in the order of the columns of `history`.
     #[schema(example = json!(["stocks", "bonds"]))]
     pub assets: Vec<String>,
-    /// What moving a law costs the adversary.
+    /// Distance that sets the adversary's cost of moving a law. Default: `scaled_one`.
     #[serde(default)]
     pub ground_norm: GroundNorm,
-    /// How the shares of the assets in what is held are chosen, period after period.
+    /// How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`.
     #[serde(default)]
     pub composition: CompositionRule,
-    /// Number of decisions that a policy is trained for. Default: 10 of a policy, 1 of an advice.
+    /// Number of allocation decisions that a policy is trained for, 1 to 520. Default: 10 for a policy; always 1 for
+    /// advice.
     #[serde(default)]
     pub horizon: Option<usize>,
-    /// Bank return per step, as a fraction.
+    /// Return of the bank per step, as a fraction, -0.5 to 0.5.
     pub rate_per_step: f64,
-    /// Periods of the history in a year: what is said a year is said with it. It changes no advice.
+    /// Number of periods of the history in a year, 1 to 366. It is used for annual figures and does not change the
+    /// advice.
     #[serde(default)]
     pub periods_per_year: Option<f64>,
-    /// Wealth, in any currency.
+    /// Initial wealth, in any currency, 1e-6 to 1e15. Default 100.
     #[serde(default = "defaults::initial_wealth")]
     pub initial_wealth: f64,
-    /// Share of wealth that may be held in all assets together: `[0, highest]`.
+    /// Share of wealth that may be held in all assets together: `[0, highest]`. Default: `[0, 1]`.
     #[serde(default = "defaults::action_interval")]
     pub action_interval: [f64; 2],
-    /// Lost of what is moved between the bank and any asset, as a share of it. An advice takes it under power and log utility.
+    /// Cost of moving money between the bank and any asset, as a share of the amount moved, 0 to 0.1. Default 0. Advice
+    /// accepts a cost under power and log utility only.
     #[serde(default)]
     pub trading_cost: f64,
-    /// Money added at the end of each period, withdrawn where it is negative; none of an advice.
+    /// Money added at the end of each period, or withdrawn if negative. Default 0. Advice accepts no other value.
     #[serde(default)]
     pub contributions: Contributions,
-    /// Relative risk aversion, in the place of `utility`: log utility at 1, power utility above.
+    /// Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub risk_aversion: Option<f64>,
-    /// Of wealth at the horizon. Default: power utility, risk aversion 3.
+    /// Utility of wealth at the horizon. Default: power utility with risk aversion 3.
     #[serde(default = "UtilitySpecification::not_given")]
     pub utility: UtilitySpecification,
-    /// Default: `bridge`. That of the fund of inverse volatilities, made wide enough for all funds at once.
+    /// Radius rule of the inverse-volatility fund; its radius is then widened to cover all funds at once. Default:
+    /// `bridge`.
     #[serde(default)]
     pub radius: Option<RadiusRule>,
-    /// The share of the radius that is acted on, found for the fund of inverse volatilities. Default: as of one asset.
+    /// Share of the radius that is used, found for the inverse-volatility fund. Default: `balanced`, or `paper` if a
+    /// `radius` is given.
     #[serde(default)]
     pub caution: Option<CautionLevel>,
-    /// The log-returns of each asset that the adversary may use. Default: as of one asset.
+    /// The log-returns of each asset that the adversary may use. Default: `worst_seen`.
     #[serde(default)]
     pub support: Option<Support>,
-    /// Log-returns, date by date, oldest first; each date has one for each asset.
+    /// Log-returns by date, oldest first, 2 to 2000 dates; each date has one value for each asset.
     pub history: Vec<Vec<f64>>,
 }
 
 impl AssetsProblem {
-    /// The problem of the fund of inverse volatilities, for one period: rate, utility and radius are checked and completed there,
-    /// and its radius is what that of all funds is a multiple of.
+    /// Returns the one-period problem of the inverse-volatility fund. Its rate, utility and radius are checked and
+    /// completed here. The radius for all funds is a multiple of its radius.
     ///
     /// # Errors
     /// A field breaks a rule.
@@ -104,7 +109,7 @@ impl AssetsProblem {
         Specification::of(ProblemSpecification { horizon: 1, ..self.of_fund() }, seed).completed()
     }
 
-    /// The investor with the fund of inverse volatilities as his one asset.
+    /// Returns the investor's problem with the inverse-volatility fund as the only asset.
     pub fn of_fund(&self) -> ProblemSpecification {
         let returns = fund_returns(&self.history, &inverse_volatility(&self.history));
         ProblemSpecification {
@@ -123,7 +128,7 @@ impl AssetsProblem {
         }
     }
 
-    /// Checks what is said of the assets.
+    /// Checks the names, the returns and the composition of the assets.
     ///
     /// # Errors
     /// The first field that breaks a rule.
@@ -134,7 +139,7 @@ impl AssetsProblem {
     }
 }
 
-/// Checks the names of assets, in the field `named`.
+/// Checks the names of assets in the field `named`.
 ///
 /// # Errors
 /// There are too few or too many, or one breaks a rule.
@@ -154,7 +159,7 @@ pub fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
     Ok(())
 }
 
-/// Checks log-returns of assets, date by date, in the field `named`.
+/// Checks the log-returns of assets, date by date, in the field `named`.
 ///
 /// # Errors
 /// The first that breaks a rule.
@@ -191,10 +196,10 @@ pub fn check_rows(
     Ok(())
 }
 
-/// Shares that sum to 1 but for so much are taken as they are.
+/// Tolerance on the sum of given shares, which should be 1.
 const WHOLE: f64 = 1e-6;
 
-/// Checks shares that are given for so many assets, in the field `named`: as many, each a share, which sum to 1.
+/// Checks given shares in the field `named`: one for each asset, each from 0 to 1, with the sum 1.
 fn check_composition(named: &str, rule: &CompositionRule, assets: usize) -> Result<(), FieldError> {
     let CompositionRule::Given(shares) = rule else { return Ok(()) };
     let field = format!("{named}.given");
@@ -211,12 +216,12 @@ fn check_composition(named: &str, rule: &CompositionRule, assets: usize) -> Resu
     }
     Ok(())
 }
-/// Largest multiple of one fund's radius.
+/// Largest factor on the radius of one fund.
 pub const LARGEST_FACTOR: f64 = 100.0;
-/// Between a log-return of the fund and what its assets give, on another machine.
+/// Tolerance between a log-return of the fund and the one computed from its assets, possibly on another machine.
 const ROUNDING: f64 = 1e-9;
 
-/// Checks that a fund keeps the rules and that `problem` is that of its investor.
+/// Checks that a fund satisfies its rules and that `problem` is the problem of its investor.
 ///
 /// # Errors
 /// The first field that breaks a rule.

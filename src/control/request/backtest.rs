@@ -1,4 +1,4 @@
-//! The walk-forward request: the periods of a record, and how they are walked through.
+//! The walk-forward request: the periods of a record, and how the walk-forward goes through them.
 
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
@@ -15,123 +15,128 @@ use crate::control::request::rules::{
 use crate::control::request::specification::default_seed;
 use crate::control::request::support::Support;
 
-/// Periods of a record.
+/// Allowed number of periods of a record.
 pub const PERIODS: std::ops::RangeInclusive<usize> = 3..=20_000;
-/// Of a year: a day at the shortest.
+/// Allowed number of periods in a year; the shortest period is a day.
 pub const YEAR: std::ops::RangeInclusive<usize> = 1..=366;
-/// Levels; more would not be told apart on one chart.
+/// Allowed number of miscoverage levels; one chart could not show more of them distinctly.
 pub const LEVELS: std::ops::RangeInclusive<usize> = 1..=3;
-/// Miscoverages.
+/// Allowed range of a miscoverage.
 pub const ALPHA: (f64, f64) = (1e-3, 0.999);
-/// Policies trained.
+/// Largest number of policies trained.
 pub const MOST_TRAININGS: usize = 5_000;
-/// Steps of all of them.
+/// Largest number of steps of all policies together.
 pub const MOST_STEPS: usize = 200_000;
-/// Years of history that a policy is trained on.
+/// Default number of years of history that a policy is trained on.
 const WINDOW_YEARS: usize = 20;
 
-/// A walk-forward through a record of returns: every so many periods policies are trained on the window before, and lived by
-/// until the next.
+/// A walk-forward through a record of returns. At regular intervals, policies are trained on the preceding window and
+/// followed until the next training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BacktestRequest {
-    /// Of the risky asset, oldest first, none left out. Exactly one of this and `simple_returns` is given.
+    /// Log-returns of the risky asset, oldest first, without gaps: 3 to 20,000 values from -5 to 5. Exactly one of this
+    /// and `simple_returns` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_returns: Option<Vec<f64>>,
-    /// `price / previous price - 1`, likewise.
+    /// Simple returns of the risky asset, `price / previous price - 1`, oldest first, without gaps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simple_returns: Option<Vec<f64>>,
-    /// What the bank pays a period, as a fraction: one number for all, or one for each.
+    /// Return of the bank per period, as a fraction from -0.5 to 0.5: one number for all periods, or one for each.
     pub rate: Rates,
-    /// One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`. They tell the periods of a year.
+    /// Date of each period, evenly spaced: `2008-01-31`, `2008-01` or `2008`. The dates determine the number of periods
+    /// in a year.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dates: Option<Vec<String>>,
-    /// Default: what `dates` tell; required without them.
+    /// Number of periods in a year, 1 to 366. Default: derived from `dates`; required without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<usize>,
-    /// Periods of history that each policy is trained on. Default: 20 years of them, or half of a record that has no year beside.
+    /// Number of periods of history that each policy is trained on, 2 to 20,000. Default: 20 years, or half of the
+    /// record if 20 years would leave less than a year after them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<usize>,
-    /// Periods from one training to the next. Default: a year of them, at most `horizon`.
+    /// Number of periods from one training to the next, at most `horizon`. Default: one year, or `horizon` if that is
+    /// shorter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
-    /// Periods that a policy looks ahead. Default: `every`.
+    /// Number of periods that a policy looks ahead, 1 to 520. Default: `every`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub horizon: Option<usize>,
-    /// Levels of the adaptive strategies; the static one takes the second, or the only one.
+    /// Miscoverages of the adaptive strategies: 1 to 3 different numbers from 0.001 to 0.999. The static strategy uses
+    /// the second, or the only one. Default: 0.05, 0.1 and 0.5.
     #[serde(default = "defaults::alpha")]
     pub alpha: Vec<f64>,
-    /// Multiple of the radius of every ball.
+    /// Factor on the radius of every ball. Default 1.
     #[serde(default = "defaults::scale")]
     pub scale: f64,
-    /// The share of every radius that is acted on: a level is found anew for every training.
+    /// Share of every radius that is used. A named level is found again for every training. Default: `paper`.
     #[serde(default = "defaults::caution")]
     pub caution: CautionLevel,
-    /// The log-returns that the adversary may use.
+    /// The log-returns that the adversary may use. Default: `none`, which allows all.
     #[serde(default = "defaults::support")]
     pub support: Support,
-    /// What the balls are centred on, and what “Trusts the record” takes for the law.
+    /// Centre of the balls. The strategy “Trusts the record” takes it as the true law. Default: `empirical`.
     #[serde(default)]
     pub centre: CentreSpecification,
-    /// Relative: 1 is log utility.
+    /// Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3.
     #[serde(default = "defaults::risk_aversion")]
     pub risk_aversion: f64,
-    /// Lost of what is traded, as a share of it; policies are trained with it.
+    /// Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it. Default 0.
     #[serde(default)]
     pub trading_cost: f64,
-    /// Train every policy as if trading were free.
+    /// If true, every policy is trained as if trading were free. Default false.
     #[serde(default)]
     pub cost_blind: bool,
-    /// Design points per step.
+    /// Number of design points per step, 10 to 10,000. Default 100.
     #[serde(default = "defaults::count")]
     pub count: usize,
-    /// The same request and seed give the same report, bit for bit.
+    /// Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,
 }
 
-/// What the bank pays in each period.
+/// Return of the bank in each period.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(untagged, expecting = "must be a number or a list of numbers")]
 pub enum Rates {
-    /// The same in every period.
+    /// One rate for all periods.
     Each(f64),
-    /// One for each period.
+    /// One rate for each period.
     Listed(Vec<f64>),
 }
 
-/// What stands for fields that are left out.
+/// Defaults of the fields that are left out.
 pub mod defaults {
     use super::{CautionLevel, Support};
 
-    /// Levels.
+    /// Returns the default miscoverages.
     pub fn alpha() -> Vec<f64> {
         vec![0.05, 0.1, 0.5]
     }
-    /// As the bridge says.
+    /// Returns the default factor on the radius: that of the bridge, unchanged.
     pub fn scale() -> f64 {
         1.0
     }
-    /// The whole radius, as in the paper.
+    /// Returns the default caution: the whole radius, as in the paper.
     pub fn caution() -> CautionLevel {
         CautionLevel::Paper
     }
-    /// All, as in the paper.
+    /// Returns the default support: all returns, as in the paper.
     pub fn support() -> Support {
         Support::None {}
     }
-    /// Relative risk aversion.
+    /// Returns the default relative risk aversion.
     pub fn risk_aversion() -> f64 {
         3.0
     }
-    /// Design points.
+    /// Returns the default number of design points per step.
     pub fn count() -> usize {
         100
     }
 }
 
 impl Rates {
-    /// Of the period at `index`.
+    /// Returns the rate of the period at `index`.
     pub fn at(&self, index: usize) -> f64 {
         match self {
             Rates::Each(rate) => *rate,
@@ -139,10 +144,10 @@ impl Rates {
         }
     }
 
-    /// Checks that there is one for each of so many periods, and each of them.
+    /// Checks every rate, and that a list has one for each period.
     ///
     /// # Errors
-    /// A field that breaks its rule.
+    /// A field breaks its rule.
     pub fn check(&self, periods: usize) -> Result<(), FieldError> {
         match self {
             Rates::Each(rate) => within("rate", *rate, RATE.0, RATE.1),
@@ -155,12 +160,12 @@ impl Rates {
     }
 }
 
-/// So many periods where a record of `found` leaves a year beside them, else half of it.
+/// Returns `wanted` periods if a record of `found` periods leaves a year after them, else half of the record.
 pub fn usual_window(wanted: usize, found: usize, year: usize) -> usize {
     if wanted + year <= found { wanted } else { found / 2 }
 }
 
-/// Refuses a window that was asked for and leaves no year of the record to live through.
+/// Returns the error for a requested window that leaves no year of the record to walk through.
 pub fn too_long(window: usize, found: usize, year: usize) -> FieldError {
     let most = found.saturating_sub(year);
     let rule = match most {
@@ -172,16 +177,16 @@ pub fn too_long(window: usize, found: usize, year: usize) -> FieldError {
     FieldError::new("window", window, rule)
 }
 
-/// Between which returns lie, simple ones or log-returns.
+/// Returns the bounds of simple returns or of log-returns.
 pub fn bounds(are_simple: bool) -> (f64, f64) {
     let bound = rules::LOG_RETURN;
     if are_simple { ((-bound).exp_m1(), bound.exp_m1()) } else { (-bound, bound) }
 }
 
-/// How often there is a period, by its dates.
+/// Returns the frequency of the periods, from their dates.
 ///
 /// # Errors
-/// A date that is none, or that does not follow the one before.
+/// A text is not a date, or a date does not follow the one before.
 pub fn frequency(dates: &[String]) -> Result<Frequency, FieldError> {
     if let Some(index) = dates.iter().position(|text| date(text).is_none()) {
         return Err(FieldError::new(format!("dates[{index}]"), &dates[index], dates::FORM));
@@ -191,13 +196,13 @@ pub fn frequency(dates: &[String]) -> Result<Frequency, FieldError> {
     found.map_err(|wrong| FieldError::new(format!("dates[{}]", wrong.index), &dates[wrong.index], wrong.rule))
 }
 
-/// Those that are dates.
+/// Returns the dates, leaving out texts that are none.
 pub fn days(dates: &[String]) -> Vec<Date> {
     dates.iter().filter_map(|text| date(text)).collect()
 }
 
 impl BacktestRequest {
-    /// Fills the defaults that depend on other fields, and checks every rule but those of each window's training.
+    /// Fills the defaults that depend on other fields, and checks every rule except those of each window's training.
     ///
     /// # Errors
     /// The first field that breaks its rule.
@@ -232,7 +237,8 @@ impl BacktestRequest {
         Ok(self)
     }
 
-    /// The field of the returns, and what it holds; nothing is held where both or neither are given.
+    /// Returns the name of the field that holds the returns, and its values. The values are empty if both fields or
+    /// neither are given.
     pub fn returns(&self) -> (&'static str, &[f64]) {
         match (&self.log_returns, &self.simple_returns) {
             (Some(returns), None) => ("log_returns", returns),
@@ -241,25 +247,25 @@ impl BacktestRequest {
         }
     }
 
-    /// The log-return of the period at `index` of [`Self::returns`].
+    /// Returns the log-return of one of the values of [`Self::returns`].
     pub fn log_return(&self, value: f64) -> f64 {
         if self.simple_returns.is_some() { value.ln_1p() } else { value }
     }
 
-    /// Number of periods of the record.
+    /// Returns the number of periods of the record.
     pub fn period_count(&self) -> usize {
         self.returns().1.len()
     }
 
-    /// How often there is a period; `None` without dates.
+    /// Returns the frequency of the periods; `None` without dates.
     ///
     /// # Errors
-    /// A date that is none, or that does not follow the one before.
+    /// A text is not a date, or a date does not follow the one before.
     pub fn frequency(&self) -> Result<Option<Frequency>, FieldError> {
         self.dates.as_deref().map(frequency).transpose()
     }
 
-    /// The dates that are dates.
+    /// Returns the dates, leaving out texts that are none.
     pub fn days(&self) -> Vec<Date> {
         days(self.dates.as_deref().unwrap_or_default())
     }
@@ -300,7 +306,7 @@ impl BacktestRequest {
     }
 
     fn check_size(&self, every: usize, horizon: usize, window: usize) -> Result<(), FieldError> {
-        // At each level, cost-blind, static and plug-in.
+        // One adaptive strategy for each level, then cost-blind, static and plug-in.
         let strategies = self.alpha.len() + 3;
         let trainings = (self.period_count() - window).div_ceil(every).saturating_mul(strategies);
         if trainings > MOST_TRAININGS {
@@ -315,8 +321,10 @@ impl BacktestRequest {
     }
 }
 
+/// Checks that a list is as long as the record.
+///
 /// # Errors
-/// A list that is not as long as the record.
+/// The list has another length.
 pub fn same_length(field: &str, found: usize, wanted: usize) -> Result<(), FieldError> {
     if found == wanted {
         return Ok(());

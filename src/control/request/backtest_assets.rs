@@ -1,4 +1,4 @@
-//! The walk-forward request of several assets: a table of returns, and how it is walked through.
+//! The walk-forward request for several assets: a table of returns, and how the walk-forward goes through it.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -13,62 +13,65 @@ use super::specification::default_seed;
 use super::support::Support;
 use crate::control::error::FieldError;
 
-/// Log-returns that all one-step problems of a walk together read: some hours of two cores.
+/// Limit on the log-returns that all one-step problems of a walk-forward read: some hours on two cores.
 pub const MOST_READ: usize = 1_000_000_000;
-/// Shares that all strategies together hold: a report of some forty megabytes.
+/// Limit on the shares that all strategies together hold: a report of some forty megabytes.
 pub const MOST_HELD: usize = 2_000_000;
 
-/// A walk-forward through a record of several assets, by the one-step problem and by rules that people use.
+/// A walk-forward through a record of several assets. It compares the one-step problem with rules that people use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetsBacktestRequest {
-    /// Names of the assets, each another, in the order of the columns.
+    /// Names of the assets, 2 to 30, all different, in the order of the columns.
     #[schema(example = json!(["stocks", "bonds"]))]
     pub assets: Vec<String>,
-    /// Of the assets, date by date, oldest first, none left out. Exactly one of this and `simple_returns` is given.
+    /// Log-returns of the assets, oldest first, without gaps; each period has one value for each asset. Exactly one of
+    /// this and `simple_returns` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_returns: Option<Vec<Vec<f64>>>,
-    /// `price / previous price - 1`, likewise.
+    /// Simple returns of the assets, `price / previous price - 1`, in the same layout as `log_returns`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simple_returns: Option<Vec<Vec<f64>>>,
-    /// What the bank pays a period, as a fraction: one number for all, or one for each.
+    /// Return of the bank per period, as a fraction from -0.5 to 0.5: one number for all periods, or one for each.
     pub rate: Rates,
-    /// One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`.
+    /// Date of each period, evenly spaced: `2008-01-31`, `2008-01` or `2008`.
     pub dates: Vec<String>,
-    /// Default: what `dates` tell.
+    /// Number of periods in a year, 1 to 366. Default: derived from `dates`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<usize>,
-    /// How many of the last periods strategies know; null is all since the first. Default: 10 years, 20 years and all.
+    /// Numbers of most recent periods that strategies know; null stands for all periods since the first. Default: 10
+    /// years, 20 years and all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub windows: Option<Vec<Option<usize>>>,
-    /// Periods from one measuring of the radius, and one choice of the static strategy, to the next. Default: a year of them.
+    /// Number of periods between estimates of the radius, and between choices of the static strategy. Default: one
+    /// year.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
-    /// Miscoverage of the radius. Default: 0.1.
+    /// Miscoverage of the radius, 0.001 to 0.999: the probability that the ball misses the true law. Default 0.1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<f64>,
-    /// The log-returns of each asset that the adversary may use.
+    /// The log-returns of each asset that the adversary may use. Default: `worst_seen`.
     #[serde(default)]
     pub support: Support,
-    /// Relative: 1 is log utility.
+    /// Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3.
     #[serde(default = "defaults::risk_aversion")]
     pub risk_aversion: f64,
-    /// Lost of what is traded, as a share of it; no strategy knows of it.
+    /// Trading cost, as a share of the amount traded, 0 to 0.1. No strategy takes it into account. Default 0.
     #[serde(default)]
     pub trading_cost: f64,
-    /// The same request and seed give the same report, bit for bit.
+    /// Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,
 }
 
-/// A walk-forward of one asset, or of several, which `assets` names.
+/// A walk-forward of one asset, or of several assets if the request has the field `assets`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 #[allow(clippy::large_enum_variant)]
 pub enum BacktestQuestion {
-    /// One, which may be held beside the bank.
+    /// One asset, which may be held beside the bank.
     Asset(BacktestRequest),
-    /// Several.
+    /// Several assets.
     Assets(AssetsBacktestRequest),
 }
 
@@ -84,7 +87,8 @@ impl<'de> Deserialize<'de> for BacktestQuestion {
 }
 
 impl AssetsBacktestRequest {
-    /// The field of the returns, and what it holds; nothing is held where both or neither are given.
+    /// Returns the name of the field that holds the returns, and its values. The values are empty if both fields or
+    /// neither are given.
     pub fn returns(&self) -> (&'static str, &[Vec<f64>]) {
         match (&self.log_returns, &self.simple_returns) {
             (Some(returns), None) => ("log_returns", returns),
@@ -93,7 +97,7 @@ impl AssetsBacktestRequest {
         }
     }
 
-    /// The log-returns, date by date.
+    /// Returns the log-returns, date by date.
     pub fn log_rows(&self) -> Vec<Vec<f64>> {
         let rows = self.returns().1.iter();
         match self.simple_returns {
@@ -102,7 +106,7 @@ impl AssetsBacktestRequest {
         }
     }
 
-    /// Checks the record as it is given; how often it has a period, and how many of them make a year.
+    /// Checks the record as it is given. Returns its frequency and the number of periods in a year.
     ///
     /// # Errors
     /// The first field that breaks its rule.

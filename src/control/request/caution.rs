@@ -1,34 +1,36 @@
-//! How much of the statistical doubt an investor acts on.
+//! How much of the statistical uncertainty an investor acts on.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The share of the radius that is acted on: a level by its name, or a number.
+/// Share of the radius that is used: a named level, or a number. `bold`, `balanced` and `cautious` are found by
+/// simulation in three worlds: with no premium, with half of it, and with the whole of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CautionLevel {
-    /// The whole radius: the paper's.
+    /// The whole radius, as in the paper.
     Paper,
-    /// The share of least worst regret, where regret counts twice if the record is true.
+    /// The share with the least worst regret, with double regret in the world with the whole premium.
     Bold,
-    /// The share of least worst regret.
+    /// The share with the least worst regret over the three worlds.
     Balanced,
-    /// The share of least worst regret, where regret counts twice if there is no premium.
+    /// The share with the least worst regret, with double regret in the world without a premium.
     Cautious,
-    /// This share, whatever is seen: 0 takes the record for the truth.
+    /// A fixed share, from 0 to 10, independent of the record. At 0 the record is taken as the true law.
     Scale(f64),
 }
 
 impl CautionLevel {
-    /// The levels that are found, from the boldest.
+    /// The levels that are found from the record, the boldest first.
     pub const FOUND: [CautionLevel; 3] = [CautionLevel::Bold, CautionLevel::Balanced, CautionLevel::Cautious];
 
-    /// Whether its share follows from the record.
+    /// Returns true if the share follows from the record.
     pub fn is_found(self) -> bool {
         CautionLevel::FOUND.contains(&self)
     }
 
-    /// Of the radius, where these levels were found; a level that was not is the whole of it.
+    /// Returns the share of the radius, given the levels that were found. A level that was not found is the whole
+    /// radius.
     pub fn share(self, found: Option<&CautionLevels>) -> f64 {
         match self {
             CautionLevel::Paper => 1.0,
@@ -37,7 +39,7 @@ impl CautionLevel {
         }
     }
 
-    /// As on the wire.
+    /// Returns the name used in requests.
     pub fn name(self) -> &'static str {
         match self {
             CautionLevel::Paper => "paper",
@@ -49,43 +51,43 @@ impl CautionLevel {
     }
 }
 
-/// The shares of the radius that the levels act on, and what each costs, found from the record.
+/// The share of the radius at each level and its cost, found from the record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CautionLevels {
-    /// Mean simple returns beyond the bank, per step, that the three worlds are supposed to have: none, half, and one of the
-    /// premium seen, or 0 where it is negative, plus its standard error.
+    /// Mean simple return in excess of the bank, per step, in each of the three worlds: none, half, and the whole of a
+    /// premium. That premium is the premium seen, or 0 if that is negative, plus its standard error.
     pub premiums: [f64; 3],
-    /// Premium seen: the mean simple return of the record beyond the bank, per step.
+    /// Premium seen: the mean simple return of the record in excess of the bank, per step.
     pub premium_seen: f64,
-    /// Its standard error.
+    /// Standard error of the premium seen.
     pub standard_error: f64,
-    /// Least worst regret, double regret in the world of the whole premium.
+    /// The level `bold`: least worst regret, with double regret in the world with the whole premium.
     pub bold: CautionScale,
-    /// Least worst regret.
+    /// The level `balanced`: least worst regret.
     pub balanced: CautionScale,
-    /// Least worst regret, double regret in the world without a premium.
+    /// The level `cautious`: least worst regret, with double regret in the world without a premium.
     pub cautious: CautionScale,
-    /// The whole radius.
+    /// The level `paper`: the whole radius.
     pub paper: CautionScale,
 }
 
-/// A share of the radius and its price in the three worlds. Losses are in log certainty equivalent per step.
+/// A share of the radius and its cost in the three worlds. Losses are in log certainty equivalent per step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CautionScale {
     /// Share of the radius.
     pub scale: f64,
-    /// Its standard error, of the simulation of records.
+    /// Standard error of the share, from the simulation of records.
     pub standard_error: f64,
-    /// Loss beside the best share in each of the three worlds: without a premium, with half, and with the whole.
+    /// Loss relative to the best share in each of the three worlds: without a premium, with half, and with the whole.
     pub regrets: [f64; 3],
-    /// Spared beside taking the record for the truth, in the world without a premium.
+    /// Loss avoided relative to taking the record as the true law, in the world without a premium.
     pub spared: f64,
 }
 
 impl CautionLevels {
-    /// That of a level, where it is among these.
+    /// Returns the share and cost of a level, if it is among these.
     pub fn of(&self, level: CautionLevel) -> Option<CautionScale> {
         match level {
             CautionLevel::Paper => Some(self.paper),
@@ -97,5 +99,5 @@ impl CautionLevels {
     }
 }
 
-/// A share of the radius at most.
+/// Largest share of the radius.
 pub const LARGEST_SCALE: f64 = 10.0;

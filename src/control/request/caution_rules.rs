@@ -1,4 +1,4 @@
-//! What a problem says of caution and of the returns that are thought possible, and the rules of both.
+//! The caution level and the support of a problem, and the rules of both.
 
 use super::caution::{CautionLevel, LARGEST_SCALE};
 use super::radius_rule::RadiusRule;
@@ -8,14 +8,14 @@ use super::support::{FACTOR, Interval, LIMIT, Support};
 use crate::control::error::FieldError;
 
 impl ProblemSpecification {
-    /// The level given, or the default: the paper's where a radius is given, else `balanced`; `None` where there is no ball of which
-    /// to take a share.
+    /// Returns the level given, or the default: `paper` if a radius is given, else `balanced`. Returns `None` if the
+    /// framework has no ball.
     pub fn caution_level(&self) -> Option<CautionLevel> {
         let usual = if self.radius.is_some() { CautionLevel::Paper } else { CautionLevel::Balanced };
         self.framework.has_ball().then(|| self.caution.unwrap_or(usual))
     }
 
-    /// The same problem at the paper's caution, with every return possible, where neither is given.
+    /// Sets the paper's caution and allows every return, unless the problem gives its own values.
     #[must_use]
     pub fn as_in_the_paper(mut self) -> Self {
         self.caution.get_or_insert(CautionLevel::Paper);
@@ -23,13 +23,13 @@ impl ProblemSpecification {
         self
     }
 
-    /// Whether levels can be found: of a ball whose radius is that of the bridge.
+    /// Returns true if levels can be found: the problem has a ball, and its radius rule is `bridge` or `calibrated`.
     pub fn takes_levels(&self) -> bool {
         matches!(self.radius_rule(), RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. })
             && self.caution_level().is_some()
     }
 
-    /// The radius rule with the share of its radius that is acted on.
+    /// Returns the radius rule, scaled by the share of the radius that is used.
     pub fn radius_in_force(&self) -> RadiusRule {
         let level = self.caution_level().unwrap_or(CautionLevel::Paper);
         self.radius_rule().scaled(level.share(self.levels.as_deref()))
@@ -50,10 +50,10 @@ impl ProblemSpecification {
         seen.try_for_each(|(index, z)| check_within(given, || format!("problem.history[{index}]"), *z))
     }
 
-    /// Checks the level.
+    /// Checks the caution level.
     ///
     /// # Errors
-    /// It is out of its bounds, or there is nothing of which to take a share.
+    /// It is out of its bounds, or there is no radius of which to use a share.
     pub fn check_caution(&self) -> Result<(), FieldError> {
         if let Some(levels) = &self.levels {
             let scales = [levels.bold, levels.balanced, levels.cautious, levels.paper].map(|level| level.scale);
@@ -72,10 +72,10 @@ impl ProblemSpecification {
     }
 }
 
-/// Checks the numbers of a support, in the field `named`.
+/// Checks the numbers of a support in the field `named`.
 ///
 /// # Errors
-/// The first that breaks its rule.
+/// The first number that breaks its rule.
 pub fn check_support(named: &str, support: Support) -> Result<(), FieldError> {
     match support {
         Support::WorstSeen { factor } => rules::within(&format!("{named}.factor"), factor, FACTOR.0, FACTOR.1),
@@ -84,7 +84,7 @@ pub fn check_support(named: &str, support: Support) -> Result<(), FieldError> {
     }
 }
 
-/// Checks that a return lies within what is given, where bounds are; `field` names it.
+/// Checks that a return lies within the given bounds, if there are any; `field` names it.
 ///
 /// # Errors
 /// It lies outside.

@@ -1,40 +1,40 @@
-//! What a ball of laws is centred on.
+//! The centre of a ball of laws.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::request::sampling_law::SamplingLaw;
 
-/// The law in the middle of the ball, made of the law of the returns seen: those of the history and those seen after it alike.
+/// The centre of the ball of laws, built from the returns seen: those of the history and those seen later.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum CentreSpecification {
-    /// The law of the returns seen.
+    /// The empirical law of the returns seen.
     Empirical {},
-    /// The perturbed empirical law: that of a return seen plus a normal error. Its radius is that of the returns seen, of which
-    /// smoothing makes no more.
+    /// The perturbed empirical law: a return seen plus a normal error. Its radius is that of the returns seen, because
+    /// smoothing does not add returns.
     Smoothed {
-        /// Standard deviation of the error, in log-return. 0 is `empirical`.
+        /// Standard deviation of the error, in log-return, 0 to 1. At 0 the centre is that of `empirical`.
         bandwidth: f64,
     },
-    /// The law of the returns seen, each brought to the volatility that is expected for the coming period: of an exponentially
-    /// weighted mean of squares. Of a static ball, or for one period: what a return yet to come does to the volatility is no part of
-    /// a state.
+    /// The law of the returns seen, each rescaled to the volatility expected for the coming period. That volatility is
+    /// estimated by an exponentially weighted mean of squares. This needs the framework `static` or one period, because
+    /// the effect of later returns on the volatility is not part of a state.
     VolatilityScaled {
-        /// Periods in which the weight of a square halves.
+        /// Number of periods in which the weight of a square halves, 1 to 1e15.
         half_life: f64,
     },
-    /// The law of the returns seen, mixed with one that counts as so many more. Exactly one of `law` and `history` is given. With n
-    /// returns seen the radius is theirs times n / (n + weight): the ball allows for what they may miss. That returns are drawn from
-    /// the law given is the user's assumption, and the ball does not allow for its error.
+    /// The law of the returns seen, mixed with an assumed law that counts as additional returns. Exactly one of `law`
+    /// and `history` is given. With n returns seen the radius is theirs times n / (n + weight): the ball allows for
+    /// what they may miss. The assumed law is the user's assumption, and the ball does not allow for its error.
     Mixed {
-        /// As a formula. `bootstrap` is refused: what the returns seen say is counted already.
+        /// The assumed law as a formula. `bootstrap` is rejected, because the returns seen are already counted.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         law: Option<SamplingLaw>,
-        /// As log-returns, all of the same weight: of another market, or of a longer record.
+        /// The assumed law as log-returns of equal weight, from another market or a longer record: 2 to 20,000 values.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         history: Option<Vec<f64>>,
-        /// Returns that the law given counts as. 0 is `empirical`.
+        /// Number of returns that the assumed law counts as, 0 to 1,000,000. At 0 the centre is that of `empirical`.
         weight: f64,
     },
 }
@@ -46,7 +46,7 @@ impl Default for CentreSpecification {
 }
 
 impl CentreSpecification {
-    /// As the wire names it.
+    /// Returns the name used in requests.
     pub fn name(&self) -> &'static str {
         match self {
             CentreSpecification::Empirical {} => "empirical",
@@ -56,17 +56,17 @@ impl CentreSpecification {
         }
     }
 
-    /// Whether it is named `empirical`.
+    /// Returns true if the centre is named `empirical`.
     pub fn is_empirical(&self) -> bool {
         *self == CentreSpecification::Empirical {}
     }
 
-    /// Whether it takes the order of returns, which the law of those seen does not keep.
+    /// Returns true if the centre depends on the order of the returns, which the law of the returns seen does not keep.
     pub fn takes_order(&self) -> bool {
         matches!(self, CentreSpecification::VolatilityScaled { .. })
     }
 
-    /// Returns that a law counts as which nobody has seen.
+    /// Returns the number of returns that the assumed law counts as; 0 without one.
     pub fn assumed_weight(&self) -> f64 {
         match self {
             CentreSpecification::Mixed { weight, .. } => *weight,
@@ -74,13 +74,14 @@ impl CentreSpecification {
         }
     }
 
-    /// The share of the centre that `size` returns seen have, `size / (size + weight)`: their law is as far from the one they are
-    /// drawn from as the radius says, and the centre is as far from that one, mixed alike, times this share.
+    /// Returns the share that `size` returns seen have in the centre, `size / (size + weight)`. The radius bounds the
+    /// distance of their law from the law they are drawn from. Mixing the assumed law into both multiplies that
+    /// distance by this share.
     pub fn share_seen(&self, size: f64) -> f64 {
         size / (size + self.assumed_weight())
     }
 
-    /// What stands in the middle of the ball, of so many returns seen, in words.
+    /// Describes the centre of the ball in words, for a number of returns seen.
     pub fn in_words(&self, sample_size: usize) -> String {
         let more = match self {
             CentreSpecification::Empirical {} => String::new(),

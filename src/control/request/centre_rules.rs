@@ -9,12 +9,12 @@ use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, ProblemSpecification};
 use crate::control::request::support::Interval;
 
-/// Standard deviations of the error that smooths.
+/// Allowed standard deviations of the smoothing error.
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
-/// Returns that an assumed law counts as: beside more, no record is felt.
+/// Allowed number of returns that an assumed law counts as. With more, a record would have no effect.
 pub const ASSUMED_WEIGHT: (f64, f64) = (0.0, 1e6);
 
-/// Checks the centre of a problem whose other fields keep their rules.
+/// Checks the centre of a problem whose other fields satisfy their rules.
 ///
 /// # Errors
 /// The first field that breaks its rule.

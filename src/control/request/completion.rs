@@ -1,4 +1,4 @@
-//! What a specification leaves out, filled in.
+//! Defaults for the fields that a specification leaves out.
 
 use crate::control::error::FieldError;
 use crate::control::request::assets::check_fund;
@@ -8,14 +8,14 @@ use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::request::support::Interval;
 
-/// Design points per step where the law is part of the state, at most: the paper's count.
+/// Largest default number of design points per step if the law is part of the state: the paper's count.
 pub const DEFAULT_COUNT: usize = 1000;
-/// Where no count of design points is asked for, in basis points.
+/// Default accuracy if no number of design points is given, in basis points.
 pub const DEFAULT_ACCURACY: f64 = 0.5;
-/// Design points per step where the state is wealth alone: the paper's count.
+/// Default number of design points per step if the state is wealth alone: the paper's count.
 pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 
-/// `given`, or that of a relative risk aversion in its place, or the default.
+/// Returns the utility `given`, the utility of a relative risk aversion that is given instead, or the default.
 ///
 /// # Errors
 /// Both are given, or the risk aversion breaks its rule.
@@ -36,7 +36,7 @@ fn utility(given: UtilitySpecification, risk_aversion: Option<f64>) -> Result<Ut
 }
 
 impl Specification {
-    /// Checks every rule, and fills what depends on other fields.
+    /// Checks every rule, and fills in the fields that depend on others.
     ///
     /// # Errors
     /// The first field, in the order of the request, that breaks its rule.

@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// C, money added at the end of each period.
+/// C, the money added at the end of each period, or withdrawn if negative: one number for all periods, or a list with
+/// one number for each. Default 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(untagged, expecting = "must be a number or a list of numbers")]
 pub enum Contributions {
-    /// The same in every period.
+    /// One amount for all periods.
     Each(f64),
-    /// One for each period.
+    /// One amount for each period.
     Listed(Vec<f64>),
 }
 
@@ -20,7 +21,7 @@ impl Default for Contributions {
 }
 
 impl Contributions {
-    /// What is added at the end of period `step + 1`.
+    /// Returns the amount added at the end of period `step + 1`.
     pub fn at(&self, step: usize) -> f64 {
         match self {
             Contributions::Each(amount) => *amount,
@@ -28,7 +29,7 @@ impl Contributions {
         }
     }
 
-    /// One number where all are the same.
+    /// Replaces a list of equal amounts by the single amount.
     #[must_use]
     pub fn canonical(self) -> Self {
         match &self {
@@ -40,7 +41,7 @@ impl Contributions {
         }
     }
 
-    /// True where nothing is ever added or withdrawn.
+    /// Returns true if nothing is ever added or withdrawn.
     pub fn are_none(&self) -> bool {
         match self {
             Contributions::Each(amount) => *amount == 0.0,

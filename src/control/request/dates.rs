@@ -1,14 +1,14 @@
-//! Dates of periods, in forms that nobody reads in two ways: the year stands first.
+//! Dates of periods, in forms that can be read in only one way: the year comes first.
 
 use jiff::civil::Date;
 
-/// Of records of returns; what lies outside is a number that looks like a date.
+/// Allowed years of a record's dates. Text with another year is a number that looks like a date.
 const YEARS: std::ops::RangeInclusive<i16> = 1700..=2200;
-/// What [`date`] reads.
+/// Rule for the text that [`date`] reads.
 pub const FORM: &str = "must be a date with the year first, as 2008-01-31, 2008/01/31, 2008-01 or 2008";
 
-/// The day of a text; the first one of a month or a year. What follows the day, a time and a zone, is not used. `None` for
-/// another form, or a day that no calendar has.
+/// Reads the day from a text; the first day of a month or a year. A time and a zone after the day are ignored. Returns
+/// `None` for another form, or a day that no calendar has.
 pub fn date(text: &str) -> Option<Date> {
     let text = text.replace('/', "-");
     let text = text.trim_end_matches('Z');

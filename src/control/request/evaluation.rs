@@ -16,64 +16,65 @@ use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification, default_seed,
 };
 
-/// Simulated paths of one history.
+/// Allowed number of simulated paths of one history.
 pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
-/// Drawn histories.
+/// Allowed number of drawn histories.
 pub const HISTORIES: std::ops::RangeInclusive<usize> = 2..=1000;
-/// Confidence of intervals, a probability.
+/// Allowed confidence of intervals, a probability.
 pub const LEVEL: (f64, f64) = (0.5, 0.999);
-/// Simulated steps of one strategy; each keeps its advice.
+/// Largest number of simulated steps of one strategy; each step keeps its advice.
 const STEPS: usize = 5_000_000;
-/// Constant allocations.
+/// Largest number of constant allocations.
 pub const MOST_MIXES: usize = 101;
 
 /// A comparison of strategies on common simulated returns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EvaluationRequest {
-    /// As in a training; `framework` is left out, and `law` is the true law that returns are drawn from (default: the
-    /// design's sampling law).
+    /// The problem, as in a training, but `framework` is left out. `law` is the true law that returns are drawn from;
+    /// default: the design's sampling law. `caution` is `paper` and `support` is `none` by default.
     pub problem: ProblemSpecification,
-    /// As in a training.
+    /// States that the surrogates are trained on, as in a training.
     #[serde(default)]
     pub design: DesignSpecification,
-    /// As in a training.
+    /// Settings of the surrogates, as in a training.
     #[serde(default)]
     pub surrogate: SurrogateSpecification,
-    /// The same request and seed give the same report, but for its costs.
+    /// Seed of all random draws. The same request and seed give the same report, except for its `costs`. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,
-    /// Frameworks to compare.
+    /// Frameworks to compare. Default: all six.
     #[serde(default = "defaults::frameworks")]
     pub frameworks: Vec<Framework>,
-    /// Constant allocations to compare; 0 is All in the bank. Default: 0 to 1 by 0.1, as far as the actions go.
+    /// Constant allocations to compare, as shares of wealth, at most 101; 0 is All in the bank. Default: 0 to 1 in
+    /// steps of 0.1, up to the highest action.
     #[serde(default)]
     pub constant_mixes: Option<Vec<f64>>,
-    /// A trained policy for a framework; the others are trained inside the job.
+    /// Trained policies to use, by framework. Policies for the other frameworks are trained inside the job.
     #[serde(default)]
     #[schema(value_type = std::collections::HashMap<String, String>)]
     pub policies: BTreeMap<Framework, String>,
-    /// Simulated paths per initial history.
+    /// Number of simulated paths for each initial history, 100 to 100,000. Default 1000.
     #[serde(default = "defaults::paths")]
     pub paths: usize,
-    /// Which histories paths start from.
+    /// Histories that paths start from. Default: `given`.
     #[serde(default)]
     pub histories: InitialHistories,
-    /// Confidence of the intervals.
+    /// Confidence of the intervals, 0.5 to 0.999. Default 0.95.
     #[serde(default = "defaults::level")]
     pub level: f64,
 }
 
-/// Which histories paths start from.
+/// Histories that paths start from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum InitialHistories {
-    /// The problem's own.
+    /// The problem's own history.
     #[default]
     Given,
-    /// So many draws from the true law, each as long as the problem's own.
+    /// Histories drawn from the true law, each as long as the problem's own.
     Drawn {
-        /// How many.
+        /// Number of histories, 2 to 1000.
         count: usize,
     },
 }
@@ -94,7 +95,8 @@ mod defaults {
 }
 
 impl EvaluationRequest {
-    /// Fills the defaults that depend on other fields and checks every rule, those of every training in it among them.
+    /// Fills the defaults that depend on other fields and checks every rule, including those of every training that it
+    /// needs.
     ///
     /// # Errors
     /// The first field that breaks its rule.
@@ -172,7 +174,7 @@ impl EvaluationRequest {
         within("level", self.level, LEVEL.0, LEVEL.1)
     }
 
-    /// Number of initial histories.
+    /// Returns the number of initial histories.
     pub fn history_count(&self) -> usize {
         match self.histories {
             InitialHistories::Given => 1,
@@ -180,29 +182,31 @@ impl EvaluationRequest {
         }
     }
 
-    /// The constant allocations; none before completion.
+    /// Returns the constant allocations; none before completion.
     pub fn mixes(&self) -> &[f64] {
         self.constant_mixes.as_deref().unwrap_or_default()
     }
 
-    /// True where a single policy serves every initial history: a framework frozen at its history has one a history.
+    /// Returns true if a single policy serves every initial history. A framework frozen at its history needs a policy
+    /// for each.
     pub fn one_policy_for_all(&self, framework: Framework) -> bool {
         self.histories == InitialHistories::Given || !framework.is_frozen()
     }
 
-    /// The frameworks that are trained once, before the simulation.
+    /// Returns the frameworks that are trained once, before the simulation.
     pub fn trainings(&self) -> impl Iterator<Item = Framework> {
         let trained =
             |framework: &Framework| self.one_policy_for_all(*framework) && !self.policies.contains_key(framework);
         self.frameworks.iter().copied().filter(trained)
     }
 
-    /// Steps of the job: every backward step of every training, and the simulation.
+    /// Returns the number of steps of the job: every backward step of every training, and the simulation.
     pub fn step_count(&self) -> usize {
         self.trainings().count() * self.problem.horizon + 1
     }
 
-    /// The training of a framework, at `history` where it is frozen at one other than the problem's.
+    /// Returns the training of a framework. If the framework is frozen at another history than the problem's, `history`
+    /// is that one.
     pub fn specification(&self, framework: Framework, history: Option<&[f64]>) -> Specification {
         let mut problem = ProblemSpecification { framework, ..self.problem.clone() };
         let mut design = self.design.clone();
@@ -213,7 +217,7 @@ impl EvaluationRequest {
             problem.centre = CentreSpecification::default();
         }
         if framework.is_parametric() {
-            // The region of the same level.
+            // The confidence region has the same level.
             problem.radius = self.problem.radius_rule().alpha().map(|alpha| RadiusRule::ChiSquare { alpha });
             problem.support = None;
         }
@@ -221,7 +225,7 @@ impl EvaluationRequest {
             problem.caution = None;
         }
         if !framework.learns() {
-            // One input needs no more: the paper's count for a state that is wealth alone.
+            // One input needs no more points: this is the paper's count for a state that is wealth alone.
             design.count = design.count.map(|count| count.min(DEFAULT_COUNT_WEALTH_ALONE));
         }
         if let Some(history) = history {
@@ -233,7 +237,7 @@ impl EvaluationRequest {
         Specification { problem, fund: None, design, surrogate: self.surrogate.clone(), seed: self.seed }
     }
 
-    /// Whether a policy trained from `found` may stand in for the training of `framework`.
+    /// Checks that a policy trained from `found` may replace the training of `framework`.
     ///
     /// # Errors
     /// The first part of the problem that differs, under `policies.<framework>`.

@@ -1,29 +1,31 @@
-//! The frameworks: what the investor is robust against, and whether he learns.
+//! The frameworks: what the investor is robust against, and whether they learn.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What the investor is robust against, and whether observing returns changes it.
+/// The framework: what the advice is robust against, and whether new returns change it. Default: `adaptive`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Framework {
     /// Wasserstein ball whose centre and radius follow the observed returns (the paper).
     #[default]
     Adaptive,
-    /// Wasserstein ball frozen at the history.
+    /// Wasserstein ball of the history, which later returns do not change.
     Static,
-    /// No uncertainty: the law is `problem.law`.
+    /// No uncertainty: returns follow `problem.law`.
     KnownLaw,
-    /// The empirical law is learned and taken as true: radius zero.
+    /// The empirical law is learned and taken as the true law: the radius is 0.
     PlugIn,
-    /// Returns are taken as normal: the joint confidence region for their mean and variance, frozen at the history.
+    /// Returns are assumed normal. The uncertainty set is the joint confidence region for their mean and variance,
+    /// frozen at the history.
     ParametricStatic,
-    /// The same region, estimated anew with every return (Bielecki, Chen, Cialenco, Cousin and Jeanblanc 2019).
+    /// The confidence region of `parametric_static`, estimated again with every new return (Bielecki, Chen, Cialenco,
+    /// Cousin and Jeanblanc 2019).
     ParametricAdaptive,
 }
 
 impl Framework {
-    /// The name in requests and reports.
+    /// Returns the name used in requests and reports.
     pub fn name(self) -> &'static str {
         match self {
             Framework::Adaptive => "adaptive",
@@ -35,22 +37,22 @@ impl Framework {
         }
     }
 
-    /// True where the empirical law is part of the state.
+    /// Returns true if the empirical law is part of the state.
     pub fn learns(self) -> bool {
         matches!(self, Framework::Adaptive | Framework::PlugIn | Framework::ParametricAdaptive)
     }
 
-    /// True where the uncertainty set is frozen at the history.
+    /// Returns true if the uncertainty set is frozen at the history.
     pub fn is_frozen(self) -> bool {
         matches!(self, Framework::Static | Framework::ParametricStatic)
     }
 
-    /// True where laws lie in a Wasserstein ball.
+    /// Returns true if the uncertainty set is a Wasserstein ball.
     pub fn has_ball(self) -> bool {
         matches!(self, Framework::Adaptive | Framework::Static)
     }
 
-    /// True where returns are taken as normal.
+    /// Returns true if returns are assumed normal.
     pub fn is_parametric(self) -> bool {
         matches!(self, Framework::ParametricStatic | Framework::ParametricAdaptive)
     }

@@ -1,18 +1,19 @@
-//! What a period is: told by how far apart dates are.
+//! The frequency of periods, found from the distances between their dates.
 
 use std::ops::RangeInclusive;
 
 use jiff::civil::{Date, Weekday};
 
-/// Days that an exchange may rest: weekends, and holidays as long as the golden weeks of Asia or March 1933.
+/// Largest number of days from one trading day to the next: exchanges close for weekends, and for holidays as long as
+/// the golden weeks of Asia or March 1933.
 const LONGEST_REST: i32 = 12;
-/// Days from a week's date to the next one's, where a holiday moves either.
+/// Days from a week's date to the next one's, if a holiday moves either.
 const WEEK: RangeInclusive<i32> = 4..=10;
 
-/// Days from a month's date to the next one's, where both move to days on which exchanges are open; less is no month.
+/// Smallest number of days from a month's date to the next one's, if both move to trading days; less is no month.
 const SHORTEST_MONTH: i32 = 20;
 
-/// How often there is a period.
+/// The frequency of periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frequency {
     /// Days on which an exchange is open, or all days.
@@ -30,29 +31,29 @@ pub enum Frequency {
 /// A date that does not follow the one before: its index, and the rule that it breaks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Misplaced {
-    /// From 0.
+    /// Index of the date, from 0.
     pub index: usize,
-    /// As a sentence without its subject.
+    /// The rule that it breaks, as a sentence without its subject.
     pub rule: String,
 }
 
 use Frequency::{Daily, Monthly, Quarterly, Weekly, Yearly};
 
-/// Days between dates by which most rows tell each.
+/// Days between dates at each frequency; most gaps of a record lie in one of these ranges.
 const DISTANCES: [(Frequency, RangeInclusive<i32>); 5] =
     [(Daily, 1..=4), (Weekly, 5..=9), (Monthly, 26..=33), (Quarterly, 85..=97), (Yearly, 350..=380)];
 
-/// Days from each date to the next.
+/// Returns the days from each date to the next.
 fn gaps(dates: &[Date]) -> Vec<i32> {
     dates.windows(2).map(|pair| pair[0].until(pair[1]).map_or(0, |span| span.get_days())).collect()
 }
 
-/// Of so few days a weekday may be missing by chance.
+/// With fewer dates than this, a weekday may be missing by chance.
 const FEW_DAYS: usize = 14;
-/// Days a week has often where it has one in fourteen of all: half of what each of seven has.
+/// A weekday counts as usual if at least one in this many dates falls on it: half of the share of each of seven days.
 const OFTEN: usize = 14;
 
-/// Special sessions on a weekend now and then do not count.
+/// Returns the number of days with a period in a year. Special sessions on a weekend now and then do not count.
 fn days_a_year(dates: &[Date]) -> usize {
     let on = |day: Weekday| dates.iter().filter(|date| date.weekday() == day).count();
     if dates.len() < FEW_DAYS {
@@ -66,7 +67,7 @@ fn days_a_year(dates: &[Date]) -> usize {
     }
 }
 
-/// Where weeks begin: on Mondays, or on Sundays if most of a record's dates are those.
+/// The first day of weeks: Monday, or Sunday if most of a record's dates are Sundays.
 struct Week {
     first: Weekday,
 }
@@ -77,7 +78,7 @@ impl Week {
         Week { first: if 2 * sundays > dates.len() { Weekday::Sunday } else { Weekday::Monday } }
     }
 
-    /// Whether one week has both dates, of which the second is later.
+    /// Returns true if one week has both dates; the second is later.
     fn holds_both(&self, before: Date, date: Date) -> bool {
         let days = before.until(date).map_or(0, |span| span.get_days());
         let since = i32::from(self.first.until(before.weekday()));
@@ -86,7 +87,7 @@ impl Week {
 }
 
 impl Frequency {
-    /// The one that the median distance of dates tells, where they increase.
+    /// Returns the frequency that the median distance of increasing dates indicates.
     pub fn typical(dates: &[Date]) -> Option<Self> {
         let mut gaps = gaps(dates);
         gaps.sort_unstable();
@@ -97,7 +98,8 @@ impl Frequency {
         DISTANCES.iter().find(|(_, days)| days.contains(&gap)).map(|(frequency, _)| *frequency)
     }
 
-    /// The [`typical`](Self::typical) one; `written` is how each of them was given.
+    /// Returns the [`typical`](Self::typical) frequency if every date follows the one before; `written` holds the dates
+    /// as given.
     ///
     /// # Errors
     /// A date that is not later than the one before, or is not the next one at that frequency.
@@ -133,7 +135,7 @@ impl Frequency {
         }
     }
 
-    /// Whether no period lies between.
+    /// Returns true if no period lies between the dates.
     fn follows(self, before: Date, date: Date) -> bool {
         let days = before.until(date).map_or(0, |span| span.get_days());
         let months = |date: Date| 12 * i32::from(date.year()) + i32::from(date.month());
@@ -147,7 +149,7 @@ impl Frequency {
         }
     }
 
-    /// One of its periods, in a word.
+    /// Returns the noun for one of its periods.
     pub fn noun(self) -> &'static str {
         match self {
             Daily => "day",
@@ -158,7 +160,7 @@ impl Frequency {
         }
     }
 
-    /// What its returns are called.
+    /// Returns the adjective for its returns.
     pub fn adjective(self) -> &'static str {
         match self {
             Daily => "daily",
@@ -169,8 +171,8 @@ impl Frequency {
         }
     }
 
-    /// Periods in a year. Of days: those on which exchanges are open, 252; about 300 if one day of the weekend is among the days
-    /// as often as others are; all of them if both are.
+    /// Returns the number of periods in a year. For days it is 252, the days on which exchanges are open. It is about
+    /// 300 if one day of the weekend occurs as often as other days, and all days if both do.
     pub fn periods_per_year(self, dates: &[Date]) -> usize {
         match self {
             Daily => days_a_year(dates),
@@ -181,7 +183,7 @@ impl Frequency {
         }
     }
 
-    /// A date, as fine as the periods are.
+    /// Formats a date as finely as the periods need.
     pub fn shown(self, date: Date) -> String {
         let format = match self {
             Daily | Weekly => "%Y-%m-%d",

@@ -1,4 +1,4 @@
-//! A request for the frontier of caution: what a radius would have cost and saved on records like the one given.
+//! A request for the frontier of caution: what each radius would have cost and saved on records like the one given.
 
 use std::ops::RangeInclusive;
 
@@ -17,53 +17,56 @@ use super::specification::{ProblemSpecification, Specification, default_seed};
 use super::support::Interval;
 use crate::control::error::FieldError;
 
-/// Returns of a record: of fewer, resampling tells nothing.
+/// Allowed number of periods of a record. With fewer, resampling is uninformative.
 pub const RETURNS: RangeInclusive<usize> = 12..=5000;
-/// Multiples of the radius.
+/// Allowed number of multiples of the radius.
 pub const SCALES: RangeInclusive<usize> = 1..=20;
-/// The largest of them.
+/// The largest multiple of the radius.
 pub const LARGEST_SCALE: f64 = 10.0;
-/// Log-returns drawn from each law, times the scales: these are some minutes of two cores.
+/// Limit on the log-returns drawn from each law, times the number of scales: some minutes on two cores.
 pub const MOST_DRAWN: usize = 20_000_000;
-/// Resampled records of each kind.
+/// Allowed number of resampled records of each kind.
 pub const RESAMPLES: RangeInclusive<usize> = 20..=2000;
 
-/// A record, an investor, and the radii to try.
+/// A request for a frontier of caution: a record, an investor, and the radii to try.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrontierRequest {
-    /// One asset as in `/advise`, or several.
+    /// The problem of one asset, as in `/advise`, or of several assets. Its history holds 12 to 5000 periods.
     pub problem: FrontierProblem,
-    /// Multiples of the radius of the rule, ascending. 0 takes the record for the law.
+    /// Multiples of the rule's radius to try, ascending: 1 to 20 numbers from 0 to 10. At 0 the record is taken as the
+    /// true law. Default: 0, 0.1, 0.25, 0.5 and 1.
     #[serde(default = "default_scales")]
     pub scales: Vec<f64>,
-    /// Resampled records of each kind. Default: 400 of one asset, 60 of several, whose steps take longer.
+    /// Number of resampled records of each kind, 20 to 2000. Default: 400 for one asset, and 60 for several, whose
+    /// steps take longer.
     #[serde(default)]
     pub resamples: Option<usize>,
-    /// Periods in a row that are drawn together, 1 to half of the record. Default: the cube root of its length.
+    /// Number of consecutive periods that are drawn together, from 1 to half of the record. Default: the cube root of
+    /// the record's length.
     #[serde(default)]
     pub block: Option<usize>,
-    /// Of the resamples and of the simulated bridges.
+    /// Seed of the resampled records and of the simulated bridges. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,
 }
 
-/// Those tried unless others are given.
+/// Returns the default multiples of the radius.
 pub fn default_scales() -> Vec<f64> {
     vec![0.0, 0.1, 0.25, 0.5, 1.0]
 }
 
-/// Records drawn unless another number is given, of one asset and of several: at 240 returns of twelve that is some seconds.
+/// Default number of resampled records, for one asset and for several: some seconds at 240 returns of twelve assets.
 const DEFAULT_RESAMPLES: [usize; 2] = [400, 60];
 
-/// The problem of one asset, or of several, which `assets` names.
+/// The problem of one asset, or of several assets if it has the field `assets`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 #[allow(clippy::large_enum_variant)]
 pub enum FrontierProblem {
-    /// One, which may be held beside the bank.
+    /// One asset, which may be held beside the bank.
     Asset(ProblemSpecification),
-    /// Several.
+    /// Several assets.
     Assets(AssetsProblem),
 }
 
@@ -96,24 +99,26 @@ impl<'de> Deserialize<'de> for FrontierProblem {
     }
 }
 
-/// A request that keeps the rules, of however many assets.
+/// A valid request, for any number of assets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrontierQuestion {
-    /// As completed: another reading of it gives the same question.
+    /// The completed request. Reading it again gives the same question.
     pub request: FrontierRequest,
-    /// The assets and the investor; one asset is called `asset`.
+    /// The assets and the investor. A single asset is named `asset`.
     pub assets: AssetsProblem,
-    /// The problem of the fund of inverse volatilities, which one asset is itself, for one period.
+    /// The one-period problem of the inverse-volatility fund. With one asset, the fund is that asset.
     pub fund: Specification,
-    /// Resampled records of each kind.
+    /// Number of resampled records of each kind.
     pub resamples: usize,
-    /// Periods in a row that are drawn together.
+    /// Number of consecutive periods that are drawn together.
     pub block: usize,
-    /// Between which all log-returns lie, where that is given.
+    /// Bounds on all log-returns, if the request gives them.
     pub support: Option<Interval>,
 }
 
 impl FrontierRequest {
+    /// Checks the request and fills in its defaults.
+    ///
     /// # Errors
     /// A field breaks a rule.
     pub fn question(mut self) -> Result<FrontierQuestion, FieldError> {
@@ -181,7 +186,7 @@ impl FrontierRequest {
     }
 }
 
-/// That nothing is asked for which a record drawn anew does not have.
+/// Rejects options that do not apply to a resampled record.
 fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
     let name = problem.framework.name();
     if problem.framework != Framework::Adaptive {
@@ -220,7 +225,7 @@ fn as_assets(problem: &ProblemSpecification) -> AssetsProblem {
     asked_of(vec!["asset".to_owned()], rows, problem)
 }
 
-/// What `problem` asks of one asset, asked of these for one period.
+/// Returns the one-period problem of these assets with the options that `problem` has for one asset.
 pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSpecification) -> AssetsProblem {
     AssetsProblem {
         assets,

@@ -1,55 +1,58 @@
-//! The fund of several assets, in figures: what it is of, how its composition is chosen, how its law may be moved.
+//! The fund of several assets: its assets, how its composition is chosen, and how its law may be moved.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::numerics::levelling::{Ground, inverse_volatility};
 
-/// What a policy for several assets knows beside the problem of their fund, whose shares are those of inverse volatilities.
+/// The data of a policy for several assets, beside the problem of their fund. The shares of that fund are proportional
+/// to inverse volatilities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FundSpecification {
-    /// Names of the assets.
+    /// Names of the assets, 2 to 30, all different.
     pub assets: Vec<String>,
-    /// What moving a law costs the adversary.
+    /// Distance that sets the adversary's cost of moving a law.
     pub ground_norm: GroundNorm,
-    /// How the shares of the assets in what is held are chosen.
+    /// How the shares of the assets within the risky holdings are chosen.
     pub composition: CompositionRule,
-    /// What the radius of one fund was multiplied by, for laws of all funds to lie in their balls at once: the scale of the
-    /// problem's radius holds it. 1 under rules that look at the sample size alone.
+    /// Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100. The scale
+    /// of the problem's radius includes it. It is 1 under rules that depend on the sample size alone.
     pub radius_factor: f64,
-    /// Log-returns, date by date, oldest first; each date has one for each asset.
+    /// Log-returns by date, oldest first; each date has one value for each asset.
     pub history: Vec<Vec<f64>>,
 }
 
-/// How the composition of the fund is chosen.
+/// How the composition of the fund is chosen. Default: `one_step`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CompositionRule {
-    /// That of the allocation that solves the one-step problem; inverse volatilities where it holds nothing.
+    /// The composition of the allocation that solves the one-step problem, or inverse volatilities if that allocation
+    /// holds nothing.
     #[default]
     OneStep,
     /// Equal shares.
     Equal,
-    /// Shares in inverse proportion to the deviations of the returns.
+    /// Shares in inverse proportion to the standard deviations of the returns.
     InverseVolatility,
-    /// These shares, in the order of the assets, which sum to 1.
+    /// These shares, one for each asset in order; they sum to 1.
     Given(Vec<f64>),
 }
 
-/// The distance between two dates' log-returns.
+/// The distance between the log-returns of two dates. Default: `scaled_one`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GroundNorm {
-    /// The sum of the moves, each times its asset's inverse volatility, which sum to 1: moving all assets by s costs s.
+    /// The sum of the assets' moves, each weighted by the asset's inverse volatility. The weights sum to 1, so moving
+    /// all assets by s costs s.
     #[default]
     ScaledOne,
-    /// The largest move.
+    /// The largest move of any asset.
     Sup,
 }
 
 impl GroundNorm {
-    /// The ground cost at a history.
+    /// Returns the ground cost for a history.
     pub fn at(self, rows: &[Vec<f64>]) -> Ground {
         match self {
             GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(rows)),

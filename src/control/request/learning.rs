@@ -1,4 +1,4 @@
-//! How much older returns weigh in what is learned.
+//! Weights of older returns in the learned law.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,22 +6,23 @@ use utoipa::ToSchema;
 use crate::control::error::FieldError;
 use crate::numerics::empirical::{EmpiricalDistribution, weights};
 
-/// Periods in which a return's weight halves. Below 1 the newest return would outweigh all others together, however many there are:
-/// at 1 the effective size is at most 3. Above the largest, weights are equal to rounding.
+/// Allowed half-lives: the number of periods in which a return's weight halves. Below 1 the newest return would
+/// outweigh all others together, however many there are: at 1 the effective sample size is at most 3. Above the
+/// largest, weights are equal up to rounding.
 pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
 
-/// Two observations closer than this are one value: the standard deviation must exceed it.
+/// Smallest standard deviation of a record. Two observations closer than this count as one value.
 pub const SMALLEST_DEVIATION: f64 = 1e-7;
 
-/// What a return weighs in the law that is learned: of the history and of what is seen after it alike.
+/// Weight of a return in the learned law, for the history and for later returns alike. Default: `equal`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Learning {
-    /// As much as any other.
+    /// All returns have the same weight.
     Equal {},
-    /// Half as much as one that is `half_life` periods newer: the law forgets what is long past.
+    /// A return has half the weight of one that is `half_life` periods newer: the law forgets the distant past.
     Decay {
-        /// In periods.
+        /// Half-life, in periods, 1 to 1e15.
         half_life: f64,
     },
 }
@@ -33,10 +34,10 @@ impl Default for Learning {
 }
 
 impl Learning {
-    /// Checks that a record, named `field` in messages, has a deviation.
+    /// Checks that a record, named `field` in messages, varies.
     ///
     /// # Errors
-    /// It does not vary, as learned.
+    /// Its standard deviation, with the weights of learning, is too small.
     pub fn check_deviation(self, field: &str, record: &[f64]) -> Result<(), FieldError> {
         if self.deviation(record) >= SMALLEST_DEVIATION {
             return Ok(());
@@ -52,7 +53,7 @@ impl Learning {
     /// Checks the half-life.
     ///
     /// # Errors
-    /// It is out of [`HALF_LIFE`].
+    /// It is outside [`HALF_LIFE`].
     pub fn check(self) -> Result<(), FieldError> {
         let (least, most) = HALF_LIFE;
         match self {
@@ -64,12 +65,12 @@ impl Learning {
         }
     }
 
-    /// Whether older returns weigh less.
+    /// Returns true if older returns weigh less.
     pub fn decays(self) -> bool {
         self != Learning::Equal {}
     }
 
-    /// d, what of a return's weight is left one return later: `2^(-1 / half_life)`.
+    /// Returns d, the fraction of a return's weight that is left one return later: `2^(-1 / half_life)`.
     pub fn retention(self) -> f64 {
         match self {
             Learning::Equal {} => 1.0,
@@ -77,37 +78,38 @@ impl Learning {
         }
     }
 
-    /// The law that `record`, oldest first, teaches.
+    /// Returns the law learned from `record`, oldest first.
     pub fn law(self, record: &[f64]) -> EmpiricalDistribution {
         EmpiricalDistribution::decaying(record, self.retention())
     }
 
-    /// What the values of a record of `count` weigh, oldest first; the newest weighs 1.
+    /// Returns the weights of a record of `count` values, oldest first; the newest weighs 1.
     pub fn weights(self, count: usize) -> Vec<f64> {
         weights(count, self.retention())
     }
 
-    /// The mean over a record, oldest first, of `value`.
+    /// Returns the weighted mean of `value` over a record, oldest first.
     pub fn mean(self, record: &[f64], value: impl Fn(f64) -> f64) -> f64 {
         let weights = self.weights(record.len());
         let sum = record.iter().zip(&weights).map(|(&log_return, weight)| weight * value(log_return)).sum::<f64>();
         sum / weights.iter().sum::<f64>()
     }
 
-    /// Standard deviation of a record, oldest first.
+    /// Returns the weighted standard deviation of a record, oldest first.
     pub fn deviation(self, record: &[f64]) -> f64 {
         let mean = self.mean(record, |log_return| log_return);
         self.mean(record, |log_return| (log_return - mean).powi(2)).sqrt()
     }
 
-    /// [`EmpiricalDistribution::effective_size`] of the law of `count` returns:
+    /// Returns the [`EmpiricalDistribution::effective_size`] of the law of `count` returns:
     ///
     ///   tanh(n b / 2) / tanh(b / 2),   b = ln(2) / half_life.
     pub fn effective_size(self, count: usize) -> f64 {
         self.largest_effective_size().map_or(count as f64, |largest| largest * self.settled(count))
     }
 
-    /// What the effective size tends to as returns accumulate, `1 / tanh(b / 2) = (1 + d) / (1 - d)`; none where it grows for ever.
+    /// Returns the limit of the effective sample size as returns accumulate, `1 / tanh(b / 2) = (1 + d) / (1 - d)`;
+    /// `None` if it grows for ever.
     pub fn largest_effective_size(self) -> Option<f64> {
         match self {
             Learning::Equal {} => None,
@@ -115,7 +117,7 @@ impl Learning {
         }
     }
 
-    /// The effective size of `count` returns over what it tends to: `tanh(n b / 2)`; 0 where it grows for ever.
+    /// Returns the effective sample size of `count` returns over its limit: `tanh(n b / 2)`; 0 if it grows for ever.
     fn settled(self, count: usize) -> f64 {
         match self {
             Learning::Equal {} => 0.0,
@@ -123,7 +125,8 @@ impl Learning {
         }
     }
 
-    /// Returns from which on the effective size is at least `share` of what it tends to; none where it grows for ever.
+    /// Returns the number of returns from which the effective sample size is at least `share` of its limit; `None` if
+    /// it grows for ever.
     pub fn settled_from(self, share: f64) -> Option<usize> {
         match self {
             Learning::Equal {} => None,

@@ -1,4 +1,4 @@
-//! What may be asked: the requests, their defaults, and every rule they must keep. No mathematics.
+//! The requests: their fields, their defaults, and every rule they must satisfy. No mathematics.
 
 pub mod annualised;
 pub mod assets;

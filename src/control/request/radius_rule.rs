@@ -5,73 +5,74 @@ use utoipa::ToSchema;
 
 use crate::control::request::framework::Framework;
 
-/// How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
-/// confidence region, every other of the Wasserstein ball.
+/// Rule by which the radius of the uncertainty set follows from the sample of size n. `chi_square` is for the
+/// confidence region of the parametric frameworks, every other rule for the Wasserstein ball.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
 pub enum RadiusRule {
-    /// `scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths.
+    /// `scale Q / sqrt(n)`, with Q the (1 - alpha)-quantile of the bridge statistic over simulated paths.
     Bridge {
-        /// Miscoverage, the probability that the ball misses the true law.
+        /// Miscoverage: the probability that the ball misses the true law, 0.001 to 0.999. Default 0.1.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
-        /// Simulated paths.
+        /// Number of simulated paths, 100 to 100,000. Default 2000.
         #[serde(default = "defaults::paths")]
         paths: usize,
-        /// A factor on the radius.
+        /// Factor on the radius, 0 to 100. Default 1.
         #[serde(default = "defaults::scale")]
         scale: f64,
-        /// By what every simulated quantile is multiplied, so that that of the history is exact: found, never asked for. What a
-        /// request says here is found anew.
+        /// Factor on every simulated quantile that makes the quantile of the history exact. The service computes it and
+        /// replaces any value in a request.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         correction: Option<f64>,
     },
-    /// That of `bridge` times a factor found once, from the history: with it, the balls of a share 1 - alpha of records drawn from the
-    /// smoothed law of the history hold that law.
+    /// The radius of `bridge` times a factor found once, from the history. For records drawn from the smoothed law of
+    /// the history, a share 1 - alpha of the balls with this factor contain that law.
     Calibrated {
-        /// Miscoverage.
+        /// Miscoverage, 0.01 to 0.999. Default 0.1.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
-        /// Simulated paths.
+        /// Number of simulated paths, 100 to 100,000. Default 2000.
         #[serde(default = "defaults::paths")]
         paths: usize,
-        /// One more factor on the radius.
+        /// Further factor on the radius, 0 to 100. Default 1.
         #[serde(default = "defaults::scale")]
         scale: f64,
     },
     /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
     Concentration {
-        /// Miscoverage.
+        /// Miscoverage, 0.001 to 0.999. Default 0.1.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
-        /// C of the inequality.
+        /// Constant C of the inequality, from `alpha` to 1e9.
         #[serde(rename = "C")]
         numerator: f64,
-        /// c of the inequality, per squared log-return.
+        /// Constant c of the inequality, per squared log-return, 1e-9 to 1e12.
         #[serde(rename = "c")]
         rate: f64,
     },
     /// `kappa / sqrt(n)`.
     RootN {
-        /// In log-return.
+        /// kappa, in log-return, 0 to 100.
         kappa: f64,
     },
-    /// The same radius at every sample size.
+    /// A fixed radius at every sample size.
     Fixed {
-        /// In log-return.
+        /// Radius, in log-return, 0 to 10.
         radius: f64,
     },
-    /// `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
-    /// of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    /// `sqrt(kappa / n)` estimated standard deviations, with kappa the (1 - alpha)-quantile of chi-square with two
+    /// degrees of freedom. The region is `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, with m and v the
+    /// sample's mean and variance.
     ChiSquare {
-        /// Miscoverage.
+        /// Miscoverage, 0.001 to 1. Default 0.1.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
     },
 }
 
 impl RadiusRule {
-    /// As on the wire.
+    /// Returns the name used in requests.
     pub fn name(&self) -> &'static str {
         match self {
             RadiusRule::Bridge { .. } => "bridge",
@@ -83,23 +84,23 @@ impl RadiusRule {
         }
     }
 
-    /// The rule of a request that names none.
+    /// Returns the rule of a request that names none.
     pub fn default_of(framework: Framework) -> Self {
         let alpha = defaults::alpha();
         if framework.is_parametric() { RadiusRule::ChiSquare { alpha } } else { RadiusRule::bridge(alpha) }
     }
 
-    /// The bridge rule at this miscoverage, with the default number of paths and no factor.
+    /// Returns the bridge rule at this miscoverage, with the default number of paths and no factor.
     pub fn bridge(alpha: f64) -> Self {
         RadiusRule::scaled_bridge(alpha, defaults::scale())
     }
 
-    /// The same with a factor on the radius.
+    /// Returns the bridge rule at this miscoverage, with a factor on the radius.
     pub fn scaled_bridge(alpha: f64, scale: f64) -> Self {
         RadiusRule::Bridge { alpha, paths: defaults::paths(), scale, correction: None }
     }
 
-    /// The rule of a radius so many times as large, of those that are simulated.
+    /// Multiplies the radius of a simulated rule by `factor`; other rules stay as they are.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {
@@ -113,7 +114,7 @@ impl RadiusRule {
         }
     }
 
-    /// Simulated paths, 0 under rules that simulate none.
+    /// Returns the number of simulated paths, 0 under rules that simulate none.
     pub fn paths(&self) -> usize {
         match *self {
             RadiusRule::Bridge { paths, .. } | RadiusRule::Calibrated { paths, .. } => paths,
@@ -121,7 +122,7 @@ impl RadiusRule {
         }
     }
 
-    /// The level of the rules that have one.
+    /// Returns the miscoverage of the rules that have one.
     pub fn alpha(&self) -> Option<f64> {
         match *self {
             RadiusRule::Bridge { alpha, .. }

@@ -12,51 +12,53 @@ use crate::control::request::specification::{
 use crate::control::request::support::Interval;
 use crate::control::request::withdrawals;
 
-/// Ends of `design.accuracy`, in basis points.
+/// Allowed range of `design.accuracy`, in basis points.
 pub const ACCURACY: (f64, f64) = (0.01, 100.0);
-/// Design points of a step: the covariance matrix of 10,000 takes 800 MB.
+/// Allowed number of design points per step: the covariance matrix of 10,000 takes 800 MB.
 pub const COUNT: std::ops::RangeInclusive<usize> = 10..=10_000;
-/// Ten years of weeks.
+/// Allowed number of periods of a horizon, up to ten years of weeks.
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
-/// Log-returns of a history.
+/// Allowed number of log-returns in a history.
 pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
 /// Largest log-return in absolute value: a factor of 148 in one step.
 pub const LOG_RETURN: f64 = 5.0;
-/// Simulated bridge paths.
+/// Allowed number of simulated bridge paths.
 pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
-/// Bridge matrix of 30 million numbers: 240 MB.
+/// Largest bridge matrix, 30 million numbers: 240 MB.
 pub const BRIDGE_NUMBERS: usize = 30_000_000;
-/// The same where a calibration reads them for each of a thousand records: about a second.
+/// Largest bridge matrix for a calibration, which reads it for each of a thousand records: about a second.
 const CALIBRATED_NUMBERS: usize = 3_000_000;
-/// Simulated returns of the design: 800 MB.
+/// Largest number of simulated returns in the design: 800 MB.
 const DESIGN_NUMBERS: usize = 100_000_000;
 /// Above this product of risk aversion and wealth, exponential utility is flat in double precision over the design.
 const EXPONENTIAL_SCALE: f64 = 300.0;
-/// Actions closer than 1e-7 are one to the search: an interval must be wider.
+/// Smallest upper end of the action interval. The search treats actions closer than 1e-7 as one, so the interval must
+/// be wider.
 const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
-/// A period is a year at most and a day at least.
+/// Allowed number of periods in a year: a period is a year at most and a day at least.
 pub const PERIODS_PER_YEAR: (f64, f64) = (1.0, 366.0);
-/// Absolute risk aversions of exponential utility, per unit of wealth: every relative one at every initial wealth is among them.
+/// Allowed absolute risk aversions of exponential utility, per unit of wealth. They include every relative one at every
+/// initial wealth.
 pub const RISK_AVERSION: (f64, f64) = (1e-18, 1e9);
-/// Risk aversions of exponential utility in multiples of one over the initial wealth.
+/// Allowed risk aversions of exponential utility, as multiples of one over the initial wealth.
 pub const RISK_AVERSION_RELATIVE: (f64, f64) = (1e-3, 100.0);
-/// Of power utility, and of log utility at 1.
+/// Allowed relative risk aversions: log utility at 1, power utility above.
 pub const RELATIVE_RISK_AVERSION: (f64, f64) = (1.0, 100.0);
-/// Trading costs, shares of what is traded.
+/// Allowed trading costs, as shares of the amount traded.
 pub const TRADING_COST: (f64, f64) = (0.0, 0.1);
-/// Below, what a trade keeps is lost in rounding.
+/// Smallest trading cost above 0. The effect of a smaller one is lost in rounding.
 const SMALLEST_TRADING_COST: f64 = 1e-9;
-/// What a bank pays a step.
+/// Allowed returns of the bank per step.
 pub const RATE: (f64, f64) = (-0.5, 0.5);
-/// Smallest and largest wealth.
+/// Smallest and largest allowed wealth.
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
-/// Moments of the law among the features.
+/// Allowed number of moments of the law among the features.
 pub const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
-/// Factors on a bridge radius.
+/// Allowed factors on a bridge radius.
 pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
-/// Of a simulated quantile: a hundred paths are off by less.
+/// Allowed corrections of a simulated quantile: a hundred paths are off by less.
 pub const RADIUS_CORRECTION: (f64, f64) = (0.5, 2.0);
-/// Fixed radii, in log-return.
+/// Allowed fixed radii, in log-return.
 pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
 
 /// Checks every rule.
@@ -147,7 +149,8 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     not_flat(problem, problem.initial_wealth, (field, given), "problem.initial_wealth")
 }
 
-/// Checks that utility still grows at a wealth that a problem starts with; else `refused` is, for its product with `other`.
+/// Checks that utility still grows at an initial wealth. Otherwise the error names the field `refused` and its product
+/// with `other`.
 fn not_flat(problem: &ProblemSpecification, wealth: f64, refused: (&str, f64), other: &str) -> Result<(), FieldError> {
     let utility = problem.utility.absolute(problem.initial_wealth);
     let UtilitySpecification::Exponential { risk_aversion, .. } = utility else { return Ok(()) };
@@ -208,7 +211,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
     }
 }
 
-/// Checks a history of log-returns, oldest first, of which the law is learned so; named `field` in messages.
+/// Checks a history of log-returns, oldest first, for this kind of learning; `field` names it in messages.
 pub fn history(field: &str, values: &[f64], learning: Learning) -> Result<(), FieldError> {
     if !HISTORY_LENGTH.contains(&values.len()) {
         let rule = format!("must hold {} to {} log-returns", HISTORY_LENGTH.start(), HISTORY_LENGTH.end());

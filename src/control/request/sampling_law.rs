@@ -9,18 +9,18 @@ use utoipa::ToSchema;
 pub enum SamplingLaw {
     /// A mixture of normal laws.
     GaussianMixture {
-        /// At least one; their weights sum to 1.
+        /// Components of the mixture, 1 to 32; their weights sum to 1.
         components: Vec<MixtureComponent>,
     },
-    /// Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives.
+    /// Smoothed bootstrap of the history with the weights of its returns, with the same weighted mean and variance.
     Bootstrap {},
-    /// A Student t law, moved and stretched.
+    /// A Student t law, shifted and scaled.
     StudentT {
-        /// Its mean, in log-return per step.
+        /// Mean, in log-return per step, -1 to 1.
         location: f64,
-        /// What a standard t variable is multiplied by, in log-return.
+        /// Factor on a standard t variable, in log-return, 1e-6 to 1.
         scale: f64,
-        /// Above 2: its variance is finite.
+        /// Degrees of freedom, 2.1 to 1e6: above 2 the variance is finite.
         degrees_of_freedom: f64,
     },
 }
@@ -29,10 +29,10 @@ pub enum SamplingLaw {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MixtureComponent {
-    /// Its probability.
+    /// Probability of the component, above 0 and at most 1.
     pub weight: f64,
-    /// In log-return.
+    /// Mean, in log-return, -1 to 1.
     pub mean: f64,
-    /// In squared log-return.
+    /// Variance, in squared log-return, 1e-12 to 1.
     pub variance: f64,
 }

@@ -1,7 +1,7 @@
 //! The training request: every choice a user has, its default and its rule.
 //!
-//! A [`Specification`] arrives with holes; `Specification::completed` checks every rule (`rules.rs`) and fills what depends on
-//! other fields (`completion.rs`). Only a completed one is stored, hashed and solved.
+//! A [`Specification`] arrives with fields left out. `Specification::completed` checks every rule (`rules.rs`) and
+//! fills in the fields that depend on others (`completion.rs`). Only a completed one is stored, hashed and solved.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -16,28 +16,28 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::support::{Interval, Support};
 
-/// A whole training job.
+/// A complete training job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Specification {
-    /// What the investor is and may do; of several assets, with their fund in the place of one.
+    /// The investor, the asset and the history. For several assets, the asset is their fund.
     pub problem: ProblemSpecification,
-    /// The assets of that fund, where there are several.
+    /// The assets of the fund, if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fund: Option<Box<FundSpecification>>,
-    /// Where the surrogates are trained.
+    /// States that the surrogates are trained on.
     #[serde(default)]
     pub design: DesignSpecification,
-    /// How the surrogates are made.
+    /// Settings of the surrogates.
     #[serde(default)]
     pub surrogate: SurrogateSpecification,
-    /// The same specification and seed give the same policy, bit for bit.
+    /// Seed of all random draws. The same specification and seed give the same policy, bit for bit. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,
 }
 
 impl Specification {
-    /// Of a problem, with the defaults of all else.
+    /// Creates the specification of a problem, with the defaults for everything else.
     pub fn of(problem: ProblemSpecification, seed: u64) -> Self {
         Specification { problem, fund: None, design: Default::default(), surrogate: Default::default(), seed }
     }
@@ -47,59 +47,64 @@ impl Specification {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemSpecification {
-    /// What the investor is robust against.
+    /// The framework: what the advice is robust against. Default: `adaptive`.
     #[serde(default)]
     pub framework: Framework,
-    /// Number of allocation decisions, T.
+    /// Number of allocation decisions, T, 1 to 520. Default 10.
     #[serde(default = "defaults::horizon")]
     pub horizon: usize,
-    /// Bank return per step, r, as a fraction: wealth in the bank grows by the factor 1 + r. 3 % a year are 0.00247 a month.
+    /// Return of the bank per step, r, as a fraction, -0.5 to 0.5: wealth in the bank grows by the factor 1 + r. For
+    /// example, 3 % a year is 0.00247 a month.
     pub rate_per_step: f64,
-    /// Periods of the history in a year, 12 where they are months: what is said a year is said with it. It changes no advice.
+    /// Periods of the history in a year, 1 to 366; 12 for months. Used for annual figures; it does not change the
+    /// advice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<f64>,
-    /// x_0, in any currency.
+    /// Initial wealth, x_0, in any currency, 1e-6 to 1e15. Default 100.
     #[serde(default = "defaults::initial_wealth")]
     pub initial_wealth: f64,
-    /// Share of wealth that may be held in the risky asset: `[0, highest]`.
+    /// Share of wealth that may be held in the risky asset: `[0, highest]`. Default: `[0, 1]`.
     #[serde(default = "defaults::action_interval")]
     pub action_interval: [f64; 2],
-    /// Lost of what is moved between bank and asset, as a share of it, both ways alike.
+    /// Cost of moving money either way between bank and asset, as a share of it: 0, or 1e-9 to 0.1. Default 0.
     #[serde(default)]
     pub trading_cost: f64,
-    /// Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers.
+    /// Money added at the end of each period, or withdrawn if negative: one number, or `horizon` numbers. Default 0.
     #[serde(default)]
     pub contributions: Contributions,
-    /// Relative risk aversion, in the place of `utility`: log utility at 1, power utility above.
+    /// Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub risk_aversion: Option<f64>,
-    /// Of terminal wealth. Default: power utility, risk aversion 3.
+    /// Utility of terminal wealth. Default: power utility with risk aversion 3.
     #[serde(default = "UtilitySpecification::not_given")]
     pub utility: UtilitySpecification,
-    /// What older returns weigh in the law that is learned.
+    /// Weights of older returns in the learned law. Default: `equal`.
     #[serde(default)]
     pub learning: Learning,
-    /// What the ball is centred on. `known_law` and the parametric frameworks, which have no ball, take no other than the default.
+    /// Centre of the ball. Default: `empirical`. `known_law` and the parametric frameworks have no ball, so they accept
+    /// only the default.
     #[serde(default)]
     pub centre: CentreSpecification,
-    /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
+    /// Rule for the radius of the uncertainty set. Default: `bridge`; `chi_square` in the parametric frameworks, which
+    /// accept no other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<RadiusRule>,
-    /// The share of the radius that is acted on. Default: `balanced`, and `paper` where a `radius` is given. For the radius rules
-    /// `bridge` and `calibrated` alone.
+    /// Share of the radius that is used. Default: `balanced`, or `paper` if a `radius` is given. Levels other than
+    /// `paper` need the radius rule `bridge` or `calibrated`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub caution: Option<CautionLevel>,
-    /// What the levels are and cost on this record: found, never asked for. What a request says here is found anew.
+    /// Shares and costs of the caution levels, found by the service from the record. A value in a request is replaced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub levels: Option<Box<CautionLevels>>,
-    /// The log-returns that the adversary may use. Default: `worst_seen`. Refused by the parametric frameworks: a normal law has no
-    /// bounds.
+    /// The log-returns that the adversary may use. Default: `worst_seen`. Must be absent in the parametric frameworks,
+    /// because a normal law has no bounds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub support: Option<Support>,
-    /// The return law of the `known_law` framework; refused by the others.
+    /// The return law of the `known_law` framework, which requires it. Must be absent in the other frameworks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub law: Option<SamplingLaw>,
-    /// The log-returns observed before the start, at least two of them distinct.
+    /// The log-returns observed before the start, oldest first: 2 to 20,000 values from -5 to 5, at least two of them
+    /// distinct.
     pub history: Vec<f64>,
 }
 
@@ -107,26 +112,26 @@ pub struct ProblemSpecification {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum UtilitySpecification {
-    /// `(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth. Exactly one of its fields is given.
+    /// Exponential utility, `(1 - exp(-risk_aversion x)) / risk_aversion`. Exactly one of its fields is given.
     Exponential {
-        /// Absolute, per unit of wealth.
+        /// Absolute risk aversion, per unit of wealth, 1e-18 to 1e9.
         #[serde(default = "defaults::not_given")]
         risk_aversion: f64,
-        /// The same times the initial wealth, without unit; a completed specification has the absolute one.
+        /// Risk aversion times initial wealth, without unit, 0.001 to 100. Completion replaces it by the absolute one.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         risk_aversion_relative: Option<f64>,
     },
-    /// `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1.
+    /// Power utility, `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`.
     Power {
-        /// Relative, without unit.
+        /// Relative risk aversion, without unit, above 1 and at most 100.
         risk_aversion: f64,
     },
-    /// `ln x`.
+    /// Log utility, `ln x`.
     Log {},
 }
 
 impl UtilitySpecification {
-    /// Of constant relative risk aversion: log utility at 1, power utility above.
+    /// Returns the utility of constant relative risk aversion: log utility at 1, power utility above.
     pub fn relative(risk_aversion: f64) -> Self {
         match risk_aversion {
             1.0 => UtilitySpecification::Log {},
@@ -142,7 +147,7 @@ impl Default for UtilitySpecification {
 }
 
 impl UtilitySpecification {
-    /// Stands for one that is not given, which no JSON says.
+    /// Returns the placeholder for a utility that is left out, a value that JSON cannot express.
     pub(super) fn not_given() -> Self {
         UtilitySpecification::Power { risk_aversion: defaults::not_given() }
     }
@@ -151,12 +156,12 @@ impl UtilitySpecification {
         !matches!(self, UtilitySpecification::Power { risk_aversion } if risk_aversion.is_nan())
     }
 
-    /// Exponential utility of this absolute risk aversion.
+    /// Returns the exponential utility of this absolute risk aversion.
     pub fn exponential(risk_aversion: f64) -> Self {
         UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: None }
     }
 
-    /// The same with its risk aversion per unit of wealth, for who starts with `initial_wealth`:
+    /// Returns the utility with its risk aversion per unit of wealth, for an investor who starts with `initial_wealth`:
     /// `risk_aversion = risk_aversion_relative / initial_wealth`.
     /// Checked by: `tests/service/advise.rs::a_relative_risk_aversion_is_of_the_wealth_at_the_start`.
     #[must_use]
@@ -171,7 +176,7 @@ impl UtilitySpecification {
 }
 
 impl ProblemSpecification {
-    /// The problem of an investor who has seen `history` and whose bank pays `rate_per_step`, every default taken.
+    /// Returns the problem of an investor with this history and a bank that pays `rate_per_step`, with every default.
     pub fn of(history: Vec<f64>, rate_per_step: f64) -> Self {
         ProblemSpecification {
             framework: Framework::default(),
@@ -195,70 +200,73 @@ impl ProblemSpecification {
         }
     }
 
-    /// False where a state's worth is proportional to its wealth, and the best action does not depend on it.
+    /// Returns false if a state's value is proportional to its wealth and the best action does not depend on wealth.
     pub fn depends_on_wealth(&self) -> bool {
         matches!(self.utility, UtilitySpecification::Exponential { .. }) || !self.contributions.are_none()
     }
 
-    /// The radius rule given, or the framework's default.
+    /// Returns the radius rule given, or the framework's default.
     pub fn radius_rule(&self) -> RadiusRule {
         self.radius.unwrap_or_else(|| RadiusRule::default_of(self.framework))
     }
 
-    /// The support rule given, or the default.
+    /// Returns the support rule given, or the default.
     pub fn support_rule(&self) -> Support {
         self.support.unwrap_or_default()
     }
 }
 
-/// Which states the surrogates are trained on.
+/// The states that the surrogates are trained on.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DesignSpecification {
-    /// Basis points of the certainty equivalent by which the value served may be off, as a root mean square over the states of a
-    /// step, the errors of the steps after it included. Design points are added until fresh states say that it is reached.
-    /// Default 0.5 where there is no `count`; where the state is wealth alone, `count` decides.
+    /// Target accuracy of the value served, in basis points of the certainty equivalent, 0.01 to 100. It bounds the
+    /// root mean square error over the states of a step, including the errors of later steps. Design points are added
+    /// until fresh states show that the target is reached. Default 0.5 if there is no `count`. If the state is wealth
+    /// alone, `count` decides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
-    /// Design points per step, N; with an `accuracy`, at most. Default 1000; 200 where the state is wealth alone.
+    /// Number of design points per step, N, 10 to 10,000; with an `accuracy`, the largest number. Default 1000, or 200
+    /// if the state is wealth alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
-    /// Where the empirical laws of the design start.
+    /// Starting point of the design's empirical laws. Default: `given`.
     #[serde(default)]
     pub initial_laws: InitialLaws,
     /// The law that moves the design forward. Default: `bootstrap`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling_law: Option<SamplingLaw>,
-    /// Initial wealths of the design. Default: the initial wealth alone.
+    /// Range of initial wealths in the design. Default: the initial wealth alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wealth: Option<Interval>,
 }
 
-/// Where the design's empirical laws start.
+/// Starting point of the design's empirical laws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialLaws {
     /// Every design point starts at the history.
     #[default]
     Given,
-    /// Each design point starts at as many fresh draws of the sampling law as the history has.
+    /// Each design point starts at fresh draws of the sampling law, as many as the history has returns.
     Resampled,
 }
 
-/// How the surrogates are made.
+/// Settings of the surrogates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurrogateSpecification {
-    /// What the value surrogate regresses.
+    /// The quantity that the value surrogate regresses. Default: `floor_gain`.
     #[serde(default)]
     pub target: SurrogateTarget,
-    /// What the surrogates see of a state.
+    /// The features of a state that the surrogates use. Default: `standardized`.
     #[serde(default)]
     pub features: FeatureMap,
-    /// Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more.
+    /// Number of moments of the law among the features, 1 to 6. The parametric frameworks use at most two, because a
+    /// normal law has no more. Default 4.
     #[serde(default = "defaults::moment_count")]
     pub moment_count: usize,
-    /// Where the hyperparameters are searched.
+    /// Bounds of the hyperparameter search.
     #[serde(default)]
     pub bounds: HyperparameterBounds,
 }
@@ -274,7 +282,7 @@ impl Default for SurrogateSpecification {
     }
 }
 
-/// What the value surrogate regresses.
+/// The quantity that the value surrogate regresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SurrogateTarget {
@@ -285,27 +293,27 @@ pub enum SurrogateTarget {
     Value,
 }
 
-/// How a state becomes the inputs of a surrogate.
+/// The map from a state to the inputs of a surrogate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureMap {
-    /// Log wealth; mean, log standard deviation, skewness, log kurtosis; log radius where it varies; the worst-case
-    /// excess return over the ball.
+    /// Log wealth; mean, log standard deviation, skewness, log kurtosis; log radius if it varies; the worst-case excess
+    /// return over the ball.
     #[default]
     Standardized,
     /// Wealth and the raw moments (the paper).
     RawMoments,
 }
 
-/// Box of the maximum-likelihood search, for inputs and targets scaled to unit variance.
+/// Bounds of the maximum-likelihood search, lowest first, for inputs and targets scaled to unit variance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HyperparameterBounds {
-    /// In standard deviations of an input over the design.
+    /// Length scales, in standard deviations of an input over the design. Default: `[0.05, 1000]`.
     pub lengthscale: [f64; 2],
-    /// In mean squares of the target over the design.
+    /// Signal variances, in mean squares of the target over the design. Default: `[0.001, 100000]`.
     pub signal_variance: [f64; 2],
-    /// In mean squares of the target over the design.
+    /// Noise variances, in mean squares of the target over the design. Default: `[1e-10, 1]`.
     pub noise_variance: [f64; 2],
 }
 
@@ -315,7 +323,7 @@ impl Default for HyperparameterBounds {
     }
 }
 
-/// Of every request that has a seed.
+/// Returns the default seed of every request that has one.
 pub fn default_seed() -> u64 {
     1
 }
@@ -325,7 +333,7 @@ pub(super) mod defaults {
     pub fn horizon() -> usize {
         10
     }
-    /// Stands for a number that is not given, which no JSON says.
+    /// Returns the placeholder for a number that is left out, a value that JSON cannot express.
     pub fn not_given() -> f64 {
         f64::NAN
     }

@@ -1,13 +1,14 @@
-//! Which log-returns the adversary may use.
+//! The log-returns that the adversary may use.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Standard deviations on either side of the mean that `worst_seen` always considers, however calm the extremes seen.
+/// Number of standard deviations on either side of the mean that `worst_seen` always includes, however calm the
+/// extremes seen.
 pub const LEAST_DEVIATIONS: f64 = 5.0;
-/// Bounds of a given support, and of any that follows from a record.
+/// Largest absolute log-return in a given support, and in any that follows from a record.
 pub const LIMIT: f64 = 20.0;
-/// Multiples of the worst return seen.
+/// Allowed multiples of the worst return seen.
 pub const FACTOR: (f64, f64) = (1.0, 10.0);
 
 /// A closed interval.
@@ -20,25 +21,26 @@ pub struct Interval {
     pub max: f64,
 }
 
-/// The log-returns that the laws in a ball may give mass to. Part of the law, as its radius is: under `worst_seen` it follows the
-/// returns seen so far.
+/// The log-returns that the laws in a ball may give mass to. They depend on the law, as its radius does: under
+/// `worst_seen` they follow the returns seen so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Support {
-    /// From `min(factor z_min, m - 5 s)` to `max(factor z_max, m + 5 s)`, z_min and z_max the worst and the best log-return of the
-    /// law in the middle, m and s its mean and standard deviation; never narrower than from z_min to z_max.
+    /// From `min(factor z_min, m - 5 s)` to `max(factor z_max, m + 5 s)`, with z_min and z_max the worst and the best
+    /// log-return of the ball's centre, and m and s its mean and standard deviation. Never narrower than from z_min to
+    /// z_max.
     WorstSeen {
-        /// Multiple of the worst and the best log-return, 1 to 10.
+        /// Multiple of the worst and the best log-return, 1 to 10. Default 2.
         #[serde(default = "default_factor")]
         factor: f64,
     },
-    /// All log-returns: the paper's.
+    /// All log-returns, as in the paper.
     None {},
-    /// Those between two bounds, whatever is seen.
+    /// The log-returns between two bounds, whatever returns are seen.
     Between {
-        /// The lowest.
+        /// The lowest log-return, at least -20.
         min: f64,
-        /// The highest.
+        /// The highest log-return, at most 20.
         max: f64,
     },
 }
@@ -49,19 +51,19 @@ impl Default for Support {
     }
 }
 
-/// What a support is found from.
+/// The statistics of a law from which a support is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// The lowest and the highest log-return.
     pub ends: [f64; 2],
-    /// Of the log-returns, by their masses.
+    /// Mean of the log-returns, weighted by their masses.
     pub mean: f64,
-    /// Of the log-returns.
+    /// Variance of the log-returns, weighted by their masses.
     pub variance: f64,
 }
 
 impl Extent {
-    /// Of log-returns of equal mass.
+    /// Computes the extent of log-returns of equal mass.
     pub fn of(log_returns: impl Iterator<Item = f64> + Clone) -> Self {
         let count = log_returns.clone().count().max(1) as f64;
         let mean = log_returns.clone().sum::<f64>() / count;
@@ -72,7 +74,8 @@ impl Extent {
 }
 
 impl Support {
-    /// The interval around a law of this extent, which is asked for where it matters; `None` where every return is allowed.
+    /// Returns the interval around a law of this extent; `None` if every return is allowed. The extent is computed only
+    /// if it is needed.
     /// Checked by: `tests::twice_the_worst_or_five_deviations`.
     pub fn around(self, law: impl FnOnce() -> Extent) -> Option<Interval> {
         match self {
@@ -89,7 +92,7 @@ impl Support {
         }
     }
 
-    /// The bounds that hold whatever is seen.
+    /// Returns the bounds that do not depend on the returns seen, if the support has them.
     pub fn given(self) -> Option<Interval> {
         match self {
             Support::Between { min, max } => Some(Interval { min, max }),
@@ -106,7 +109,7 @@ fn default_factor() -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand: of -0.1, 0.02 and 0.05 the mean is -0.01 and the variance 0.0042.
+    /// By hand: the mean of -0.1, 0.02 and 0.05 is -0.01 and the variance is 0.0042.
     #[test]
     fn twice_the_worst_or_five_deviations() {
         let law = Extent::of([-0.1, 0.02, 0.05].into_iter());
@@ -117,7 +120,7 @@ mod tests {
         assert!((min + 0.01 + reach).abs() < 1e-12 && (max + 0.01 - reach).abs() < 1e-12);
         let [min, max] = ends(Support::WorstSeen { factor: 8.0 });
         assert!((min + 0.8).abs() < 1e-12 && (max - 0.4).abs() < 1e-12);
-        // A record that never fell, and one whose worst is further than five deviations.
+        // A record that never fell, and one whose worst return is further from the mean than five deviations.
         let rose = Support::default().around(|| Extent::of([0.3, 0.30001].into_iter())).unwrap();
         assert!(rose.min < 0.3 && rose.min > 0.2999 && rose.max > 0.6);
         let crash = [-0.5].into_iter().chain((0..99).map(|k| if k % 2 == 0 { 0.01 } else { -0.01 }));

@@ -1,4 +1,4 @@
-//! What a problem says of the periods of an account: all that a replay of them needs of it.
+//! The terms of an account's periods: all that a replay needs of a problem.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,26 +8,26 @@ use super::learning::Learning;
 use super::specification::ProblemSpecification;
 use crate::control::problem::dynamics::Dynamics;
 
-/// Rate, cost and flows of the periods that a policy is lived by, and how its law is learned.
+/// Rate, cost and flows of the periods in which a policy is followed, and how its law is learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Terms {
-    /// T, periods.
+    /// T, the number of periods.
     pub horizon: usize,
-    /// r, simple return of the bank per step.
+    /// r, the simple return of the bank per step, as a fraction.
     pub rate_per_step: f64,
-    /// c, of what is traded.
+    /// c, the trading cost, as a share of the amount traded.
     pub trading_cost: f64,
-    /// C, money added at the end of each period.
+    /// C, the money added at the end of each period; negative if it is withdrawn.
     pub contributions: Contributions,
-    /// What older returns weigh.
+    /// Weights of older returns in the learned law.
     pub learning: Learning,
-    /// By which a period without a day takes the next one due.
+    /// Number of periods in a year. A period reported without a date gets the next due date, found from this number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<f64>,
 }
 
 impl Terms {
-    /// Of a completed specification.
+    /// Returns the terms of a completed specification.
     pub fn of(problem: &ProblemSpecification) -> Self {
         Terms {
             horizon: problem.horizon,
@@ -39,7 +39,7 @@ impl Terms {
         }
     }
 
-    /// What becomes of money in the period after `step` periods. Nothing is said of what is still to come.
+    /// Returns the rate, cost and contribution of the period after `step` periods. Later contributions are left out.
     pub fn period(&self, step: usize) -> Dynamics {
         let plain = Dynamics::plain(self.rate_per_step, self.trading_cost);
         Dynamics { contribution: self.contributions.at(step), ..plain }

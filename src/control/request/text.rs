@@ -1,13 +1,13 @@
-//! The rule of texts that people write: names, notes, tags, reasons.
+//! The rule for text that people write: names, notes, tags, reasons.
 
 use std::ops::RangeInclusive;
 
 use crate::control::error::FieldError;
 
-/// Checks that a text has so many letters, and no control characters but those in `accepted`.
+/// Checks that a text has an allowed number of letters, and no control characters except those in `accepted`.
 ///
 /// # Errors
-/// It has more or fewer letters; it has a control character, which is named with its place.
+/// It has too few or too many letters, or a control character, which is reported with its position.
 pub fn check_text(
     field: &str,
     text: &str,

@@ -1,7 +1,7 @@
-//! What a request that keeps every rule may all the same have meant otherwise: a unit mistaken, above all.
+//! Warnings about requests that are valid but probably mistaken, above all in a unit.
 //!
-//! A warning refuses nothing, since each of these requests can be meant: banks have paid 50 % a year, and coins have moved as
-//! much in a day.
+//! A warning rejects nothing, because each of these requests can be intended: banks have paid 50 % a year, and coins
+//! have moved as much in a day.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -10,44 +10,44 @@ use crate::control::request::annualised::{self, compounded};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::specification::ProblemSpecification;
 
-/// Rates a year beyond it are rarely paid in a currency that keeps its worth.
+/// Annual rates above this are rarely paid in a currency that keeps its value.
 const HIGH_RATE_A_YEAR: f64 = 0.15;
-/// Deviations of log-returns a year beyond it are those of daily or monthly returns in percent. Shares have 0.15 to 1, coins up
-/// to 2.5; the returns of an index in percent have from 10 (months) to 16 (days).
+/// Annual deviations of log-returns above this are those of daily or monthly returns in percent. Shares have 0.15 to 1,
+/// coins up to 2.5; the returns of an index in percent have from 10 (months) to 16 (days).
 const LARGE_DEVIATION_A_YEAR: f64 = 3.0;
-/// The same of one period, where nobody says how long it is: more than most shares move in a year.
+/// Largest usual deviation of log-returns in one period of unknown length: more than most shares move in a year.
 const LARGE_DEVIATION: f64 = 0.5;
-/// Costs beyond it are those of houses, not of what is traded every period.
+/// Costs above this are those of houses, not of assets that are traded every period.
 const HIGH_TRADING_COST: f64 = 0.02;
 
-/// Something in a sound request that may be a mistake.
+/// Something in a valid request that may be a mistake.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Warning {
-    /// What is warned of.
+    /// Kind of the warning.
     pub code: WarningCode,
-    /// Dotted path in the request.
+    /// Dotted path of the field in the request.
     pub field: &'static str,
-    /// What it holds, what that means, and what it should hold if something else was meant, in sentences.
+    /// The value, what it means, and what the field should hold if something else was meant, in sentences.
     pub message: String,
 }
 
-/// What is warned of.
+/// Kind of a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarningCode {
-    /// The bank pays more than 15 % a year. Without `periods_per_year` a period is taken for a year, which it is at most.
+    /// The bank pays more than 15 % a year. Without `periods_per_year` a period counts as a year, its greatest length.
     RateHigh,
     /// The bank pays more than the mean of the record's simple returns.
     RateAboveRecord,
-    /// The record's log-returns deviate by more than 3 a year, or by more than 0.5 a period where `periods_per_year` is not
-    /// given.
+    /// The record's log-returns have a standard deviation above 3 a year, or above 0.5 a period if `periods_per_year`
+    /// is not given.
     RecordInPercent,
     /// Trading costs more than 2 %.
     TradingCostHigh,
 }
 
 impl Warning {
-    /// The same of a walk-forward, whose fields have other names; that of its returns is given.
+    /// Renames the fields to those of a walk-forward; `returns` is its field of returns.
     pub fn of_walk(self, returns: &'static str) -> Self {
         let names =
             [("problem.rate_per_step", "rate"), ("problem.trading_cost", "trading_cost"), ("problem.history", returns)];
@@ -60,7 +60,7 @@ impl Warning {
 }
 
 impl ProblemSpecification {
-    /// What may be a mistake, in the order of the request. Cost O(n ln n) for n returns.
+    /// Returns the warnings, in the order of the request. Cost O(n ln n) for n returns.
     ///
     /// Checked by: `what_is_mistaken_is_warned_of_and_what_is_usual_is_not`.
     pub fn warnings(&self) -> Vec<Warning> {
@@ -117,7 +117,7 @@ fn warning(code: WarningCode, field: &'static str, said: String) -> Warning {
     Warning { code, field, message: format!("{field} {said}.") }
 }
 
-/// A share in percent, to a tenth of it.
+/// Formats a share in percent, to a tenth of a percent.
 fn percent(share: f64) -> String {
     let shown = 100.0 * share;
     if shown < 1e6 { format!("{} %", (10.0 * shown).round() / 10.0) } else { "over a million %".into() }
@@ -127,9 +127,9 @@ fn percent(share: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Rate, periods a year, trading cost, and the deviation of returns whose mean is 1 %.
+    /// Returns the warnings for a rate, periods per year, a trading cost, and the deviation of returns with mean 1 %.
     fn warned(rate: f64, periods_per_year: Option<f64>, trading_cost: f64, deviation: f64) -> Vec<WarningCode> {
-        // Two simple returns of mean 1 %, their logarithms about `deviation` off it.
+        // Two simple returns with mean 1 %, whose log-returns have the standard deviation `deviation`.
         let history = vec![(1.01 * (1.0 + deviation.tanh())).ln(), (1.01 * (1.0 - deviation.tanh())).ln()];
         let problem =
             ProblemSpecification { periods_per_year, trading_cost, ..ProblemSpecification::of(history, rate) };
@@ -141,7 +141,8 @@ mod tests {
     fn what_is_mistaken_is_warned_of_and_what_is_usual_is_not() {
         use WarningCode::{RateAboveRecord, RateHigh, RecordInPercent, TradingCostHigh};
         let (months, days) = (Some(12.0), Some(252.0));
-        // Shares by the month, by the day, and by a year of nobody knows how long; a coin by the day; a currency of 14 % a year.
+        // Monthly shares, daily shares, and shares with a period of unknown length; a daily coin; a currency that pays
+        // 14 % a year.
         for (rate, periods, cost, deviation) in [
             (0.0025, months, 0.002, 0.045),
             (0.0001, days, 0.0005, 0.0125),
@@ -151,7 +152,8 @@ mod tests {
         ] {
             assert_eq!(warned(rate, periods, cost, deviation), [], "{rate} {periods:?} {cost} {deviation}");
         }
-        // The rate of a year for that of a month, and with nothing said of it; returns of days in percent; a cost in percent.
+        // An annual rate given as a monthly one, and with a period of unknown length; daily returns in percent; a cost
+        // in percent.
         assert_eq!(warned(0.03, months, 0.0, 0.045), [RateHigh, RateAboveRecord]);
         assert_eq!(warned(0.16, None, 0.0, 0.045), [RateHigh, RateAboveRecord]);
         assert_eq!(warned(0.03, None, 0.0, 0.045), [RateAboveRecord]);

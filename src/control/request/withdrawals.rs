@@ -1,16 +1,16 @@
-//! Whether the bank alone pays for everything that is withdrawn.
+//! Checks that the bank alone pays for everything that is withdrawn.
 
 use crate::control::error::FieldError;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::specification::ProblemSpecification;
 
-/// A bank is empty once less than this part of what it began with is not withdrawn, all at present value.
+/// Fraction of its initial money, at present value, below which the bank counts as empty.
 const ROUNDING: f64 = 1e-9;
 
-/// Checks that a wealth at the start, left in the bank, pays for everything that is withdrawn.
+/// Checks that an initial wealth, left in the bank, pays for everything that is withdrawn.
 ///
 /// # Errors
-/// It runs dry.
+/// The money runs out, or less than the required spare is left.
 pub fn check_start(problem: &ProblemSpecification, field: &str, wealth: f64) -> Result<(), FieldError> {
     let periods = Dynamics::of(problem);
     let refused = |rule: String| Err(FieldError::new(field, wealth, rule));
@@ -24,11 +24,11 @@ pub fn check_start(problem: &ProblemSpecification, field: &str, wealth: f64) -> 
     }
 }
 
-/// Checks that what selling everything leaves, `liquidated`, left in the bank, pays for everything that is withdrawn in
+/// Checks that the proceeds of selling everything, `liquidated`, pay from the bank for everything that is withdrawn in
 /// `periods`.
 ///
 /// # Errors
-/// What must be, where it runs dry.
+/// The money runs out; the text is the rule that is broken.
 pub fn check_bank(periods: &[Dynamics], liquidated: f64) -> Result<(), String> {
     let (mut left, mut discount) = (liquidated, 1.0);
     let is_empty = |period: &Dynamics| {
@@ -45,7 +45,7 @@ pub fn check_bank(periods: &[Dynamics], liquidated: f64) -> Result<(), String> {
     }
 }
 
-/// A wealth at the start with what is to come.
+/// Returns the total of an initial wealth and what is still to come.
 pub fn total_wealth(problem: &ProblemSpecification, wealth: f64) -> f64 {
     Dynamics::of(problem)[0].total(wealth, 0.0)
 }
