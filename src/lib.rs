@@ -1,15 +1,15 @@
 //! Ballast: nonparametric adaptive robust control of an investor, as a library and a service.
 //!
-//! Six floors; a floor may name only the floors below it (a test reads `src` and checks).
+//! Six layers, the lowest first; a layer may name only the layers before it (a test reads `src` and checks).
 //!
-//! - [`numerics`]: mathematics with no investor in it: Gaussian processes, empirical laws, bridges, transport.
+//! - [`numerics`]: mathematics without an investor: Gaussian processes, empirical laws, bridges, transport.
 //! - [`control`]: the paper: the problem, its uncertainty sets, the robust Bellman step, the policy.
-//! - [`returns`]: text of returns, as people paste it and programs write it, read into returns.
+//! - [`returns`]: parsing of returns from text, as people paste it and programs write it.
 //! - [`store`]: durable facts: jobs, policies, sessions, observations.
 //! - [`service`]: use cases: train, open a session, observe, act. No HTTP types.
 //! - [`http`]: translation between the wire and the use cases, and nothing else.
 //!
-//! Beside them stands [`report`], a leaf that names no floor: charts, pages and tables from data, for people to read.
+//! A leaf beside the layers, [`report`], names none of them: charts, pages and tables from data, for people to read.
 
 #![forbid(unsafe_code)]
 

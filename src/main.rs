@@ -1,4 +1,4 @@
-//! Parses the command line and runs what it names.
+//! Parses the command line and runs the command.
 
 #![forbid(unsafe_code)]
 
@@ -22,8 +22,8 @@ struct CommandLine {
     command: Command,
 }
 
-/// Its threads take little of the address space, and so do those of SQLite, which it serves too: a service whose address
-/// space is limited lives (`tests/operation/memory.rs`).
+/// The allocator, also of SQLite. The threads of both use little address space, so the service survives a limit on it
+/// (`tests/operation/memory.rs`).
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -35,47 +35,47 @@ enum Command {
     Advise(advise::AdviseArgs),
     /// Run the service.
     Serve(serve::Serve),
-    /// Train on the past, live through the next year, roll: a report on real returns.
+    /// Report a walk-forward on real returns: train on the past, follow the policy for the next year, repeat.
     Backtest(backtest::BacktestArgs),
-    /// Say what more or less caution would cost on records like the one in a file.
+    /// Report what more or less caution would cost on records like the one in a file.
     Frontier(frontier::FrontierArgs),
-    /// Say how often balls hold the law that records come from, and what they cost.
+    /// Report how often balls contain the law that records come from, and what they cost.
     Coverage(coverage::CoverageArgs),
     /// Compare frameworks out of sample, in this process.
     Evaluate(evaluate::Evaluate),
-    /// Compute the tables and figures of the paper's section 3 anew.
+    /// Recompute the tables and figures of the paper's section 3.
     Reproduce(reproduce::Reproduce),
-    /// Say who may call a service.
+    /// Manage the keys that allow callers to use a service.
     #[command(subcommand)]
     Keys(keys::Keys),
     /// Show who did what, newest first.
     Audit(audit::Audit),
-    /// Verify every row of a store by its seal or hash; reads only, beside a running service or without one.
+    /// Verify every row of a store by its seal or hash. Only reads, and works while a service runs or without one.
     Check(check::Check),
     /// Copy the database of a data folder into one file, while the service runs, and verify the copy.
     Backup(backup::Backup),
-    /// Make a data folder of a backup, verified.
+    /// Make a data folder from a backup and verify it.
     Restore(backup::Restore),
-    /// Move a data folder into PostgreSQL, every row compared, while no service runs.
+    /// Move a data folder into PostgreSQL and compare every row, while no service runs.
     Move(backup::Move),
-    /// Put one damaged thing of a data folder back from a backup, while no service runs.
+    /// Restore one damaged item of a data folder from a backup, while no service runs.
     Repair(backup::Repair),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Measure this machine's speed and accuracy.
     #[command(subcommand)]
     Bench(bench::Bench),
-    /// Measure what the live service bears on this machine.
+    /// Measure the load that the live service can bear on this machine.
     Loadtest(loadtest::LoadTest),
     /// Print the OpenAPI description.
     Openapi,
 }
 
-/// What a shell tells of a program whose reader went away.
+/// Exit code that a shell reports for a program whose output is no longer read.
 const NOBODY_READS: i32 = 141;
 
-/// Ends without a word where whoever reads what is printed has gone, as `head` does once it has read enough. Other panics are told
-/// as ever.
+/// Ends the process silently if the reader of its output is gone, as `head` is once it has read enough. Other panics
+/// are reported as usual.
 fn end_where_nobody_reads() {
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -99,7 +99,7 @@ fn main() -> ExitCode {
         }
     };
     let outcome = runtime.block_on(outcome());
-    // The process ends now, whatever a thread still computes that nobody waits for.
+    // End the process now, even if a thread still computes something that nobody waits for.
     runtime.shutdown_background();
     outcome
 }
