@@ -1,12 +1,15 @@
-//! Who did what: an entry for every change that a caller makes, written in the transaction of the change itself, so that
-//! it tells of what happened and of nothing else. [`super::audit_chain`] writes and keeps them.
+//! The audit: an entry for every change that a caller makes. The entry is written in the transaction of the change, so
+//! an entry exists if and only if the change happened. [`super::audit_chain`] writes and keeps the entries.
 //!
-//! Observations have no entry. They are most of what is ever written, and a row of theirs is what an entry is: appended
-//! once, numbered and sealed, with the key that reported it under the seal. [`Store::deeds`] shows both.
+//! Observations have no audit entry. They are most of what is ever written, and an observation's own row already serves
+//! as one: it is appended once, numbered and sealed, and the seal covers the key that reported it. [`Store::deeds`]
+//! shows both.
 //!
-//! Not done, and why: entries of calls that were refused (they change nothing, and would let anybody write; the log of
-//! requests names their keys, and metrics count them by tenant); entries for what jobs and the service itself do later (a
-//! job's row says how it ended, and its entry who asked for it).
+//! Not done, and why:
+//! - Entries for rejected calls. They change nothing, and anybody could write entries by being rejected. The request
+//!   log names their keys, and metrics count them by tenant.
+//! - Entries for what jobs and the service itself do later. A job's row records how it ended, and its audit entry
+//!   records who requested it.
 
 use std::sync::Arc;
 
@@ -16,39 +19,39 @@ use super::query::{Row, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
-/// Who changes something, and when.
+/// The caller that changes something, and the time of the change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Actor {
-    /// The name of a key; empty where none was asked for.
+    /// The name of the key; empty if no key was required.
     pub key: Arc<str>,
-    /// What the key may do, or what stands for it.
+    /// The roles of the key, or a word that replaces them if there is no key.
     pub roles: Arc<str>,
     pub at_ms: i64,
 }
 
 impl Actor {
-    /// Whoever runs a command on the store itself.
+    /// Returns the actor for a person who runs a command on the store itself.
     pub fn operator(at_ms: i64) -> Self {
         Actor { key: "".into(), roles: "operator".into(), at_ms }
     }
 
-    /// The service by itself.
+    /// Returns the actor for a change that the service makes by itself.
     pub fn service(at_ms: i64) -> Self {
         Actor { key: "".into(), roles: "service".into(), at_ms }
     }
 
-    /// The chain that its entries are in: that of its key, else of what stands for one.
+    /// Returns the chain that holds this actor's entries: named by the key, or by `roles` if there is no key.
     pub(super) fn chain(&self) -> &str {
         if self.key.is_empty() { &self.roles } else { &self.key }
     }
 
-    /// True for a call, false for an operator or the service itself.
+    /// Returns true for a caller, false for an operator or the service itself.
     pub(super) fn is_caller(&self) -> bool {
         !matches!(self.chain(), "operator" | "service")
     }
 }
 
-/// What can be done to a thing.
+/// A kind of change that the audit records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deed {
     OpenSession,
@@ -95,27 +98,27 @@ impl Deed {
     }
 }
 
-/// One thing that was done.
+/// One recorded change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AuditRow {
-    /// Order over all tenants; the cursor of [`Store::deeds`]. 0 of an observation.
+    /// Order over all tenants; the cursor of [`Store::deeds`]. It is 0 for an observation.
     pub sequence: i64,
     pub tenant: Tenant,
     pub key: String,
     pub roles: String,
     pub deed: String,
-    /// What it was done to.
+    /// The thing that was changed.
     pub object: String,
-    /// What came of it.
+    /// The result of the change.
     pub outcome: String,
     pub at_ms: i64,
-    /// From 1 in the chain of its key; of an observation, in its session.
+    /// Counts from 1 in the chain of the key; for an observation, in its session.
     pub number: i64,
-    /// Over all of it but the sequence and over the seal of the entry before; in hexadecimal digits.
+    /// Covers every field except the sequence, and the seal of the entry before; in hexadecimal digits.
     pub seal: String,
 }
 
-/// What is asked of the audit; all of it where nothing is given.
+/// Selects audit entries; an empty filter selects all of them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct AuditFilter {
     pub tenant: Option<Tenant>,
@@ -123,8 +126,8 @@ pub struct AuditFilter {
 }
 
 impl Store {
-    /// At most `limit` entries, newest first; `after` is the `sequence` of the last row of the page before. Where the object
-    /// is a session, at most as many of its observations are on the first page beside them.
+    /// Returns at most `limit` entries, newest first. `after` is the `sequence` of the last row of the page before. If
+    /// the object is a session, the first page also holds up to `limit` of its observations.
     pub async fn deeds(
         &self,
         filter: &AuditFilter,
@@ -202,7 +205,7 @@ impl AuditRow {
     }
 }
 
-/// The name of an entry in reports of damage.
+/// Returns the name of an entry for damage reports.
 pub(super) fn entry(chain: &str, tenant: &str, number: i64) -> String {
     format!("entry {number} of {chain} in the audit of {tenant}")
 }

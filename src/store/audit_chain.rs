@@ -1,17 +1,18 @@
-//! The chains that entries of the audit are in: how they grow, how they are cut, whether they are whole.
+//! The chains of audit entries: how they grow, how they are cut, and how they are verified.
 //!
-//! The entries of a key are a chain: they are numbered from 1, and each is sealed over the seal of the one before. The end
-//! of a chain and the place where it was cut stand beside it under a seal of their own, and how many chains there are under
-//! another. A check therefore finds an entry that was altered, taken out or slipped in, entries missing at either end, and
-//! a chain that is gone. Nothing of it is hidden by going on: an end that is damaged keeps the seal that does not fit.
+//! The entries of a key form a chain: they are numbered from 1, and each seal covers the seal of the entry before. A
+//! separate row stores the end of the chain and the point where it was cut, under a seal of its own. Another sealed row
+//! stores the number of chains. A check therefore finds an altered, removed or inserted entry, entries missing at
+//! either end, and a missing chain. Appending more entries hides no damage, because a damaged end keeps the seal that
+//! does not fit.
 //!
-//! Each key has a chain of its own. Who writes to a chain waits for the commit of whoever wrote to it before, which keys
-//! need not do for each other.
+//! Each key has a chain of its own. A writer to a chain waits for the commit of the previous writer to that chain, and
+//! writers with different keys need not wait for each other.
 //!
-//! [`Store::cut_audit`] drops entries by age and by nothing else, so no number of changes drives out what was done before:
-//! a caller who has made as many entries as [`Quotas`] admits within that age changes nothing more. A chain is cut once
-//! its oldest entry is a day past the age, so at most once a day, and keeps the seal at which it was cut. The cut is itself
-//! an entry, in the chain of the service.
+//! [`Store::cut_audit`] drops entries by age only, so a caller cannot push out old entries by making many changes. A
+//! caller with as many entries as [`Quotas`] allows within that age cannot change anything more. A chain is cut once
+//! its oldest entry is a day past the age, so at most once a day, and it keeps the seal at which it was cut. The cut is
+//! itself an entry, in the chain of the service.
 
 use futures_util::FutureExt;
 
@@ -23,9 +24,9 @@ use super::quotas::{self, Quotas};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
-/// Entries of one chain dropped in one transaction, so that others are not kept waiting.
+/// The number of entries of one chain that one transaction drops, so that other writers do not wait long.
 const CUT_AT_ONCE: i64 = 5_000;
-/// How far past its age the oldest entry of a chain is before the chain is cut.
+/// A chain is cut once its oldest entry is older than the age limit by this much.
 const MARGIN_MS: i64 = 24 * 60 * 60 * 1000;
 
 /// The end of a chain.
@@ -48,8 +49,8 @@ impl Store {
         self.list("reading the audit", chains(), |rows| rows.iter().map(end).collect()).await
     }
 
-    /// Drops entries from before `before_ms` of every chain whose oldest is a day older still; their number. The newest
-    /// entry of a chain stays whatever its age, so that the end is there to be compared.
+    /// Drops entries from before `before_ms` in every chain whose oldest entry is at least a day older than that.
+    /// Returns how many were dropped. The newest entry of a chain always stays, so that its end can be compared.
     pub async fn cut_audit(&self, before_ms: i64, now_ms: i64) -> Result<u64, StoreError> {
         let aged = query(
             "SELECT audit_chains.tenant, audit_chains.chain FROM audit_chains
@@ -65,7 +66,7 @@ impl Store {
         for of in found {
             match self.cut_chain(of, before_ms, now_ms).await {
                 Ok(cut) => dropped += cut,
-                // One chain that is damaged keeps none of the others.
+                // A damaged chain does not stop the others from being cut.
                 Err(error) => failed = Some(error),
             }
         }
@@ -86,10 +87,11 @@ impl Store {
     }
 }
 
-/// Writes an entry; in the transaction of what it tells of.
+/// Writes an audit entry in the transaction of the change that it records.
 ///
 /// # Errors
-/// The caller's chain has as many entries as `quotas` admits; the transaction is to be undone.
+/// Fails if the caller's chain already has as many entries as `quotas` allows; the transaction must then be rolled
+/// back.
 pub(super) async fn record(
     connection: &mut Connection<'_>,
     (quotas, actor): (Quotas, &Actor),
@@ -98,7 +100,7 @@ pub(super) async fn record(
     object: &str,
     outcome: &str,
 ) -> Result<(), Failure> {
-    // The chain is held from here on, so that no two entries follow the same one.
+    // The chain is locked from here on, so that no two entries follow the same one.
     let mut chain = Chain::hold(connection, tenant, actor.chain()).await?;
     if actor.is_caller() {
         quotas::within(Quota::AuditEntries, chain.end - chain.number, 1, quotas.audit_entries.into())?;
@@ -153,7 +155,7 @@ async fn cut(
     let connection = &mut connection;
     let tenant = Tenant::stored(&tenant);
     let mut chain = Chain::hold(connection, &tenant, &name).await?;
-    // A damaged end would be sound again.
+    // Without this check, resealing would make a damaged end look sound.
     chain.verify()?;
     let young = query("SELECT min(number) AS number FROM audit WHERE tenant = $1 AND chain = $2 AND at_ms >= $3");
     let young = connection.row(young.bind(tenant.as_str()).bind(name.as_str()).bind(before_ms)).await?;
@@ -180,12 +182,12 @@ async fn cut(
     Ok(dropped)
 }
 
-/// The chains, with their ends.
+/// Selects the chains with their ends.
 pub(super) fn chains() -> Query {
     query("SELECT * FROM audit_chains ORDER BY place")
 }
 
-/// How many chains there are; no row before the first.
+/// Selects the number of chains; there is no row before the first chain.
 pub(super) fn total() -> Query {
     query("SELECT chains, seal FROM audit_total")
 }
@@ -194,7 +196,7 @@ fn total_seal(chains: i64) -> Seal {
     Seal::of("audit total").integer(chains)
 }
 
-/// Checks that `chains` are all that were ever begun.
+/// Checks that `chains` equals the number of chains ever begun.
 pub(super) fn verify_total(total: Option<&Row>, chains: i64) -> Result<(), Failure> {
     let what = || "the number of chains of the audit".to_owned();
     match total {
@@ -206,12 +208,12 @@ pub(super) fn verify_total(total: Option<&Row>, chains: i64) -> Result<(), Failu
     }
 }
 
-/// A chain, on its way through a check from where it was cut.
+/// A chain that a check is walking, starting where the chain was cut.
 pub(super) struct Chain {
     pub tenant: String,
     pub chain: String,
     place: i64,
-    /// Entries found so far, those cut among them.
+    /// The number of the last entry checked so far; entries that were cut count.
     number: i64,
     cut_seal: Vec<u8>,
     end: i64,
@@ -233,7 +235,7 @@ impl Chain {
         })
     }
 
-    /// The chain, begun if there is none, to be changed by this transaction alone.
+    /// Locks the chain for this transaction, and begins it if there is none.
     async fn hold(connection: &mut Connection<'_>, tenant: &Tenant, chain: &str) -> Result<Self, Failure> {
         let find = || {
             let find = query("SELECT * FROM audit_chains WHERE tenant = $1 AND chain = $2");
@@ -242,7 +244,7 @@ impl Chain {
         if let Some(row) = connection.row(find()).await? {
             return Chain::from_row(&row);
         }
-        // Held from here on, so that no two begin the same chain or have one place.
+        // Locked from here on, so that no two transactions begin the same chain or use the same `place`.
         let hold = query(
             "INSERT INTO audit_total (row_id, chains, seal) VALUES (1, 0, $1)
              ON CONFLICT (row_id) DO UPDATE SET chains = audit_total.chains RETURNING chains",
@@ -275,7 +277,7 @@ impl Chain {
         Ok(begun)
     }
 
-    /// Over where it is cut and where it ends.
+    /// Computes the seal over the point of the cut and the end.
     fn seal(&self) -> Seal {
         Seal::of("audit end")
             .text(&self.tenant)
@@ -287,12 +289,12 @@ impl Chain {
             .bytes(&self.end_seal)
     }
 
-    /// Call before [`Chain::follow`].
+    /// Verifies the chain's own seal. Call this before [`Chain::follow`].
     pub(super) fn verify(&self) -> Result<(), Failure> {
         self.seal().verify(&self.own_seal, || format!("the end of {} in the audit of {}", self.chain, self.tenant))
     }
 
-    /// The entries that follow, no more than `limit`; what was added since the check began is not among them.
+    /// Selects at most `limit` following entries, without those added since the check began.
     pub(super) fn next(&self, limit: i64) -> Query {
         let next = query(
             "SELECT * FROM audit WHERE tenant = $1 AND chain = $2 AND number > $3 AND number <= $4
@@ -306,7 +308,7 @@ impl Chain {
         self.number >= self.end
     }
 
-    /// Goes on over what [`Chain::next`] found; what is damaged among it.
+    /// Advances over the rows that [`Chain::next`] found, and returns the damage among them.
     pub(super) fn follow(&mut self, rows: &[Row]) -> Result<Vec<String>, Failure> {
         let named = |number| entry(&self.chain, &self.tenant, number);
         let mut damage = Vec::new();

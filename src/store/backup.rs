@@ -1,11 +1,11 @@
-//! A folder's database as one file, and back.
+//! Backup of a folder's database into one file, and restore from it.
 //!
-//! The copy is made by `VACUUM INTO`: one read transaction, so it holds exactly what was committed when it began, and the
-//! writer goes on meanwhile. SQLite's other way, the backup API, starts anew whenever another process writes, which under
-//! load may be never, and copies pages without reading them; this reads every row, and a damaged page ends it. Its cost is
-//! that the write-ahead log grows until the copy is done.
+//! The copy is made by `VACUUM INTO`, which is one read transaction: the copy holds exactly what was committed when it
+//! began, and the writer continues meanwhile. SQLite's other way, the backup API, restarts whenever another process
+//! writes, so it may never finish under load. It also copies pages without reading them. `VACUUM INTO` reads every row
+//! and fails on a damaged page. Its cost is that the write-ahead log grows until the copy is done.
 //!
-//! Either way a name appears only once what it names is whole, verified and on the disk.
+//! In both directions the final file name appears only after the file is complete, verified and synced to disk.
 
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{Error, ErrorKind};
@@ -19,17 +19,17 @@ use super::error::{Failure, StoreError, unusable};
 use super::sqlite::held::unstamp;
 use super::sqlite::opening::{DATABASE, connect, inspect, lock, migrate, opening, version};
 
-/// How a copy with damaged things in it is treated.
+/// How to treat a copy that contains damaged rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Damage {
-    /// There is none.
+    /// Damage is an error.
     Refused,
-    /// It is kept, with them as they are; each is told.
+    /// The copy is kept with its damaged rows as they are, and each is reported.
     Skipped,
 }
 
 impl Damage {
-    /// The outcome of a check, where it found damage.
+    /// Turns reported damage into success if damage is to be skipped.
     fn accept(self, checked: Result<(), StoreError>) -> Result<(), StoreError> {
         match checked {
             Err(StoreError::Damaged { .. }) if self == Damage::Skipped => Ok(()),
@@ -38,18 +38,18 @@ impl Damage {
     }
 }
 
-/// Copies the database of `dir` into the new file `out`, readable by its owner alone, and verifies the copy, telling what
-/// was verified. A process may hold the folder and write.
+/// Copies the database of `dir` into the new file `out`, readable by its owner alone. Then verifies the copy and
+/// reports through `tell` what was verified. A process may hold the folder and write meanwhile.
 ///
 /// # Errors
-/// `out` exists, another backup writes `out.partial`, the file or, unless that is skipped, a thing in it is damaged, or the disk fails; nothing is
-/// left at `out`.
+/// Fails if `out` exists, another backup is writing `out.partial`, the file is damaged, or the disk fails. A damaged
+/// row fails too, unless damage is skipped. Nothing is left at `out` after a failure.
 pub async fn backup(dir: &Path, out: &Path, damage: Damage, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     refuse_existing(out)?;
     let partial = beside(out, ".partial");
     let held = begin(&partial)?;
     let copied = async {
-        // Another backup may have ended since.
+        // Another backup may have finished in the meantime.
         refuse_existing(out)?;
         copy(dir, &partial).await?;
         unstamp(&partial)?;
@@ -58,17 +58,17 @@ pub async fn backup(dir: &Path, out: &Path, damage: Damage, tell: &mut impl FnMu
     };
     let copied = copied.await;
     if copied.is_err() {
-        // What failed is what the caller must hear.
+        // The first failure is the one to report.
         let _ = std::fs::remove_file(&partial);
     }
     drop(held);
     copied
 }
 
-/// An empty file of a backup under way, held by a lock, so that what a killed backup left is told from one that runs.
+/// Opens an empty file for a backup and locks it, so that a leftover of a killed backup differs from a running backup.
 ///
 /// # Errors
-/// Another backup is writing it.
+/// Fails if another backup is writing it.
 fn begin(partial: &Path) -> Result<File, StoreError> {
     let begin = || {
         let file = OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(partial)?;
@@ -85,19 +85,19 @@ fn begin(partial: &Path) -> Result<File, StoreError> {
     Ok(file)
 }
 
-/// Makes `dir` a folder with the database of the backup `from`, its schema brought up to date, and verifies it, telling
-/// what was verified.
+/// Creates the database of `dir` from the backup `from` and brings its schema up to date. Then verifies it and reports
+/// through `tell` what was verified.
 ///
 /// # Errors
-/// `dir` holds a database or is held by a process, the backup is damaged, unless that is skipped, or of a later release, or the disk fails; `dir`
-/// then has no database.
+/// Fails if `dir` holds a database or a process holds `dir`, or if the disk fails. A backup that is damaged fails too,
+/// unless damage is skipped, as does one of a later release. `dir` has no database after a failure.
 pub async fn restore(from: &Path, dir: &Path, damage: Damage, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     let held = lock(dir)?;
     let (database, partial) = (dir.join(DATABASE), dir.join(DATABASE).with_extension("partial"));
     for taken in [database.clone(), beside(&database, "-wal"), beside(&database, "-journal")] {
         refuse_existing(&taken)?;
     }
-    // What a restore that was cut off left; the lock says that nobody is at it.
+    // Files left by an interrupted restore; the lock guarantees that no restore is using them.
     let leftovers = ["", "-wal", "-shm", "-journal"].map(|end| beside(&partial, end));
     leftovers.iter().try_for_each(|file| remove(file))?;
     let restored = async {
@@ -127,7 +127,7 @@ async fn copy(dir: &Path, partial: &Path) -> Result<(), StoreError> {
     connection.close().await.map_err(opening)
 }
 
-/// Gives what is verified its name, durably.
+/// Gives a verified file its final name, durably.
 fn publish(partial: &Path, name: &Path) -> Result<(), StoreError> {
     let folder = match name.parent() {
         Some(folder) if folder != Path::new("") => folder,

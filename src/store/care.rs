@@ -1,4 +1,4 @@
-//! Which sessions need care, as conditions of a list's statement: counted over all that match, and listed by reason.
+//! Conditions in SQL that select the sessions that need attention: counted over all matches, and listed by reason.
 
 use super::codec::from_sql;
 use super::error::Failure;
@@ -7,16 +7,16 @@ use super::statement::{ANSWER, HORIZON, IS_WAITING, OBSERVATIONS, Statement};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
-/// Why a session needs care.
+/// The reason why a session needs attention.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Care {
     /// Its next report is late, by the calendar of its policy.
     Overdue,
     /// It waits for its next policy.
     Renewal,
-    /// Its returns have changed.
+    /// Its drift alarm is raised.
     Alarm,
-    /// It is completed, or in its last period without a renewal to follow by itself.
+    /// It is completed, or it is in its last period and no automatic renewal follows.
     Ending,
 }
 
@@ -24,23 +24,23 @@ impl Care {
     pub const ALL: [Care; 4] = [Care::Overdue, Care::Renewal, Care::Alarm, Care::Ending];
 }
 
-/// What is late at the moment at which care is judged.
+/// The dates that decide which reports are late, at the moment of the query.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Today {
     pub first_days: Vec<FirstDay>,
 }
 
-/// The first day after which nothing is late yet, for sessions by policies of so many periods a year.
+/// The first day on which a report is not yet late, for sessions whose policy has this many periods a year.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstDay {
     pub periods_per_year: f64,
-    /// As 2008-09-30.
+    /// For example 2008-09-30.
     pub date: String,
-    /// Its beginning.
+    /// The beginning of that day.
     pub begin_ms: i64,
 }
 
-/// How many sessions match, how many of them need care, and why; one may have several reasons.
+/// How many sessions match, how many of them need attention, and for which reasons; a session may have several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CareCounts {
     pub sessions: usize,
@@ -52,7 +52,7 @@ pub struct CareCounts {
 }
 
 impl Store {
-    /// How many periods a year the policies of a tenant have, each number once.
+    /// Lists the distinct numbers of periods a year among the policies of a tenant.
     pub async fn calendars(&self, tenant: &Tenant) -> Result<Vec<f64>, StoreError> {
         let found = query(
             "SELECT DISTINCT periods_per_year FROM policies
@@ -75,7 +75,7 @@ impl Care {
     }
 }
 
-/// Adds the condition that a session needs this care. A completed one needs it for its end alone.
+/// Adds the condition that a session needs this kind of attention. A completed session only matches `Ending`.
 pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
     if care != Care::Ending {
         statement.and(&format!("({OBSERVATIONS} < {HORIZON} OR {IS_WAITING}) AND "), []);
@@ -108,7 +108,7 @@ pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
     }
 }
 
-/// Adds the condition that a session needs care for any reason.
+/// Adds the condition that a session needs attention for any reason.
 pub(super) fn needs_any(statement: &mut Statement, today: &Today) {
     statement.and(" AND (", []);
     for (place, care) in Care::ALL.into_iter().enumerate() {

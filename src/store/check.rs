@@ -1,9 +1,10 @@
-//! Whether what is stored is what was written: every row is read once, every seal and every hash computed anew.
+//! Checks that stored data is what was written: reads every row once and recomputes every seal and hash.
 //!
-//! It reads only, over a connection of its own, a page of rows at a time, so it runs beside a process that writes: what
-//! is added or deleted meanwhile is sound or gone. Damage of one thing does not end it: it lists all. Cost: one pass over the database, and memory for one policy or one session.
+//! A check only reads, over a connection of its own, one page of rows at a time. It can therefore run beside a process
+//! that writes: rows added or deleted meanwhile are sound or gone. Damage does not end the check; it lists all damage.
+//! Cost: one pass over the database, and memory for one policy or one session.
 //!
-//! Not found: a session that lost its last entries, whole rows, observations and nothing else (see the head of [`super`]).
+//! Not found: a session whose last rows are missing, if all of them are observations (see the head of [`super`]).
 
 use std::path::Path;
 
@@ -22,11 +23,11 @@ use super::sessions::SessionRow;
 use super::{PostgresUrl, entries, leases, migrations, policies, postgres, sqlite};
 
 const DOING: &str = "checking the store";
-/// Rows of jobs, policies or sessions read at a time.
+/// The number of rows of jobs, policies or sessions read at a time.
 const PAGE: i64 = 256;
 
-/// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an entry $2 and for
-/// each of several assets $3.
+/// Selects each tenant with its stored totals and the sums over its rows. $1 is the overhead of a row in bytes, $2 the
+/// size of an entry, and $3 the addition to an entry for each of several assets.
 pub(super) const TOTALS: &str = "
     WITH parts (tenant, sessions, bytes) AS (
         SELECT tenant, 0, $1 FROM jobs
@@ -45,7 +46,7 @@ pub(super) const TOTALS: &str = "
            usage.bytes AS kept, CAST(sums.bytes AS BIGINT) AS summed
     FROM usage FULL JOIN sums ON sums.tenant = usage.tenant";
 
-/// Sessions of which the audit has more corrections or renewals than there are entries.
+/// Selects sessions for which the audit has more corrections or renewals than there are entries.
 const UNRECORDED: &str = "
     SELECT DISTINCT object FROM (
         SELECT object, CASE deed WHEN 'session.correct' THEN 'correction' ELSE 'renewal' END AS kind, count(*) AS recorded
@@ -54,7 +55,7 @@ const UNRECORDED: &str = "
     WHERE recorded > (SELECT count(*) FROM entries WHERE entries.session = object AND entries.kind = changes.kind)
     ORDER BY object";
 
-/// The parts of a check, in its order.
+/// The parts of a check, in the order in which they run.
 #[derive(Debug, Clone, Copy)]
 enum Part {
     File,
@@ -74,7 +75,7 @@ impl Part {
 /// A store about to be checked.
 pub struct Inspection {
     reader: Reader,
-    /// The things that are not what was written, so far.
+    /// The damage found so far.
     damage: Vec<String>,
 }
 
@@ -90,15 +91,15 @@ impl From<Reader> for Inspection {
 }
 
 impl Inspection {
-    /// The database of a folder, whether or not a process holds it.
+    /// Opens the database of a folder, even if a process holds it.
     ///
     /// # Errors
-    /// There is none, or it cannot be read.
+    /// Fails if there is no database or it cannot be read.
     pub async fn of_folder(dir: &Path) -> Result<Self, StoreError> {
         sqlite::opening::inspect(dir).await.map(|connection| Reader::Sqlite(connection).into())
     }
 
-    /// A [`backup`](super::backup), which nobody writes to.
+    /// Opens a [`backup`](super::backup), to which nothing writes.
     ///
     /// # Errors
     /// As [`Inspection::of_folder`].
@@ -106,13 +107,15 @@ impl Inspection {
         sqlite::opening::inspect_file(file).await.map(|connection| Reader::Sqlite(connection).into())
     }
 
+    /// Connects to the database at `url`.
+    ///
     /// # Errors
-    /// The database is not reached.
+    /// Fails if the database cannot be reached.
     pub async fn of_database(url: &PostgresUrl) -> Result<Self, StoreError> {
         postgres::inspect(url).await.map(|connection| Reader::Postgres(connection).into())
     }
 
-    /// Checks everything, and tells a sentence for each kind of thing that is sound and for each thing that is not.
+    /// Checks everything, and calls `tell` with a sentence for each sound kind of data and for each damaged thing.
     ///
     /// # Errors
     /// [`StoreError::Damaged`] counts what is damaged; [`StoreError::NewerSchema`] and [`StoreError::OlderSchema`] say that
@@ -145,7 +148,7 @@ impl Inspection {
     async fn all(&mut self, tell: &mut impl FnMut(String)) -> Result<(), Failure> {
         for part in Part::ALL {
             let before = self.damage.len();
-            // A part that cannot be read at all is damage of the file; the others may be read.
+            // A part that cannot be read at all counts as damage of the file; the other parts may still be readable.
             let found = self.part(part).await;
             let sentence = self.note(found)?;
             match (sentence, &self.damage[before..]) {
@@ -153,14 +156,14 @@ impl Inspection {
                 (_, damage) => damage.iter().for_each(|what| tell(format!("damaged: {what}"))),
             }
             if self.damage.iter().any(|what| what.starts_with("the ")) && matches!(part, Part::File) {
-                // Rows of pages that are damaged need not be what the driver can read.
+                // The driver may fail to read rows on damaged pages.
                 break;
             }
         }
         Ok(())
     }
 
-    /// The value that was read, unless it is damaged.
+    /// Returns the value that was read; records damage and returns `None` if it is damaged.
     fn note<T>(&mut self, read: Result<T, Failure>) -> Result<Option<T>, Failure> {
         let failure = match read {
             Ok(value) => return Ok(Some(value)),
@@ -171,7 +174,7 @@ impl Inspection {
         Ok(None)
     }
 
-    /// Checks a part; a sentence that counts what it has.
+    /// Checks a part, and returns a sentence that counts what it holds.
     async fn part(&mut self, part: Part) -> Result<String, Failure> {
         Ok(match part {
             Part::File => {
@@ -225,7 +228,7 @@ impl Inspection {
         Ok((found.len(), entries))
     }
 
-    /// What SQLite knows of its file: the trees and indexes, and that no row refers to one that is not there.
+    /// Runs SQLite's own checks: its trees and indexes are intact, and no row refers to a missing one.
     async fn file(&mut self) -> Result<(), Failure> {
         if let Reader::Postgres(_) = self.reader {
             return Ok(());
@@ -247,7 +250,7 @@ impl Inspection {
 
     async fn policies(&mut self) -> Result<usize, Failure> {
         let (mut after, mut checked) = (0, 0);
-        // One at a time: a policy may have megabytes.
+        // One at a time, because a policy may take megabytes.
         let next = "SELECT sequence, policy, json FROM policies WHERE sequence > $1 ORDER BY sequence LIMIT 1";
         while let Some(row) = self.read(query(next).bind(after)).await?.first() {
             (after, checked) = (row.get("sequence")?, checked + 1);
@@ -294,7 +297,7 @@ impl Inspection {
         }
     }
 
-    /// What quotas go by: the totals of each tenant against its rows.
+    /// Compares the totals of each tenant, which quotas are based on, with its rows.
     async fn totals(&mut self) -> Result<usize, Failure> {
         let totals = self.read(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES).bind(ASSET_BYTES)).await?;
         for row in &totals {
@@ -316,7 +319,7 @@ impl Inspection {
     }
 }
 
-/// How many entries of a session there are, and those among them that are damaged or missing.
+/// Counts the entries of a session, and lists those that are damaged or missing.
 fn each(session: &str, rows: &[Row]) -> Result<(usize, Vec<String>), Failure> {
     let (mut last, mut damage) = (0, Vec::new());
     for row in rows {

@@ -1,14 +1,14 @@
-//! How numbers and seals become bytes.
+//! Encoding of numbers and seals as bytes.
 
 use sha2::{Digest, Sha256};
 
 use super::error::Failure;
 
-/// SHA-256 over the fields of a row, each preceded by its length, numbers by their bits.
+/// SHA-256 over the fields of a row. Texts and bytes are preceded by their length; numbers enter by their bits.
 pub(super) struct Seal(Sha256);
 
 impl Seal {
-    /// `thing` separates the seals of different tables.
+    /// Starts a seal; `thing` separates the seals of different tables.
     pub(super) fn of(thing: &str) -> Self {
         Seal(Sha256::new()).text(thing)
     }
@@ -37,7 +37,7 @@ impl Seal {
         self.0.finalize().to_vec()
     }
 
-    /// Fails with `what` as the damaged thing where the stored seal is another.
+    /// Fails with `what` as the damaged thing if the stored seal differs.
     pub(super) fn verify(self, stored: &[u8], what: impl FnOnce() -> String) -> Result<(), Failure> {
         if self.finish() == stored { Ok(()) } else { Err(Failure::Corrupt(what())) }
     }
@@ -51,18 +51,18 @@ pub(super) fn encode_reals(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// `None` where the length is not a multiple of eight.
+/// Returns `None` if the length is not a multiple of eight.
 pub(super) fn decode_reals(bytes: &[u8]) -> Option<Vec<f64>> {
     let (numbers, rest) = bytes.as_chunks::<8>();
     rest.is_empty().then(|| numbers.iter().map(|&number| f64::from_le_bytes(number)).collect())
 }
 
-/// A count as SQL holds it. Counts beyond `i64` do not occur; they saturate.
+/// Converts a count for SQL. Counts beyond `i64` do not occur; they saturate.
 pub(super) fn to_sql(count: usize) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
 }
 
-/// A count from SQL; negative ones are damage.
+/// Reads a count from SQL; a negative one is damage.
 pub(super) fn from_sql(count: i64) -> Result<usize, Failure> {
     usize::try_from(count).map_err(|_| Failure::Corrupt(format!("a count of {count}")))
 }

@@ -1,7 +1,8 @@
-//! What happened in a session: append-only entries, numbered from 1 in the order they were recorded.
+//! The events of a session: append-only entries, numbered from 1 in the order they were recorded.
 //!
-//! An entry says what was reported and what was answered. It is appended by who knows all entries before it, since its
-//! number is theirs and one more: of two who append at once one does not, reads what the other wrote, and decides again.
+//! An entry stores what was reported and what was answered. A writer must know all earlier entries, because it numbers
+//! the new entry one above the last. If two writers append at once, one fails, reads the other's entry, and decides
+//! again.
 
 use std::sync::LazyLock;
 
@@ -18,40 +19,40 @@ use super::quotas::{self, Quotas, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError};
 
-/// What an entry is of.
+/// The kind of event that an entry records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EntryKind {
     /// A period that passed.
     Observation,
-    /// Another report of a period that passed before.
+    /// A corrected report of an earlier period.
     Correction,
-    /// The policy that the session goes on by.
+    /// The policy that the session continues with.
     Renewal,
 }
 
-/// One entry; as read, verified against its seal.
+/// One entry; verified against its seal when it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EntryRow {
     pub session: String,
     pub entry: usize,
     pub kind: EntryKind,
-    /// From 1 among those of its kind: the period, or which correction it is.
+    /// Counts from 1 among the entries of its kind: the period, or the number of the correction.
     pub number: usize,
-    /// What was reported: the same content under the same number is a repeat.
+    /// The report: the same content under the same number is a repeat.
     pub content_json: String,
     pub answer_json: String,
-    /// Numbers that either of them names by their place.
+    /// The numbers that `content_json` and `answer_json` refer to by position.
     pub numbers: Vec<u8>,
     pub created_ms: i64,
-    /// The name of the key that reported it; empty where none was asked for.
+    /// The name of the key that reported it; empty if no key was required.
     pub key: String,
 }
 
-/// What became of an entry to append.
+/// The outcome of an append.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Append {
     Appended,
-    /// Its number is not the one after the last entry's: somebody else wrote meanwhile.
+    /// Its number is not one above the last entry's, because another writer appended meanwhile.
     NotNext,
     NoSession,
     /// Its tenant has no such policy.
@@ -67,7 +68,7 @@ impl EntryKind {
         }
     }
 
-    /// What numbers of its kind count.
+    /// Returns the word for what the numbers of this kind count.
     pub fn counted(self) -> &'static str {
         match self {
             EntryKind::Observation => "period",
@@ -84,11 +85,12 @@ impl EntryKind {
 }
 
 impl Store {
-    /// Appends the entry after the last, or says why not; decided and written in one transaction. An observation has its
-    /// room since the session was opened or renewed; every other entry takes its own, and is told of in the audit.
+    /// Appends the entry after the last, or returns why it was not appended; decides and writes in one transaction. The
+    /// quota for an observation was already reserved when the session was opened or renewed. Every other entry reserves
+    /// its own quota and gets an audit entry.
     ///
     /// # Errors
-    /// [`StoreError::OverQuota`] where there is no room for what is no observation.
+    /// [`StoreError::OverQuota`] if an entry other than an observation exceeds the quota.
     pub async fn append(&self, new: EntryRow) -> Result<Append, StoreError> {
         if new.kind != EntryKind::Observation {
             let (quotas, actor, session) = (self.quotas, self.actor.clone(), new.session.clone());
@@ -104,12 +106,12 @@ impl Store {
         }
     }
 
-    /// The newest entry of a kind and number: a period that is observed again after it was taken out is in another.
+    /// Returns the newest entry of this kind and number. A period observed again after its removal has a newer entry.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where the row is not what was written.
+    /// [`StoreError::Corrupt`] if the row is not what was written.
     pub async fn entry(&self, session: &str, kind: EntryKind, number: usize) -> Result<Option<EntryRow>, StoreError> {
-        // No entry stands before as many of its kind.
+        // The entry with number n of its kind is at least the n-th entry.
         let find = query(
             "SELECT * FROM entries WHERE session = $1 AND entry >= $2 AND number = $2 AND kind = $3
              ORDER BY entry DESC LIMIT 1",
@@ -118,11 +120,11 @@ impl Store {
         self.read("reading an entry", find, |rows| rows.first().map(EntryRow::from_row).transpose()).await
     }
 
-    /// Every entry of the session, in order. `None` where there is no such session, by the same statement: a session that
-    /// is deleted meanwhile is never one without entries.
+    /// Returns every entry of the session, in order, or `None` if there is no such session. One statement reads both,
+    /// so a session deleted meanwhile never looks like one without entries.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where a row is not what was written or one is missing.
+    /// [`StoreError::Corrupt`] if a row is not what was written or one is missing.
     pub async fn entries(&self, session: &str) -> Result<Option<Vec<EntryRow>>, StoreError> {
         self.read("reading entries", all_of(session), |rows| numbered(session, rows)).await
     }
@@ -136,7 +138,7 @@ pub(super) fn all_of(session: &str) -> Query {
     all.bind(session)
 }
 
-/// What [`all_of`] finds, each row verified and none missing before the last.
+/// Decodes the rows of [`all_of`], verifying each and that none is missing before the last.
 pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Option<Vec<EntryRow>>, Failure> {
     let Some(first) = rows.first() else { return Ok(None) };
     if first.get::<Option<i64>>("entry")?.is_none() {
@@ -149,8 +151,8 @@ pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Option<Vec<EntryRo
     }
 }
 
-/// Appends by one statement, which commits by itself: two that append the same entry, or one beside a deletion, meet at the
-/// table's keys. Why an entry is not appended is found out after.
+/// Appends by one statement, which commits by itself. The table's keys decide between two writers of the same entry, or
+/// between an append and a deletion. The reason for a failure is looked up afterwards.
 async fn append_shared(database: &Database, new: EntryRow) -> Result<Append, StoreError> {
     match database.execute(APPENDING, bind_row(query(INSERT_ONE.as_str()), &new)).await {
         Ok(rows) if rows > 0 => Ok(Append::Appended),
@@ -161,17 +163,17 @@ async fn append_shared(database: &Database, new: EntryRow) -> Result<Append, Sto
     }
 }
 
-/// What appending calls itself in errors.
+/// Names the operation in errors.
 pub(super) const APPENDING: &str = "appending an entry";
 
-/// The row is inserted by a statement that decides itself whether it is the next one; why it was not is found out after.
-/// It changes rows by that statement only.
+/// Inserts the row by a statement that itself checks that it is the next one. The reason for a failure is looked up
+/// afterwards. No other statement here changes rows.
 pub(super) async fn append(mut connection: Connection<'_>, new: EntryRow) -> Result<Append, Failure> {
     append_next(&mut connection, &new).await.map(|(append, _)| append)
 }
 
-/// As [`append`], and the tenant whose session it is. Observations come without the lock: it must not keep them from referring
-/// to the session, or each would wait for the other.
+/// Appends like [`append`], and also returns the tenant of the session. Observations are inserted without this row
+/// lock. The lock must not block their reference to the session, or the two could deadlock.
 pub(super) async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<(Append, Tenant), Failure> {
     let session = query("SELECT tenant FROM sessions WHERE session = $1").bind(new.session.as_str());
     let Some(found) = connection.row(session.for_update_but_references()).await? else {
@@ -182,7 +184,7 @@ pub(super) async fn append_next(connection: &mut Connection<'_>, new: &EntryRow)
     Ok((append, Tenant::stored(&found.get::<String>("tenant")?)))
 }
 
-/// Appends an entry that was given no room when its session was opened, and tells of it in the audit.
+/// Appends an entry that had no quota reserved when its session was opened, and records it in the audit.
 async fn append_with_room(
     mut connection: Connection<'_>,
     new: EntryRow,
@@ -197,7 +199,7 @@ async fn append_with_room(
     Ok(append)
 }
 
-/// Room for so many entries more, and what it was taken for.
+/// Reserves quota for `room` more entries, and records in the audit what it is for.
 pub(super) async fn take_room(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -214,10 +216,11 @@ pub(super) async fn take_room(
 
 const NAMES: &str = "session, entry, kind, number, content_json, answer_json, numbers, created_ms, access_key, seal";
 const COLUMNS: usize = 10;
-/// The entry after the last that `new.session` has.
+/// Selects the number after the last entry of `new.session`.
 const NEXT: &str = "(SELECT coalesce(max(entry), 0) + 1 FROM entries WHERE entries.session = new.session)";
 
-/// Inserts a row whose entry is the one after the last of a session that exists, unless another is about to be that.
+/// Inserts a row if its session exists and it is the session's next entry, unless another transaction inserts that
+/// entry.
 static INSERT_ONE: LazyLock<String> = LazyLock::new(|| {
     let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${column}")).collect();
     format!(
@@ -228,9 +231,9 @@ static INSERT_ONE: LazyLock<String> = LazyLock::new(|| {
     )
 });
 
-/// Powers of two, so that any number of rows finds a statement of less than twice its size.
+/// The sizes are powers of two, so that any number of rows fits a statement of less than twice its size.
 const SIZES: usize = 7;
-/// Rows that one statement takes at most.
+/// The most rows that one statement inserts.
 pub(super) const ROWS_AT_ONCE: usize = 1 << (SIZES - 1);
 
 static INSERT_MANY: [LazyLock<String>; SIZES] = [
@@ -243,8 +246,8 @@ static INSERT_MANY: [LazyLock<String>; SIZES] = [
     LazyLock::new(|| insert_all(64)),
 ];
 
-/// Inserts so many rows of SQLite, or none: one that is not the next of its session has no seal, which the table refuses,
-/// and a session that does not exist is refused as what it refers to. Values not bound are NULL, a row of them is none.
+/// Inserts `rows` rows into SQLite, or none. A row that is not the next of its session gets no seal, which the table
+/// rejects. A row of an unknown session fails its foreign key. Unbound values are NULL, and rows of them are skipped.
 fn insert_all(rows: usize) -> String {
     let sealed = NAMES.replace("seal", &format!("CASE entry WHEN {NEXT} THEN seal END"));
     let row = format!("({})", ["?"; COLUMNS].join(", "));
@@ -255,10 +258,10 @@ fn insert_all(rows: usize) -> String {
     )
 }
 
-/// Inserts up to [`ROWS_AT_ONCE`] rows, all of them or none, by one statement of SQLite.
+/// Inserts up to [`ROWS_AT_ONCE`] rows into SQLite by one statement, all of them or none.
 ///
 /// # Errors
-/// Also where not all of them are the next ones of sessions that exist.
+/// Fails too if some row is not the next one of a session that exists.
 pub(super) async fn append_all(connection: &mut Connection<'_>, new: &[&EntryRow]) -> Result<(), Failure> {
     let size = new.len().next_power_of_two().trailing_zeros() as usize;
     let insert = new.iter().fold(query(INSERT_MANY[size].as_str()), |insert, new| bind_row(insert, new));
@@ -280,12 +283,12 @@ fn bind_row(insert: Query, new: &EntryRow) -> Query {
 }
 
 impl EntryRow {
-    /// The head of its session where this is the last entry.
+    /// Returns the head of its session if this is the last entry.
     pub fn head(&self) -> Head {
         Head { entries: self.entry, seal: self.seal().finish() }
     }
 
-    /// Entries that it is counted as: a correction may have a long reason.
+    /// Returns how many entries it counts as, because a correction may have a long reason.
     fn room(&self) -> i64 {
         let lengths = [self.content_json.len(), self.answer_json.len(), self.session.len(), self.key.len()];
         1 + (quotas::SEALED_BYTES + to_sql(lengths.into_iter().sum())) / quotas::ENTRY_BYTES
@@ -304,7 +307,7 @@ impl EntryRow {
             .text(&self.key)
     }
 
-    /// An observation as the audit shows it, its own seal verified.
+    /// Verifies an observation's seal and returns it as an audit row.
     pub(super) fn told(row: &Row) -> Result<AuditRow, Failure> {
         let observation = EntryRow::from_row(row)?;
         Ok(AuditRow {
@@ -325,7 +328,7 @@ impl EntryRow {
         Self::beside(row, "created_ms", "seal")
     }
 
-    /// The entry of a row that has a session beside it, so that its time and its seal have names of their own.
+    /// Reads the entry from a row that is joined with a session, so that its time and its seal have other column names.
     pub(super) fn beside(row: &Row, created_ms: &str, seal: &str) -> Result<Self, Failure> {
         let read = EntryRow {
             session: row.get("session")?,
@@ -341,6 +344,8 @@ impl EntryRow {
         read.verified(&row.get::<Vec<u8>>(seal)?)
     }
 
+    /// Verifies the entry against its seal.
+    ///
     /// # Errors
     /// [`Failure::Corrupt`] if this is not the entry that was sealed.
     pub(super) fn verified(self, seal: &[u8]) -> Result<Self, Failure> {

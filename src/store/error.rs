@@ -1,4 +1,4 @@
-//! Errors of the store: what the caller, the operator and the process must do next.
+//! Errors of the store, classified by what the caller, the operator and the process must do next.
 
 mod postgres;
 mod sqlite;
@@ -8,27 +8,28 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-/// Why the store could not answer. Clones share the cause, since one failed commit answers a whole group.
+/// The reason why the store could not answer. Clones share the cause, because one failed commit answers a whole group.
 #[derive(Debug, Clone, Error)]
 pub enum StoreError {
-    /// No room for the write; nothing of it was kept, and reads go on.
+    /// There is no disk space for the write; nothing of it was kept, and reads continue.
     #[error("the disk is full")]
     Full { source: Arc<sqlx::Error> },
-    /// An I/O error, a failed fsync or a damaged file of SQLite: what is in memory can no longer be trusted. The process must exit.
+    /// An I/O error, a failed fsync or a damaged file of SQLite: the state in memory can no longer be trusted. The
+    /// process must exit.
     #[error("the store failed while {doing}; the process must restart")]
     Fatal { doing: &'static str, source: Arc<sqlx::Error> },
-    /// Busy, closing, or not reached. The same request may succeed later.
+    /// The store is busy, closing, or not reached. The same request may succeed later.
     #[error("the store is unavailable while {doing}")]
     Unavailable { doing: &'static str, source: Option<Arc<sqlx::Error>> },
     /// The file has a schema newer than this binary's.
     #[error("the store has schema {found}, newer than {known}, the newest this binary knows")]
     NewerSchema { found: i64, known: i64 },
-    /// The file has a schema older than this binary's; where nothing may be changed, it is not brought up to date.
+    /// The file has a schema older than this binary's; it is not brought up to date in a mode that may change nothing.
     #[error(
         "the store has schema {found}, older than {known}, this binary's; a start of the service brings it up to date"
     )]
     OlderSchema { found: i64, known: i64 },
-    /// A file that the process holds is not the one of its name any more: what it writes is lost. The process must exit.
+    /// A file that the process holds is no longer the one with its name, so its writes are lost. The process must exit.
     #[error("{} was moved, removed or replaced under the process that holds it; the process must restart", path.display())]
     Replaced { path: PathBuf },
     /// Another process holds the folder.
@@ -40,13 +41,13 @@ pub enum StoreError {
     /// One stored thing is not what was written; everything else may be sound.
     #[error("{what} is damaged")]
     Corrupt { what: String },
-    /// Things that a check found not to be what was written.
+    /// Things that a check found to be damaged.
     #[error("{first} is damaged{}", and_others(*others))]
     Damaged { first: String, others: usize },
     /// A repair was refused.
     #[error("nothing is repaired: {reason}")]
     NotRepaired { reason: String },
-    /// A folder's rows that are not in the database they were to be moved to.
+    /// A move was refused because rows of the folder are not in the target database.
     #[error("nothing was moved: {reason}")]
     NotMoved { reason: String },
     /// The folder or the lock file cannot be used.
@@ -55,7 +56,7 @@ pub enum StoreError {
     /// The database refused a statement: a defect of this program.
     #[error("the store refused a statement while {doing}")]
     Refused { doing: &'static str, source: Arc<sqlx::Error> },
-    /// A tenant would keep more than it may; nothing of the write was kept.
+    /// The write would exceed a quota of the tenant; nothing of it was kept.
     #[error(transparent)]
     OverQuota(OverQuota),
     /// The schema could not be brought up to date.
@@ -71,17 +72,17 @@ fn and_others(count: usize) -> String {
     }
 }
 
-/// What a tenant may keep so much of and no more; how much is set in [`Quotas`](super::Quotas).
+/// A limited resource of a tenant; the limits are set in [`Quotas`](super::Quotas).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quota {
     QueuedJobs,
     Sessions,
     Bytes,
-    /// Entries that the audit keeps of one key.
+    /// The entries that the audit keeps of one key.
     AuditEntries,
 }
 
-/// A tenant would keep more than it may.
+/// An exceeded quota of a tenant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("the tenant keeps {kept} {} and may keep {limit}; this takes {wanted} more", quota.counted())]
 pub struct OverQuota {
@@ -92,7 +93,7 @@ pub struct OverQuota {
 }
 
 impl Quota {
-    /// The option of `ballast serve` that sets it.
+    /// Returns the option of `ballast serve` that sets it.
     pub fn option(self) -> &'static str {
         match self {
             Quota::QueuedJobs => "quota-queued-jobs",
@@ -113,7 +114,7 @@ impl Quota {
 }
 
 impl StoreError {
-    /// True where SQLite may have rolled the whole transaction back, so that nothing of its group can be kept.
+    /// Returns true if SQLite may have rolled the whole transaction back, so that nothing of its group can be kept.
     pub(super) fn ends_group(&self) -> bool {
         matches!(self, StoreError::Full { .. } | StoreError::Unavailable { .. }) || self.is_fatal()
     }
@@ -123,12 +124,12 @@ impl StoreError {
     }
 }
 
-/// A file or folder that the system does not give.
+/// Returns the error for a file or folder that the operating system does not let this process use.
 pub(super) fn unusable(path: &Path, error: std::io::Error) -> StoreError {
     StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) }
 }
 
-/// What an engine's error means to whoever waits for an answer, whichever engine it is.
+/// The meaning of an engine's error for a caller, independent of the engine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Cause {
     Full,
@@ -138,10 +139,10 @@ pub(super) enum Cause {
     Refused,
 }
 
-/// What goes wrong inside an operation, before it is known what was being done.
+/// A failure inside an operation, before the name of the operation is added.
 #[derive(Debug)]
 pub(super) enum Failure {
-    /// What the engine's error means is found where it is met, so that nobody above needs to know the engine.
+    /// The error is classified at its source, so that the layers above need not know the engine.
     Engine(Cause, sqlx::Error),
     Corrupt(String),
     OverQuota(OverQuota),
@@ -156,10 +157,10 @@ impl Failure {
         Failure::Engine(postgres::cause(&error), error)
     }
 
-    /// The damage of one stored thing.
+    /// Returns the description of damage to one stored thing.
     ///
     /// # Errors
-    /// It is no damage of one thing.
+    /// Returns the failure itself if it is anything else.
     pub(super) fn damage(self) -> Result<String, Failure> {
         match self {
             Failure::Corrupt(what) => Ok(what),

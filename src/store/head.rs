@@ -1,9 +1,9 @@
-//! The head of a session: what tells whether it is still what it was.
+//! The head of a session, which shows if the session has changed.
 
 /// How many entries a session has, and the seal of its last row.
 ///
-/// Rows are only appended, and a seal covers the time its row was made: equal heads mean equal sessions, even where the
-/// database was restored from a copy and went on differently.
+/// Rows are only appended, and a seal covers the time its row was made. Equal heads therefore mean equal sessions, even
+/// if the database was restored from a copy and then continued differently.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Head {
     /// Number of entries.

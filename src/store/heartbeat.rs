@@ -1,5 +1,5 @@
-//! The newest moment that a folder's process knew of, so that a clock that jumped is seen: a folder has no clock but its
-//! machine's. A database has its own.
+//! The latest time that a folder's process stored, used to detect a clock that jumped. A folder has no clock but its
+//! machine's; a database has its own.
 
 use futures_util::FutureExt;
 
@@ -7,7 +7,7 @@ use super::query::{Row, query};
 use super::{Engine, Store, StoreError};
 
 impl Store {
-    /// The clock of the database, in milliseconds; `None` over a folder, which has none.
+    /// Returns the clock of the database, in milliseconds; `None` for a folder, which has none.
     pub async fn database_time(&self) -> Result<Option<i64>, StoreError> {
         match &self.engine {
             Engine::Sqlite(_) => Ok(None),
@@ -15,7 +15,7 @@ impl Store {
         }
     }
 
-    /// The moment that was stored last.
+    /// Returns the time that was stored last.
     pub async fn heartbeat(&self) -> Result<Option<i64>, StoreError> {
         let found = |rows: &[Row]| rows.first().map(|row| row.get("at_ms")).transpose();
         self.probe("reading the last heartbeat", query("SELECT at_ms FROM heartbeat"), found).await

@@ -1,25 +1,25 @@
-//! Idempotency keys of sessions: the same key and request again find the session that the first one opened.
+//! Idempotency keys of sessions: the same key and request again find the session that the first request opened.
 //!
-//! A key is its tenant's, over jobs and sessions alike, and lives as long as what it made.
+//! A key belongs to its tenant, over jobs and sessions alike, and lives as long as what it made.
 
 use super::error::Failure;
 use super::query::{Connection, query};
 use super::tenant::Tenant;
 
-/// Before the specification of a training that was made for sessions. No caller can send such a key: no header has a line
-/// break.
+/// Prefix of the idempotency key of a training that was made for sessions. No caller can send such a key, because no
+/// header contains a line break.
 pub(super) const FOR_SESSIONS: &str = "shared\n";
 
-/// What tells a repeated request from a new one.
+/// The parts that distinguish a repeated request from a new one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RequestKey {
-    /// As the user chose it.
+    /// The idempotency key as the user chose it.
     pub key: String,
-    /// Hash of the request as the user sent it: tells a repeat from another request under the same key.
+    /// Hash of the request as the user sent it; distinguishes a repeat from another request under the same key.
     pub request_hash: String,
 }
 
-/// What a key was used for.
+/// The earlier use of a key.
 pub(super) enum Used {
     /// The same request, which opened this session.
     BySame { session: Option<String> },
@@ -27,7 +27,7 @@ pub(super) enum Used {
     ByAnother,
 }
 
-/// What the key was used for before; `None` for a new key.
+/// Returns the earlier use of the key; `None` for a new key.
 pub(super) async fn used(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -40,7 +40,7 @@ pub(super) async fn used(
     Ok(Some(if is_same { Used::BySame { session: used.get("session")? } } else { Used::ByAnother }))
 }
 
-/// Takes the key for a session. False where somebody else took it in the meantime.
+/// Takes the key for a session. Returns false if another transaction took it in the meantime.
 pub(super) async fn take(
     connection: &mut Connection<'_>,
     tenant: &Tenant,

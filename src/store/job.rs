@@ -1,4 +1,4 @@
-//! What a job is, as stored.
+//! Stored jobs.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,7 +10,7 @@ use super::labels::Relabel;
 use super::query::Row;
 use super::tenant::Tenant;
 
-/// What a job computes.
+/// The kind of computation that a job runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobKind {
@@ -45,11 +45,11 @@ pub struct NewJob {
     pub kind: JobKind,
     /// The completed request, as the worker reads it back.
     pub request_json: String,
-    /// Hash of the request as the user sent it: tells a repeat from another request under the same key.
+    /// Hash of the request as the user sent it; distinguishes a repeat from another request under the same key.
     pub request_hash: String,
     pub idempotency_key: Option<String>,
     pub steps_total: usize,
-    /// What the policy of a training is to be called.
+    /// The labels for the policy of a training.
     pub labels: Relabel,
     pub created_ms: i64,
 }
@@ -66,24 +66,24 @@ pub struct JobRow {
     pub steps_total: usize,
     /// Number of checkpoints saved; equals `steps_total` once succeeded.
     pub steps_done: usize,
-    /// A user asked for it to stop; its worker has yet to.
+    /// True if a user asked for it to stop and its worker has not stopped yet.
     pub cancel_requested: bool,
     /// How often it was claimed: the fencing token of its present worker.
     pub attempt: i64,
     /// How many workers died under it, or fell silent past their lease, since it last saved a checkpoint.
     pub deaths: i64,
-    /// The policy of a succeeded training, even where that policy was deleted since.
+    /// The policy of a succeeded training, even if that policy was deleted since.
     pub policy: Option<String>,
-    /// Why it failed.
+    /// The reason why it failed.
     pub error: Option<String>,
     pub created_ms: i64,
-    /// When it was first claimed.
+    /// The time it was first claimed.
     pub started_ms: Option<i64>,
-    /// When it reached its terminal state.
+    /// The time it reached its terminal state.
     pub finished_ms: Option<i64>,
 }
 
-/// What became of a [`NewJob`].
+/// The outcome of creating a [`NewJob`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum CreateJob {
     Created(JobRow),
@@ -93,12 +93,12 @@ pub enum CreateJob {
     KeyConflict,
 }
 
-/// A job in the hands of a worker, until its lease runs out.
+/// A job held by a worker, until its lease runs out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClaimedJob {
     pub row: JobRow,
     pub request_json: String,
-    /// To be named in every write of this worker.
+    /// The attempt that every write of this worker must name.
     pub attempt: i64,
 }
 
@@ -110,7 +110,7 @@ pub enum JobOutcome {
         policy_id: String,
         policy_json: Vec<u8>,
     },
-    /// A job whose result is a report and no policy.
+    /// A job whose result is a report instead of a policy.
     Reported {
         report_json: String,
     },
@@ -130,7 +130,7 @@ pub struct JobCounts {
     pub cancelled: u64,
 }
 
-/// Since when the job waits that has waited longest, and since when the one runs that has run longest.
+/// The start of the longest wait among queued jobs, and of the longest run among running jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct OldestJobs {
     pub queued_ms: Option<i64>,

@@ -1,4 +1,4 @@
-//! The life of a job as a pure function; SQL stores the answer.
+//! The life of a job as a pure function; SQL stores the resulting state.
 //!
 //! ```text
 //!            Claim            Succeed, Fail, Cancel
@@ -49,10 +49,10 @@ impl JobState {
     pub const ALL: [JobState; 5] =
         [JobState::Queued, JobState::Running, JobState::Succeeded, JobState::Failed, JobState::Cancelled];
 
-    /// The state after `event`.
+    /// Returns the state after `event`.
     ///
     /// # Errors
-    /// Every event on a terminal state, and every pair the diagram above lacks.
+    /// Fails for every event on a terminal state, and for every pair that the diagram above lacks.
     pub fn next(self, event: JobEvent) -> Result<JobState, IllegalTransition> {
         use JobState::{Cancelled, Failed, Queued, Running, Succeeded};
         match (self, event) {
@@ -67,12 +67,12 @@ impl JobState {
         }
     }
 
-    /// True where no event changes the state any more.
+    /// Returns true if no event can change the state any more.
     pub fn is_terminal(self) -> bool {
         matches!(self, JobState::Succeeded | JobState::Failed | JobState::Cancelled)
     }
 
-    /// The name on the wire and in SQL.
+    /// Returns the name on the wire and in SQL.
     pub fn as_str(self) -> &'static str {
         match self {
             JobState::Queued => "queued",

@@ -1,4 +1,4 @@
-//! Jobs as users see them: created once, listed, cancelled, deleted once they have ended.
+//! Jobs as users see them: created once, listed, cancelled, and deleted after they have ended.
 
 use futures_util::FutureExt;
 
@@ -18,7 +18,7 @@ impl Store {
     /// Queues a job and records its idempotency key, both or neither.
     ///
     /// # Errors
-    /// [`StoreError::OverQuota`] where the tenant has as many jobs queued, or keeps as many bytes, as it may.
+    /// [`StoreError::OverQuota`] if the tenant has used up its quota of queued jobs or of bytes.
     pub async fn create_job(&self, new: NewJob) -> Result<CreateJob, StoreError> {
         let (quotas, actor) = (self.quotas, self.actor.clone());
         self.write("creating a job", move |connection| create(connection, new, quotas, actor).boxed()).await
@@ -29,7 +29,7 @@ impl Store {
         self.list("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
     }
 
-    /// The job that a tenant's idempotency key made.
+    /// Returns the job that a tenant's idempotency key made.
     pub async fn job_by_key(&self, tenant: &Tenant, key: &str) -> Result<Option<JobRow>, StoreError> {
         let find = query(
             "SELECT jobs.* FROM idempotency_keys JOIN jobs ON jobs.job = idempotency_keys.job
@@ -39,7 +39,7 @@ impl Store {
         self.list("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
     }
 
-    /// The report of a tenant's succeeded job.
+    /// Returns the report of a tenant's succeeded job.
     pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Option<String>, StoreError> {
         let find = query(
             "SELECT json FROM job_reports JOIN jobs ON jobs.job = job_reports.job
@@ -49,7 +49,7 @@ impl Store {
         self.list("reading a report", find, |rows| rows.first().map(|row| row.get("json")).transpose()).await
     }
 
-    /// Length of the report of a job.
+    /// Returns the length of the report of a job, in bytes.
     pub async fn report_bytes(&self, tenant: &Tenant, job: &str) -> Result<Option<usize>, StoreError> {
         let find = query(
             "SELECT CAST(octet_length(json) AS BIGINT) AS bytes FROM job_reports JOIN jobs ON jobs.job = job_reports.job
@@ -59,7 +59,7 @@ impl Store {
         self.list("measuring a report", find, |rows| rows.first().map(|row| row.length("bytes")).transpose()).await
     }
 
-    /// Whether a user asked for the job to stop; false where there is no such job.
+    /// Returns whether a user asked for the job to stop; false if there is no such job.
     pub async fn is_to_stop(&self, job: &str) -> Result<bool, StoreError> {
         let asked = query("SELECT cancel_requested FROM jobs WHERE job = $1").bind(job);
         let asked = self.probe("asking whether a job is to stop", asked, |rows| {
@@ -68,7 +68,8 @@ impl Store {
         Ok(asked.await?.unwrap_or(false))
     }
 
-    /// At most `limit` jobs of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
+    /// Returns at most `limit` jobs of a tenant, newest first; `after` is the `sequence` of the last row of the page
+    /// before.
     pub async fn jobs(&self, tenant: &Tenant, limit: usize, after: Option<i64>) -> Result<Vec<JobRow>, StoreError> {
         let page = query("SELECT * FROM jobs WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3")
             .bind(tenant.as_str())
@@ -77,8 +78,8 @@ impl Store {
         self.list("listing jobs", page, |rows| rows.iter().map(JobRow::from_row).collect()).await
     }
 
-    /// Cancels a queued job at once and flags a running one; a terminal job stays as it is. `None` where there is no such
-    /// job, else the job as it is now.
+    /// Cancels a queued job at once and flags a running one; a terminal job stays as it is. Returns `None` if there is
+    /// no such job, else the job as it is now.
     pub async fn request_cancel(&self, job: &str, now_ms: i64) -> Result<Option<JobRow>, StoreError> {
         let (job, actor) = (job.to_owned(), self.actor.clone());
         self.write("cancelling a job", move |connection| cancel(connection, job, actor, now_ms).boxed()).await
@@ -119,7 +120,8 @@ impl Store {
     }
 }
 
-/// The tenant's turn stays locked: nobody else queues for it, nor takes its idempotency key, in between.
+/// Creates a job while the tenant's turn is locked: no other transaction queues a job for the tenant, nor takes its
+/// idempotency key, in between.
 async fn create(
     mut connection: Connection<'_>,
     new: NewJob,
@@ -151,7 +153,7 @@ async fn create(
     count(connection, &new, bytes, quotas, actor).await.map(CreateJob::Created)
 }
 
-/// Inserts a job and its request; the bytes that they take.
+/// Inserts a job and its request, and returns the bytes that they take.
 pub(super) async fn insert(connection: &mut Connection<'_>, new: &NewJob) -> Result<i64, Failure> {
     let insert =
         query("INSERT INTO jobs (job, kind, state, steps_total, created_ms, tenant) VALUES ($1, $2, $3, $4, $5, $6)");
@@ -171,7 +173,7 @@ pub(super) async fn insert(connection: &mut Connection<'_>, new: &NewJob) -> Res
     Ok(bytes)
 }
 
-/// Counts what a new job takes, and tells of it in the audit.
+/// Counts the bytes of a new job, and records it in the audit.
 pub(super) async fn count(
     connection: &mut Connection<'_>,
     new: &NewJob,
@@ -186,7 +188,7 @@ pub(super) async fn count(
     row.ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
 }
 
-/// What an idempotency key used before answers; `None` for a new key.
+/// Returns the answer for an idempotency key that was used before; `None` for a new key.
 async fn repeated(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -206,7 +208,7 @@ async fn repeated(
     }
 }
 
-/// The job, to be changed by this transaction alone.
+/// Finds the job and locks it for this transaction.
 pub(super) async fn find(connection: &mut Connection<'_>, job: &str) -> Result<Option<JobRow>, Failure> {
     let find = query("SELECT * FROM jobs WHERE job = $1").bind(job).for_update();
     connection.row(find).await?.as_ref().map(JobRow::from_row).transpose()
@@ -231,7 +233,7 @@ pub(super) async fn cancel(
     find(connection, &job).await
 }
 
-/// Sets a terminal state; the checkpoints and the request are needed no more.
+/// Sets a terminal state, and deletes the checkpoints and the request, which are no longer needed.
 pub(super) async fn end(
     connection: &mut Connection<'_>,
     row: &JobRow,
@@ -254,7 +256,7 @@ pub(super) async fn end(
     quotas::change(connection, &row.tenant, Usage::of_bytes(-bytes)).await.map(drop)
 }
 
-/// Labels to give, as a column; empty where there are none.
+/// Encodes labels for their column; empty if there are none.
 fn labels_json(labels: &Relabel) -> Result<String, Failure> {
     if labels.is_empty() {
         return Ok(String::new());
@@ -262,7 +264,7 @@ fn labels_json(labels: &Relabel) -> Result<String, Failure> {
     serde_json::to_string(labels).map_err(|error| Failure::Corrupt(format!("labels that cannot be written ({error})")))
 }
 
-/// What the policy of a job is to be called.
+/// Reads the labels for the policy of a job.
 pub(super) async fn labels_of(connection: &mut Connection<'_>, job: &str) -> Result<Relabel, Failure> {
     let find = query("SELECT labels_json FROM job_requests WHERE job = $1").bind(job);
     let found: String = connection.row(find).await?.map_or(Ok(String::new()), |row| row.get("labels_json"))?;
@@ -272,7 +274,7 @@ pub(super) async fn labels_of(connection: &mut Connection<'_>, job: &str) -> Res
     serde_json::from_str(&found).map_err(|error| Failure::Corrupt(format!("the labels of job {job} ({error})")))
 }
 
-/// The sum of the column `bytes`.
+/// Sums the column `bytes`.
 fn sum(rows: &[Row]) -> Result<i64, Failure> {
     rows.iter().map(|row| row.get::<i64>("bytes")).sum()
 }

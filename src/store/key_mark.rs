@@ -1,5 +1,6 @@
-//! A mark beside a folder's database that it had keys: a database that was lost, or rolled back to before its first key, is
-//! then not answered to everybody. PostgreSQL has no such place; there `--require-keys` says so.
+//! A marker file beside a folder's database that says that the store had keys. If the database is lost, or rolled back
+//! to before its first key, the service then does not answer calls without a key. PostgreSQL has no folder for such a
+//! file; there `--require-keys` has the same effect.
 
 use std::fs::File;
 use std::io::{ErrorKind, Write};
@@ -12,12 +13,12 @@ const MARK: &str = "ballast.keys";
 const CONTENT: &[u8] = b"The database beside this file has keys. Without a key in it the service does not start while this file is here.\n";
 
 impl Store {
-    /// The mark that there were keys, if it was made.
+    /// Returns the path of the marker file, if it exists.
     pub fn key_mark(&self) -> Option<PathBuf> {
         self.mark().filter(|mark| mark.exists())
     }
 
-    /// Makes the mark; nothing where it is made or has no place.
+    /// Creates the marker file; does nothing if it exists or the store has no folder.
     pub fn mark_keys(&self) -> Result<(), StoreError> {
         self.mark().map_or(Ok(()), |mark| make(&mark).map_err(|error| unusable(&mark, error)))
     }

@@ -1,4 +1,4 @@
-//! Keys: who may call what, for which tenant. Of a key's text only the SHA-256 ever comes here.
+//! Keys: which calls a key allows, and for which tenant. Only the SHA-256 of a key's text is ever stored.
 
 use std::fmt;
 use std::path::Path;
@@ -16,7 +16,7 @@ use super::tenant::Tenant;
 use super::{Engine, PostgresUrl, Store, StoreError, sqlite};
 use crate::control::error::FieldError;
 
-/// What a key lets its holder do.
+/// A role of a key: what it allows its holder to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum KeyRole {
     /// Everything that changes nothing.
@@ -25,7 +25,7 @@ pub enum KeyRole {
     Operate,
     /// Queue and cancel jobs, import and delete policies.
     Train,
-    /// All of it, and the figures of the whole service.
+    /// Everything above, and the figures of the whole service.
     Admin,
 }
 
@@ -42,28 +42,28 @@ pub struct NewKey {
     pub tenant: Tenant,
     pub roles: KeyRoles,
     pub created_ms: i64,
-    /// From then on it is none.
+    /// The key is not in force from this time on.
     pub expires_ms: Option<i64>,
 }
 
-/// A key to store in the place of another, whose tenant and roles it takes.
+/// A key that replaces another, with the same tenant and roles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Successor {
     pub key: String,
     pub hash: [u8; 32],
     pub created_ms: i64,
-    /// Where it is not given, the key is in force for as long as the one before was made for.
+    /// If `None`, the key is in force for as long as the replaced key was made for.
     pub expires_ms: Option<i64>,
 }
 
-/// What became of a rotation.
+/// The outcome of a rotation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rotate {
-    /// Both are in force; the old one is shown as it is now.
+    /// Both are in force; `old` is the replaced key as it is now.
     Rotated { old: Box<KeyRow>, new: Box<KeyRow> },
     /// There is no key of this name.
     Absent,
-    /// It is no longer in force, so there is nothing to hand over.
+    /// The key is no longer in force, so it cannot be replaced.
     Ended,
 }
 
@@ -82,9 +82,9 @@ pub struct KeyRow {
 /// The keys of a store, oldest first.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StoredKeys {
-    /// Revoked ones among them.
+    /// The valid keys, including revoked ones.
     pub sound: Vec<KeyRow>,
-    /// Names of keys that are not as they were written, and let nobody in.
+    /// Names of keys that are not as they were written; they admit no call.
     pub damaged: Vec<String>,
 }
 
@@ -100,32 +100,34 @@ impl StoredKeys {
         Ok(keys)
     }
 
-    /// True if there never was a key.
+    /// Returns true if there never was a key.
     pub fn is_empty(&self) -> bool {
         self.sound.is_empty() && self.damaged.is_empty()
     }
 }
 
-/// The keys of a store, held beside whoever serves it.
+/// The keys of a store, opened beside a process that may be serving it.
 pub struct KeyRing(Store);
 
 impl KeyRing {
-    /// The keys of a folder, created if absent, whether or not a process serves it: SQLite lets a second process write
-    /// between two transactions of the first, and what is written here nothing else writes.
+    /// Opens the keys of a folder, which is created if absent, even if a process serves it. SQLite lets a second
+    /// process write between two transactions of the first, and nothing else writes these rows.
     ///
     /// # Errors
-    /// [`StoreError::Locked`] where the schema is to be brought up to date and a process serves the folder, else as
+    /// [`StoreError::Locked`] if the schema must be brought up to date while a process serves the folder, else as
     /// [`Store::open`].
     pub async fn open(dir: &Path) -> Result<KeyRing, StoreError> {
         Ok(KeyRing(Store::over(Engine::Sqlite(sqlite::Folder::open_beside(dir).await?))))
     }
 
-    /// As [`KeyRing::open`], but makes nothing: [`StoreError::Folder`] if there is no database.
+    /// Opens the keys like [`KeyRing::open`], but creates nothing: [`StoreError::Folder`] if there is no database.
     pub async fn open_existing(dir: &Path) -> Result<KeyRing, StoreError> {
         sqlite::opening::existing(&dir.join(sqlite::opening::DATABASE))?;
         KeyRing::open(dir).await
     }
 
+    /// Opens the keys of a PostgreSQL database.
+    ///
     /// # Errors
     /// As [`Store::connect`].
     pub async fn connect(url: &PostgresUrl) -> Result<KeyRing, StoreError> {
@@ -135,7 +137,7 @@ impl KeyRing {
     pub async fn create(&self, new: NewKey) -> Result<(), StoreError> {
         let actor = Actor::operator(new.created_ms);
         self.0.write("creating a key", move |connection| create(connection, new, actor).boxed()).await?;
-        // A service makes the mark too, where this cannot.
+        // A service creates the marker file too, if this fails.
         let _ = self.0.mark_keys();
         Ok(())
     }
@@ -144,20 +146,20 @@ impl KeyRing {
         self.0.keys().await
     }
 
-    /// Revokes a key for good; one revoked before stays as it is. False where there is none of this name.
+    /// Revokes a key for good; an already revoked key stays as it is. Returns false if there is no key of this name.
     pub async fn revoke(&self, key: &str, now_ms: i64) -> Result<bool, StoreError> {
         let key = key.to_owned();
         self.0.write("revoking a key", move |connection| revoke(connection, key, now_ms).boxed()).await
     }
 
-    /// Stores a successor of `key`, and has `key` itself expire at `old_expires_ms` where it would not sooner; both or
-    /// neither, so that there is no moment without a key in force.
+    /// Stores a successor of `key`, and makes `key` itself expire at `old_expires_ms` unless it expires sooner. Both
+    /// happen or neither, so that there is always a key in force.
     pub async fn rotate(&self, key: &str, new: Successor, old_expires_ms: i64) -> Result<Rotate, StoreError> {
         let key = key.to_owned();
         self.0.write("rotating a key", move |connection| rotate(connection, key, new, old_expires_ms).boxed()).await
     }
 
-    /// As [`Store::deeds`].
+    /// Lists audit entries like [`Store::deeds`].
     pub async fn deeds(
         &self,
         filter: &AuditFilter,
@@ -173,7 +175,7 @@ impl KeyRing {
 }
 
 impl Store {
-    /// Every key, each verified by itself: one that is damaged hides no other.
+    /// Returns every key, each verified by itself: a damaged key hides no other.
     pub async fn keys(&self) -> Result<StoredKeys, StoreError> {
         let all = query("SELECT * FROM access_keys ORDER BY sequence");
         self.probe("reading the keys", all, StoredKeys::from_rows).await
@@ -186,7 +188,7 @@ async fn create(mut connection: Connection<'_>, new: NewKey, actor: Actor) -> Re
     audit_chain::record(&mut connection, (Quotas::NONE, &actor), &tenant, Deed::CreateKey, &key, &outcome).await
 }
 
-/// The key, to be changed by this transaction alone.
+/// Finds the key and locks it for this transaction.
 async fn find(connection: &mut Connection<'_>, key: &str) -> Result<Option<KeyRow>, Failure> {
     let find = query("SELECT * FROM access_keys WHERE access_key = $1").bind(key).for_update();
     connection.row(find).await?.as_ref().map(KeyRow::from_row).transpose()
@@ -266,7 +268,7 @@ impl From<NewKey> for KeyRow {
 }
 
 impl KeyRow {
-    /// Over all of it; a time that is not set is as far off as none comes.
+    /// Computes the seal over every field; a time that is not set counts as `i64::MAX`.
     fn seal(&self) -> Seal {
         Seal::of("key")
             .text(&self.key)
@@ -278,7 +280,7 @@ impl KeyRow {
             .integer(self.expires_ms.unwrap_or(i64::MAX))
     }
 
-    /// Whether it was revoked, or has expired by `now_ms`.
+    /// Returns true if the key was revoked, or has expired by `now_ms`.
     pub fn has_ended(&self, now_ms: i64) -> bool {
         self.revoked_ms.is_some() || self.expires_ms.is_some_and(|expires_ms| expires_ms <= now_ms)
     }
@@ -304,7 +306,7 @@ impl KeyRow {
 impl KeyRole {
     pub const ALL: [KeyRole; 4] = [KeyRole::Read, KeyRole::Operate, KeyRole::Train, KeyRole::Admin];
 
-    /// The name on the wire, on the command line and in SQL.
+    /// Returns the name on the wire, on the command line and in SQL.
     pub fn as_str(self) -> &'static str {
         match self {
             KeyRole::Read => "read",
@@ -316,15 +318,17 @@ impl KeyRole {
 }
 
 impl KeyRoles {
+    /// Sorts the roles and drops repeated ones.
+    ///
     /// # Errors
-    /// There is none.
+    /// Fails if there are no roles.
     pub fn new(mut roles: Vec<KeyRole>) -> Result<Self, FieldError> {
         roles.sort();
         roles.dedup();
         if roles.is_empty() { Err(FieldError::new("roles", "[]", "must hold a role")) } else { Ok(KeyRoles(roles)) }
     }
 
-    /// Whether its holder may do what needs `role`.
+    /// Returns whether the roles allow what needs `role`.
     pub fn include(&self, role: KeyRole) -> bool {
         self.0.contains(&role) || self.0.contains(&KeyRole::Admin)
     }

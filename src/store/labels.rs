@@ -1,8 +1,8 @@
-//! What a tenant calls its policies and sessions: a name, notes and tags.
+//! The labels of a tenant's policies and sessions: a name, notes and tags.
 //!
-//! They describe and find things, and nothing is computed from them: no seal covers them, and a policy's name by its content
-//! and a session's advice are the same whatever they are called. Both kinds of thing have their labels in one table, each
-//! row written in the transaction of what it is of, and gone with it.
+//! Labels describe things and make them findable, and nothing is computed from them. No seal covers them, and neither a
+//! policy's content hash nor a session's advice depends on them. Both kinds of thing have their labels in one table.
+//! Each row is written in the transaction of the thing it labels, and deleted with it.
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -21,45 +21,47 @@ use super::{Store, StoreError};
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
 
-/// Letters of a name, of notes and of a tag.
+/// The most letters of a name.
 pub const LONGEST_NAME: usize = 100;
 pub const LONGEST_NOTES: usize = 2_000;
 pub const LONGEST_TAG: usize = 50;
 /// Tags of one thing.
 pub const MOST_TAGS: usize = 20;
 
-/// What a policy or a session is called; each part is empty where nothing was said.
+/// The labels of a policy or a session; a part that was not set is empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Labels {
-    /// Not necessarily of this one alone.
+    /// The name, which need not be unique.
     pub name: String,
     pub notes: String,
     pub tags: Vec<String>,
 }
 
-/// A change of labels: what is absent stays, what is null or empty is cleared.
+/// A change of labels: an absent field stays, a null or empty one is cleared.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Relabel {
     /// At most 100 letters, without control characters.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// At most 2,000 letters, without control characters but line breaks.
+    /// At most 2,000 letters, without control characters except line breaks.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     pub notes: Option<String>,
-    /// At most 20, each another, of 1 to 50 letters without control characters.
+    /// At most 20 distinct tags, each of 1 to 50 letters without control characters.
     #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
     pub tags: Option<Vec<String>>,
 }
 
-/// A field that is there, be it null.
+/// Deserializes a field that is present, even if it is null.
 pub fn given<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserializer: D) -> Result<Option<T>, D::Error> {
     Option::<T>::deserialize(deserializer).map(|value| Some(value.unwrap_or_default()))
 }
 
 impl Relabel {
+    /// Checks every field.
+    ///
     /// # Errors
-    /// The first field that breaks its rule.
+    /// Fails with the first field that breaks its rule.
     pub fn check(&self) -> Result<(), FieldError> {
         if let Some(name) = &self.name {
             check_text("name", name, 0..=LONGEST_NAME, &[])?;
@@ -83,27 +85,28 @@ impl Relabel {
         Ok(())
     }
 
-    /// Whether it changes nothing, whatever the labels are.
+    /// Returns true if it changes nothing, whatever the labels are.
     pub fn is_empty(&self) -> bool {
         *self == Relabel::default()
     }
 }
 
 impl Labels {
-    /// As they are after a change.
+    /// Returns the labels after a change.
     pub fn after(self, change: &Relabel) -> Labels {
         let Relabel { name, notes, tags } = change.clone();
         Labels { name: name.unwrap_or(self.name), notes: notes.unwrap_or(self.notes), tags: tags.unwrap_or(self.tags) }
     }
 
-    /// Of a row with the columns `name`, `notes` and `tags`, of a join that may have found none.
+    /// Reads a row with the columns `name`, `notes` and `tags`; the values are NULL if a join found no labels.
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let text = |column: &str| row.get::<Option<String>>(column).map(Option::unwrap_or_default);
         let tags = text("tags")?.split('\n').filter(|tag| !tag.is_empty()).map(str::to_owned).collect();
         Ok(Labels { name: text("name")?, notes: text("notes")?, tags })
     }
 
-    /// Tags as a column has them: each between line breaks, which no tag holds, so that a whole tag is found as a part.
+    /// Encodes the tags for their column. Each stands between line breaks, which no tag contains, so that a substring
+    /// search finds whole tags.
     fn tags_column(&self) -> String {
         if self.tags.is_empty() { String::new() } else { format!("\n{}\n", self.tags.join("\n")) }
     }
@@ -114,23 +117,24 @@ impl Labels {
         texts.iter().map(|text| quotas::length(text.as_bytes())).sum::<i64>() + words::bytes(&self.words())
     }
 
-    /// The words of the name and of the tags.
+    /// Returns the words of the name and of the tags.
     fn words(&self) -> BTreeSet<String> {
         words::words(&format!("{}\n{}", self.name, self.tags.join("\n")))
     }
 }
 
 impl Store {
-    /// What a policy or a session of a tenant is called; nothing where there is none.
+    /// Returns the labels of a tenant's policy or session; empty labels if there are none.
     pub async fn labels(&self, tenant: &Tenant, object: &str) -> Result<Labels, StoreError> {
         let find = query(FIND).bind(tenant.as_str()).bind(object);
         self.list("reading labels", find, |rows| rows.first().map_or(Ok(Labels::default()), Labels::from_row)).await
     }
 
-    /// Changes what a policy or a session of a tenant is called; as it is called now. `None` where there is none.
+    /// Changes the labels of a tenant's policy or session, and returns the new labels. Returns `None` if the tenant has
+    /// no such thing.
     ///
     /// # Errors
-    /// [`StoreError::OverQuota`] where the tenant keeps as many bytes as it may.
+    /// [`StoreError::OverQuota`] if the tenant's quota of bytes is used up.
     pub async fn relabel(
         &self,
         tenant: &Tenant,
@@ -169,14 +173,15 @@ async fn stored(connection: &mut Connection<'_>, tenant: &Tenant, object: &str) 
 
 const FIND: &str = "SELECT name, notes, tags FROM labels WHERE tenant = $1 AND object = $2";
 
-/// Which labels were changed, for the audit.
+/// Returns which labels were changed, for the audit.
 fn told(change: &Relabel) -> String {
     let given = [("name", change.name.is_some()), ("notes", change.notes.is_some()), ("tags", change.tags.is_some())];
     let named: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
     format!("set {}", named.join(", "))
 }
 
-/// Keeps a thing from being deleted or called otherwise until this transaction ends; its row, if the tenant has it.
+/// Locks a thing against deletion and changes of its labels until this transaction ends. Returns its row, if the tenant
+/// has it.
 pub(super) async fn hold(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -191,7 +196,8 @@ pub(super) async fn hold(
     connection.row(find).await?.map(|row| row.get("sequence")).transpose()
 }
 
-/// Changes the labels of a thing that is held by this transaction; as they are now, and what they take more.
+/// Changes the labels of a thing that this transaction holds. Returns the new labels, and the additional bytes they
+/// take.
 pub(super) async fn put(
     connection: &mut Connection<'_>,
     of: Worded<'_>,
@@ -224,7 +230,7 @@ pub(super) async fn put(
     Ok((labels, Usage::of_bytes(grown)))
 }
 
-/// Deletes the labels of what is deleted, and all its words; what the labels took.
+/// Deletes the labels and all the words of a deleted thing. Returns the usage that the labels took.
 pub(super) async fn remove(connection: &mut Connection<'_>, of: Worded<'_>, object: &str) -> Result<Usage, Failure> {
     let labels = stored(connection, of.tenant, object).await?;
     let delete = query("DELETE FROM labels WHERE tenant = $1 AND object = $2");

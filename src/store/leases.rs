@@ -1,12 +1,13 @@
 //! Jobs as workers see them: claimed under a lease, checkpointed, finished.
 //!
-//! A worker holds a job until its lease runs out. Every claim raises `attempt`, and every write names the attempt it was
-//! claimed under: a worker that slept past its lease, and whose job another took, finds itself fenced, by `false`, and must
-//! drop the job.
+//! A worker holds a job until its lease runs out. Every claim raises `attempt`, and every write names the attempt it
+//! was claimed under. If a worker sleeps past its lease and another worker claims the job, the first is fenced: its
+//! writes return `false`, and it must drop the job.
 //!
-//! A job that is claimed while it runs has lost its worker: the process died, or was silent past the lease, which nobody
-//! can tell from dying. One that loses [`MOST_DEATHS`] workers between two checkpoints fails: what ends a process again
-//! and again must not take down one worker after another. A worker that stops in order releases its job, which is no death.
+//! A job that is claimed while it runs has lost its worker: the process died or was silent past the lease, which cannot
+//! be distinguished. A job that loses [`MOST_DEATHS`] workers between two checkpoints fails, because a job that
+//! repeatedly ends its process must not take down one worker after another. A worker that stops in order releases its
+//! job, which does not count as a death.
 
 use futures_util::FutureExt;
 
@@ -22,13 +23,13 @@ use super::words::{Labelled, Worded};
 use super::{Store, StoreError, policies, turns};
 use crate::control::policy::periods_per_year;
 
-/// Workers that may die under a job between two checkpoints.
+/// The job fails once this many workers died under it between two checkpoints.
 const MOST_DEATHS: i64 = 3;
 
 impl Store {
-    /// Takes the oldest job whose worker's lease ran out, else the queued one whose turn it is (`super::turns`), until
-    /// `now_ms + 1000 lease_seconds`. A job that was asked to stop is cancelled on the way rather than claimed, and one under
-    /// which too many workers died fails.
+    /// Claims a job until `now_ms + 1000 lease_seconds`: the oldest job whose worker's lease ran out, else the queued
+    /// job whose turn it is (`super::turns`). On the way, a job that was asked to stop is cancelled instead of claimed,
+    /// and a job under which too many workers died fails.
     pub async fn claim_job(
         &self,
         worker: &str,
@@ -40,13 +41,13 @@ impl Store {
         self.write("claiming a job", move |connection| claim(connection, worker, until_ms, now_ms).boxed()).await
     }
 
-    /// Holds the job until `until_ms`. False when fenced.
+    /// Holds the job until `until_ms`. Returns false when fenced.
     pub async fn renew_lease(&self, job: &str, attempt: i64, until_ms: i64) -> Result<bool, StoreError> {
         let job = job.to_owned();
         self.write("renewing a lease", move |connection| renew(connection, job, attempt, until_ms).boxed()).await
     }
 
-    /// Stores the solution of one step, replacing an earlier one. False when fenced.
+    /// Stores the solution of one step, replacing an earlier one. Returns false when fenced.
     pub async fn save_checkpoint(
         &self,
         job: &str,
@@ -59,15 +60,16 @@ impl Store {
             .await
     }
 
-    /// Every checkpoint of the job, ascending by step, each verified against its seal.
+    /// Returns every checkpoint of the job, ascending by step, each verified against its seal.
     pub async fn checkpoints(&self, job: &str) -> Result<Vec<(usize, Vec<u8>)>, StoreError> {
         self.read("reading checkpoints", checkpoints_of(job), |rows| verified_checkpoints(job, rows)).await
     }
 
-    /// Stores the result, sets the terminal state and deletes the checkpoints, all or nothing. False when fenced.
+    /// Stores the result, sets the terminal state and deletes the checkpoints, all or nothing. Returns false when
+    /// fenced.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where a policy's name is not the hash of its bytes.
+    /// [`StoreError::Corrupt`] if a policy's name is not the hash of its bytes.
     pub async fn finish_job(
         &self,
         job: &str,
@@ -87,7 +89,8 @@ impl Store {
         .await
     }
 
-    /// Puts the job back in the queue with its checkpoints; one that was asked to stop is cancelled. False when fenced.
+    /// Puts the job back in the queue with its checkpoints, or cancels it if it was asked to stop. Returns false when
+    /// fenced.
     pub async fn release_job(&self, job: &str, attempt: i64, now_ms: i64) -> Result<bool, StoreError> {
         let job = job.to_owned();
         self.write("releasing a job", move |connection| release(connection, job, attempt, now_ms).boxed()).await
@@ -144,7 +147,7 @@ async fn claimed(connection: &mut Connection<'_>, job: &str) -> Result<ClaimedJo
     }
 }
 
-/// A job to take over, which had its turn; else the one whose turn it is. Nobody else is taking it.
+/// Finds and locks a job to take over, which has had its turn already; else the one whose turn it is.
 async fn claimable(connection: &mut Connection<'_>, now_ms: i64) -> Result<Option<JobRow>, Failure> {
     let left = query("SELECT * FROM jobs WHERE state = $1 AND lease_until_ms <= $2 ORDER BY sequence LIMIT 1");
     let left = left.bind(JobState::Running.as_str()).bind(now_ms);
@@ -163,7 +166,7 @@ async fn renew(mut connection: Connection<'_>, job: String, attempt: i64, until_
     Ok(connection.execute(renew).await? > 0)
 }
 
-/// The job where this attempt still holds it, and does until this transaction ends.
+/// Returns the job if this attempt still holds it, and locks it until this transaction ends.
 async fn held(connection: &mut Connection<'_>, job: &str, attempt: i64) -> Result<Option<JobRow>, Failure> {
     let row = find(connection, job).await?;
     Ok(row.filter(|row| row.state == JobState::Running && row.attempt == attempt))
@@ -197,7 +200,7 @@ pub(super) fn checkpoints_of(job: &str) -> Query {
     query("SELECT step, bytes, seal FROM checkpoints WHERE job = $1 ORDER BY step").bind(job)
 }
 
-/// What [`checkpoints_of`] finds, each verified against its seal.
+/// Decodes the rows of [`checkpoints_of`], verifying each against its seal.
 pub(super) fn verified_checkpoints(job: &str, rows: &[Row]) -> Result<Vec<(usize, Vec<u8>)>, Failure> {
     let verified = |row: &Row| {
         let (step, bytes) = (row.get("step")?, row.get::<Vec<u8>>("bytes")?);

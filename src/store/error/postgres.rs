@@ -1,8 +1,8 @@
-//! What an error of PostgreSQL means.
+//! The classification of PostgreSQL errors.
 
 use super::Cause;
 
-/// Never [`Cause::Fatal`]: what this process holds in memory does not depend on the server's disk.
+/// Classifies an error; never as [`Cause::Fatal`], because this process's memory does not depend on the server's disk.
 pub(super) fn cause(error: &sqlx::Error) -> Cause {
     match error {
         sqlx::Error::Database(database) => of_code(&database.code().unwrap_or_default()),
@@ -17,7 +17,7 @@ pub(super) fn cause(error: &sqlx::Error) -> Cause {
     }
 }
 
-/// Codes by class, https://www.postgresql.org/docs/current/errcodes-appendix.html.
+/// Classifies a code by its class, https://www.postgresql.org/docs/current/errcodes-appendix.html.
 fn of_code(code: &str) -> Cause {
     match code {
         // disk_full

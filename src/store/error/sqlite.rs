@@ -1,4 +1,4 @@
-//! What an error of SQLite means.
+//! The classification of SQLite errors.
 
 use super::Cause;
 
@@ -29,7 +29,7 @@ pub(super) fn cause(error: &sqlx::Error) -> Cause {
     }
 }
 
-/// `code` is an extended code; its low byte is the primary one.
+/// Classifies an extended result code; its low byte is the primary code.
 fn of_code(code: i32) -> Cause {
     match (code, code & 0xff) {
         (_, FULL) | (IO_ERROR_INDEX_SIZE, _) => Cause::Full,
@@ -50,7 +50,7 @@ mod tests {
         assert_eq!([FULL, 4874].map(of_code), [Cause::Full; 2]);
     }
 
-    /// What cannot be read as what was written is damage to that row alone.
+    /// A row that cannot be decoded as written is damage to that row alone.
     #[test]
     fn what_cannot_be_read_is_a_damaged_row() {
         let column = sqlx::Error::ColumnDecode { index: "seal".into(), source: "not text".into() };
