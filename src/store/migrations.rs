@@ -1,4 +1,4 @@
-//! The schema of either engine, as a list of steps that only grows.
+//! The schema of each engine, as a list of steps that only grows.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(super) fn sqlite() -> Migrator {
     migrator(&SQLITE)
 }
 
-/// Runs under an advisory lock, so replicas that start together take turns.
+/// Returns the migrator for PostgreSQL. It runs under an advisory lock, so replicas that start together take turns.
 pub(super) fn postgres() -> Migrator {
     migrator(&POSTGRES)
 }
@@ -29,27 +29,31 @@ fn migrator(steps: &[Step]) -> Migrator {
     Migrator::with_migrations(steps.iter().map(migration).collect())
 }
 
+/// Rejects a schema that is newer than this binary's.
+///
 /// # Errors
-/// [`StoreError::NewerSchema`] where `found` is newer than every step of `migrator`.
+/// [`StoreError::NewerSchema`] if `found` is newer than every step of `migrator`.
 pub(super) fn refuse_newer(migrator: &Migrator, found: i64) -> Result<(), StoreError> {
     let known = newest(migrator);
     if found > known { Err(StoreError::NewerSchema { found, known }) } else { Ok(()) }
 }
 
+/// Rejects a schema that is not this binary's.
+///
 /// # Errors
-/// [`StoreError::NewerSchema`], [`StoreError::OlderSchema`] where `found` is not the last step of `migrator`.
+/// [`StoreError::NewerSchema`] or [`StoreError::OlderSchema`] if `found` is not the last step of `migrator`.
 pub(super) fn require_newest(migrator: &Migrator, found: i64) -> Result<i64, StoreError> {
     refuse_newer(migrator, found)?;
     let known = newest(migrator);
     if found < known { Err(StoreError::OlderSchema { found, known }) } else { Ok(found) }
 }
 
-/// The version of its last step.
+/// Returns the version of the last step.
 pub(super) fn newest(migrator: &Migrator) -> i64 {
     migrator.iter().map(|migration| migration.version).max().unwrap_or_default()
 }
 
-/// A failed migration by its cause where that is the database, as `engine` understands it.
+/// Converts a failed migration; if the cause is a database error, `engine` classifies it.
 pub(super) fn failed(error: MigrateError, engine: fn(sqlx::Error) -> Failure) -> StoreError {
     match error {
         MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => {

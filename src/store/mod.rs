@@ -2,25 +2,26 @@
 //!
 //! Promises, strongest first:
 //!
-//! 1. What was answered is on the disk: a write is answered after its commit, and the commit after its fsync.
-//! 2. What is read is what was written, bit for bit: policies, sessions and their entries carry a SHA-256 that every read
-//!    checks, so a damaged row is [`StoreError::Corrupt`], never an action.
+//! 1. An answer is durable: a write is answered after its commit, and the commit after its fsync.
+//! 2. Every read returns what was written, bit for bit. Policies, sessions and their entries carry a SHA-256 that every
+//!    read checks, so a damaged row gives [`StoreError::Corrupt`], never advice.
 //! 3. A worker whose lease ran out changes nothing: every write of a job names the `attempt` it was claimed under.
-//! 4. Decisions about one thing follow each other, whoever makes them: over SQLite because one process holds the folder
-//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on, or, of an entry that
-//!    is appended, because the table's keys admit one. Keys are the exception:
-//!    a [`KeyRing`] adds and revokes them beside the process that holds the folder, one statement each.
+//! 4. Decisions about one thing are serialized, over all callers. Over SQLite one process holds the folder and has one
+//!    writer. Over PostgreSQL each decision first locks the row it depends on; an appended entry needs no lock, because
+//!    the table's keys admit only one. Keys are the exception: a [`KeyRing`] adds and revokes them beside the process
+//!    that holds the folder, one statement each.
 //!
-//! What is decided is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions` and
-//! `entries`; how a statement is run and how a group of writes is committed is the engine's, in `sqlite` and
-//! `postgres`; what an engine's error means is said in `error`.
+//! Each decision is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions`
+//! and `entries`. The engines, in `sqlite` and `postgres`, run statements and commit groups of writes. `error`
+//! classifies an engine's errors.
 //!
 //! Conflicts and repeats are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
 //! epoch; leases are measured by [`Store::lease_time`]. Identifiers are opaque and made by the caller.
 //!
-//! Not done, and why: a digest over the end of a session's entries (a lost tail needs a lost file; a
-//! write-ahead log that damage cut short is refused at the start); deleting old sessions and policies by age (an investor's
-//! record is not ours to expire).
+//! Not done, and why:
+//! - A digest over the end of a session's entries. Entries at the end can only be lost with a file, and a write-ahead
+//!   log that damage cut short is rejected at startup.
+//! - Deleting old sessions and policies by age. The record of an investor is not ours to expire.
 
 mod audit;
 mod audit_chain;
@@ -101,12 +102,12 @@ pub use words::Labelled;
 
 /// The durable facts of one folder or one database. Clones share the connections.
 ///
-/// What waits for a database is boxed: it takes kilobytes, which every call that may wait would carry along, though most
-/// calls over a folder read nothing.
+/// Waits for a database are boxed: their futures take kilobytes, which every call that may wait would otherwise carry.
+/// Most calls over a folder read nothing.
 #[derive(Clone)]
 pub struct Store {
     engine: Engine,
-    /// Whose changes are made through it, as the audit has them.
+    /// The actor that the audit records for changes made through this store.
     actor: Actor,
     quotas: Quotas,
 }
@@ -118,21 +119,21 @@ enum Engine {
 }
 
 impl Store {
-    /// Opens `dir/ballast.sqlite`, creating folder and file, brings its schema up to date and lets every running job be
-    /// claimed at once: who ran it no longer can.
+    /// Opens `dir/ballast.sqlite`, creating the folder and the file, and brings its schema up to date. Every running
+    /// job can then be claimed at once, because its worker's process no longer holds the folder.
     ///
     /// # Errors
-    /// [`StoreError::Locked`] where another process holds the folder, [`StoreError::NewerSchema`] where a later release
-    /// wrote it, [`StoreError::OldEngine`] where SQLite is older than 3.51.3, else what the disk answered.
+    /// [`StoreError::Locked`] if another process holds the folder, [`StoreError::NewerSchema`] if a later release wrote
+    /// it, [`StoreError::OldEngine`] if SQLite is older than 3.51.3, else the error of the disk.
     pub async fn open(dir: &Path) -> Result<Store, StoreError> {
         Ok(Store::over(Engine::Sqlite(sqlite::Folder::open(dir).await?)))
     }
 
-    /// Connects to a PostgreSQL database and brings its schema up to date. Other processes may use it at the same time:
-    /// leases end by time alone.
+    /// Connects to a PostgreSQL database and brings its schema up to date. Other processes may use it at the same time,
+    /// so leases end by time alone.
     ///
     /// # Errors
-    /// [`StoreError::NewerSchema`] where a later release wrote it, else what the server answered.
+    /// [`StoreError::NewerSchema`] if a later release wrote it, else the error of the server.
     pub async fn connect(url: &PostgresUrl) -> Result<Store, StoreError> {
         Ok(Store::over(Engine::Postgres(postgres::Database::connect(url).await?)))
     }
@@ -141,20 +142,21 @@ impl Store {
         Store { engine, actor: Actor::service(0), quotas: Quotas::default() }
     }
 
-    /// The same store, changed by `actor`: each change is written into the audit as his.
+    /// Returns this store with another actor: the audit attributes each change to `actor`.
     pub fn by(&self, actor: Actor) -> Store {
         Store { actor, ..self.clone() }
     }
 
-    /// The same store, where every tenant may keep so much.
+    /// Returns this store with these quotas for every tenant.
     pub fn with_quotas(self, quotas: Quotas) -> Store {
         Store { quotas, ..self }
     }
 
-    /// The time by which leases are measured, in milliseconds, where the caller's own clock shows `local_ms`.
+    /// Returns the time by which leases are measured, in milliseconds, if the caller's own clock shows `local_ms`.
     ///
-    /// PostgreSQL's clock, since those of its clients may differ; a SQLite folder has one process, and that its own.
-    /// Time passes until the answer is used, which is safe: a lease then ends early, and one that ran out is seen late.
+    /// This is PostgreSQL's clock, because the clocks of its clients may differ. A SQLite folder has one process, so
+    /// the caller's clock serves. Time passes until the answer is used, which is safe: a lease then ends early, and an
+    /// expired lease is noticed late.
     pub async fn lease_time(&self, local_ms: i64) -> Result<i64, StoreError> {
         match &self.engine {
             Engine::Sqlite(_) => Ok(local_ms),
@@ -162,7 +164,7 @@ impl Store {
         }
     }
 
-    /// Whether the store reads and writes.
+    /// Checks that the store can be read and accepts writes.
     pub async fn ping(&self) -> Result<(), StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.ping().await,
@@ -170,8 +172,8 @@ impl Store {
         }
     }
 
-    /// Completes once the store failed in a way after which the process must exit (fsync error, damaged file).
-    /// Never completes while it is sound, nor over PostgreSQL, whose failures are not this process's.
+    /// Completes once the store has failed in a way after which the process must exit (fsync error, damaged file).
+    /// Never completes while the store is sound, nor over PostgreSQL, whose failures are not this process's.
     pub async fn until_fatal(&self) -> StoreError {
         match &self.engine {
             Engine::Sqlite(folder) => folder.until_fatal().await,
@@ -179,7 +181,7 @@ impl Store {
         }
     }
 
-    /// Commits what waits, closes every connection and gives up the folder. Later calls answer `Unavailable`.
+    /// Commits waiting writes, closes every connection and releases the folder. Later calls return `Unavailable`.
     pub async fn close(&self) {
         match &self.engine {
             Engine::Sqlite(folder) => folder.close().await,
@@ -187,7 +189,7 @@ impl Store {
         }
     }
 
-    /// Runs `work` in a transaction and answers after its commit.
+    /// Runs `work` in a transaction and returns after its commit.
     async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
@@ -199,7 +201,7 @@ impl Store {
         }
     }
 
-    /// As [`Self::write`], where `work` may change rows of `session`.
+    /// Runs `work` like [`Self::write`], if it may change rows of `session`.
     async fn write_to<T, W>(&self, session: &str, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
@@ -211,7 +213,7 @@ impl Store {
         }
     }
 
-    /// Reads what an answer to an investor rests on, by one statement.
+    /// Reads the data behind an answer to an investor, by one statement.
     async fn read<T>(
         &self,
         doing: &'static str,
@@ -221,7 +223,7 @@ impl Store {
         self.read_for(Purpose::Advice, doing, query, decode).await
     }
 
-    /// Reads what is listed, shown or followed, by one statement.
+    /// Reads data that is listed, shown or followed, by one statement.
     async fn list<T>(
         &self,
         doing: &'static str,
@@ -231,7 +233,7 @@ impl Store {
         self.read_for(Purpose::Lists, doing, query, decode).await
     }
 
-    /// Reads what tells how the store, the queue and the keys are, by one statement.
+    /// Reads the condition of the store, the queue or the keys, by one statement.
     async fn probe<T>(
         &self,
         doing: &'static str,

@@ -1,11 +1,11 @@
-//! Sessions as an overview shows them: found, put in order and listed page by page.
+//! Sessions as an overview shows them: found, sorted and listed page by page.
 //!
-//! What a row tells of where its session stands is what its last entry answered, joined to it: nothing is kept twice, so
-//! that a row is never out of step with the entries, and an observation writes no more than its entry. Only what is listed
-//! is read; what pages are put in order by is read of every session that matches.
+//! A row takes the state of its session from the answer of the last entry, which is joined to it. Nothing is stored
+//! twice, so a row never disagrees with the entries, and an observation writes only its entry. Only the listed rows are
+//! read in full; the sort key is read for every session that matches.
 //!
-//! What is shown was verified: the start of a session and its last entry by their seals. A session of which either is
-//! damaged is named, and nothing of it is shown.
+//! All that is shown was verified: the start of a session and its last entry by their seals. If either is damaged, only
+//! the session's name is listed.
 
 use super::care::{Care, CareCounts, Today, needs, needs_any};
 use super::codec::{from_sql, to_sql};
@@ -19,53 +19,53 @@ use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES, WEA
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
-/// What a list is in the order of.
+/// The sort order of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SessionOrder {
-    /// As they were opened.
+    /// By the order in which they were opened.
     #[default]
     Created,
-    /// By their names, whatever the case.
+    /// By name, ignoring case.
     Name,
-    /// By what they have now.
+    /// By current wealth.
     Wealth,
-    /// By when they last reported; first those that never did.
+    /// By the time of the last report; sessions without a report come first.
     LastReport,
 }
 
-/// Which sessions are listed.
+/// A filter by the state of sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SessionIs {
-    /// Advised by its policy.
+    /// Sessions that their policy advises.
     Active,
-    /// Its next policy is to be trained.
+    /// Sessions whose next policy is to be trained.
     Waiting,
-    /// At its horizon, and no policy is to follow.
+    /// Sessions at their horizon with no policy to follow.
     Completed,
-    /// In need of care for this reason, or for any.
+    /// Sessions that need attention for this reason, or for any.
     Needing(Option<Care>),
 }
 
-/// What is counted beside a page, each of which reads every session that matches.
+/// The counts to make beside a page, each of which reads every matching session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Counted {
     #[default]
     Nothing,
-    /// Those that match.
+    /// The number of matching sessions.
     Total,
-    /// Those that match, and those of them that need care.
+    /// The number of matching sessions, and of those that need attention.
     Care,
 }
 
-/// What is asked of a list of sessions; all of them, as they were opened, where nothing is given.
+/// The query of a list of sessions; by default all of them, in the order they were opened.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionQuery {
-    /// Beginnings of words of the session or of its policy, in any order and whatever the case.
+    /// Beginnings of words of the session or of its policy, in any order, ignoring case.
     pub search: Option<String>,
     /// A whole tag.
     pub tag: Option<String>,
     pub is: Option<SessionIs>,
-    /// By which it is told who needs care.
+    /// The dates that decide which sessions are overdue.
     pub today: Today,
     pub order: SessionOrder,
     pub descending: bool,
@@ -75,15 +75,15 @@ pub struct SessionQuery {
     pub after: Option<SessionPlace>,
 }
 
-/// The place of a row in the order of its list.
+/// The position of a row in its list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionPlace {
     pub key: SessionKey,
-    /// Of rows whose keys are the same.
+    /// Orders rows that have the same key.
     pub sequence: i64,
 }
 
-/// What a row is put in order by.
+/// The sort key of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SessionKey {
     Created,
@@ -97,24 +97,24 @@ pub enum SessionKey {
 pub struct SessionSummary {
     pub session: String,
     pub labels: Labels,
-    /// The one that advises the coming period.
+    /// The policy that advises the coming period.
     pub policy: String,
     pub policy_name: String,
-    /// Of that policy, where it says.
+    /// The periods a year of that policy, if it states them.
     pub periods_per_year: Option<f64>,
     pub initial_wealth: f64,
-    /// Share of it in the risky asset.
+    /// The share of the initial wealth in the risky asset.
     pub initial_holding: f64,
     /// The last period that the policy advises.
     pub horizon: usize,
     pub created_ms: i64,
     /// Number of periods observed.
     pub observations: usize,
-    /// Whether its next policy is to be trained.
+    /// True if its next policy is to be trained.
     pub is_due: bool,
-    /// Whether it is renewed by itself at some time.
+    /// True if it is renewed automatically at some time.
     pub is_renewed: bool,
-    /// The last observation or correction: what was answered to it, and when.
+    /// The answer to the last observation or correction, and its time.
     pub last: Option<(String, i64)>,
     pub place: SessionPlace,
 }
@@ -123,14 +123,14 @@ pub struct SessionSummary {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionList {
     pub sessions: Vec<SessionSummary>,
-    /// Sessions of the page that are not what was written, and what of each.
+    /// The damaged sessions of the page, each with its damage.
     pub damaged: Vec<(String, String)>,
-    /// The place of the last row, sound or not, if the page is full.
+    /// The position of the last row, sound or damaged, if the page is full.
     pub last: Option<SessionPlace>,
 }
 
 impl Store {
-    /// A page of the sessions of a tenant.
+    /// Lists a page of the sessions of a tenant.
     pub async fn sessions(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<SessionList, StoreError> {
         let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last: None };
         let look_at = match self.rarest_of(tenant, asked).await? {
@@ -159,7 +159,7 @@ impl Store {
         self.list("counting sessions", asked.count(tenant, &among), decode).await
     }
 
-    /// Counts what needs care among the sessions that match, in whatever state.
+    /// Counts the matching sessions that need attention; ignores the filter by state.
     pub async fn care(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<CareCounts, StoreError> {
         let among = self.rarest_of(tenant, asked).await?.map_or(Among::All, Rarest::all);
         self.list("counting sessions that need care", asked.caring(tenant, &among), CareCounts::from_rows).await
@@ -255,7 +255,7 @@ impl SessionQuery {
             search::matches(statement, search);
         }
         if let Some(tag) = &self.tag {
-            // What has the tag is another text without it.
+            // The text contains the tag if removing the tag changes it.
             statement.and(" AND replace(labels.tags, ?, '') <> labels.tags", [format!("\n{tag}\n").into()]);
         }
         match self.is {
@@ -322,7 +322,7 @@ impl SessionSummary {
     }
 }
 
-/// The last entry that moved a session, verified; `None` before the first.
+/// Returns the last entry that changed a session, verified; `None` before the first.
 fn last_of(row: &Row) -> Result<Option<EntryRow>, Failure> {
     match row.get::<Option<i64>>("entry")? {
         Some(_) => EntryRow::beside(row, "reported_ms", "last_seal").map(Some),

@@ -1,5 +1,5 @@
-//! Policies: immutable, named by the hash of their bytes. Tenants may have the same one: the bytes are stored once, and
-//! each tenant sees, dates and deletes its own; the bytes go with their last owner.
+//! Policies: immutable, named by the hash of their bytes. Several tenants may have the same policy: the bytes are
+//! stored once, and each tenant sees, dates and deletes its own entry. The bytes are deleted with their last owner.
 
 use futures_util::FutureExt;
 
@@ -23,7 +23,7 @@ pub struct PolicyRow {
     pub json: Vec<u8>,
 }
 
-/// When a tenant came by a policy, and the length of its bytes.
+/// The time when a tenant obtained a policy, and the length of its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stored {
     pub created_ms: i64,
@@ -42,23 +42,23 @@ pub struct PolicySummary {
     pub labels: Labels,
 }
 
-/// What became of a request to delete a policy.
+/// The outcome of a request to delete a policy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeletePolicy {
     Deleted,
     Absent,
-    /// Sessions live by it; it stays.
+    /// Sessions use it; it stays.
     InUse {
         sessions: u64,
     },
 }
 
 impl Store {
-    /// Stores a policy of a tenant under its content hash. False where the tenant had it.
+    /// Stores a policy of a tenant under its content hash. Returns false if the tenant already had it.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where `id` is not the hash of `json`, [`StoreError::OverQuota`] where the tenant keeps as many
-    /// bytes as it may.
+    /// [`StoreError::Corrupt`] if `id` is not the hash of `json`, [`StoreError::OverQuota`] if the tenant's quota of
+    /// bytes is used up.
     pub async fn insert_policy(
         &self,
         tenant: &Tenant,
@@ -68,7 +68,7 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let doing = "inserting a policy";
         verify(id, json).map_err(|failure| failure.during(doing))?;
-        // Before the write, which others wait for.
+        // Computed before the write, because other writers wait for it.
         let (tenant, id, year, json) = (tenant.clone(), id.to_owned(), periods_per_year(json), json.to_vec());
         let (quotas, actor) = (self.quotas, self.actor.clone());
         self.write(doing, move |mut connection| {
@@ -85,27 +85,30 @@ impl Store {
         .await
     }
 
+    /// Reads a policy of a tenant, for advice.
+    ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where the bytes no longer hash to their name.
+    /// [`StoreError::Corrupt`] if the bytes no longer hash to their name.
     pub async fn policy(&self, tenant: &Tenant, id: &str) -> Result<Option<PolicyRow>, StoreError> {
         self.read("reading a policy", owned(OWNED, tenant, id), |rows| PolicyRow::verified(rows, id)).await
     }
 
-    /// As [`Store::policy`], by the connections for what is listed and shown.
+    /// Reads a policy like [`Store::policy`], over the connections for lists.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where the bytes no longer hash to their name.
+    /// [`StoreError::Corrupt`] if the bytes no longer hash to their name.
     pub async fn policy_to_send(&self, tenant: &Tenant, id: &str) -> Result<Option<PolicyRow>, StoreError> {
         self.list("reading a policy to send", owned(OWNED, tenant, id), |rows| PolicyRow::verified(rows, id)).await
     }
 
-    /// What is known of a policy without reading it.
+    /// Returns the date and size of a policy without reading its bytes.
     pub async fn policy_stored(&self, tenant: &Tenant, id: &str) -> Result<Option<Stored>, StoreError> {
         let decode = |row: &Row| Ok(Stored { created_ms: row.get("created_ms")?, bytes: row.length("bytes")? });
         self.list("measuring a policy", owned(MEASURED, tenant, id), |rows| rows.first().map(decode).transpose()).await
     }
 
-    /// At most `limit` policies of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
+    /// Returns at most `limit` policies of a tenant, newest first; `after` is the `sequence` of the last row of the
+    /// page before.
     pub async fn policies(
         &self,
         tenant: &Tenant,
@@ -177,7 +180,7 @@ pub(super) async fn insert(
     Ok(new.is_some())
 }
 
-/// Keeps a policy from being deleted until this transaction ends; whether it is there.
+/// Locks a policy against deletion until this transaction ends; returns whether it exists.
 pub(super) async fn lock(connection: &mut Connection<'_>, id: &str) -> Result<bool, Failure> {
     let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(id);
     Ok(connection.row(policy.for_share()).await?.is_some())
@@ -188,7 +191,7 @@ pub(super) async fn is_owned(connection: &mut Connection<'_>, tenant: &Tenant, i
     Ok(connection.row(owner.bind(id).bind(tenant.as_str())).await?.is_some())
 }
 
-/// The policy stays locked while its sessions are counted: none can be opened in between.
+/// Deletes a policy of a tenant. It stays locked while its sessions are counted, so that none can be opened in between.
 async fn delete(
     mut connection: Connection<'_>,
     tenant: Tenant,

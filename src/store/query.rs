@@ -1,7 +1,7 @@
 //! A statement, its values and its rows, over either engine.
 //!
-//! Both engines speak the SQL that is written here, with `$1`; where they differ, it is said once, in this file:
-//! PostgreSQL locks the rows a decision rests on, where SQLite's one writer meets nobody.
+//! Both engines accept the SQL that is written here, with `$1`. The one difference is handled in this file: PostgreSQL
+//! locks the rows a decision depends on. SQLite needs no such locks, because it has only one writer.
 
 use std::borrow::Cow;
 
@@ -13,14 +13,14 @@ use sqlx::{AssertSqlSafe, Database, Decode, Either, Encode, Executor, Postgres, 
 
 use super::error::Failure;
 
-/// What rows are read for. Each purpose has connections of its own: whoever lists keeps no advice and no probe waiting.
+/// The purpose of a read. Each purpose has connections of its own, so that lists delay neither advice nor probes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// An answer to an investor, or a job's work.
     Advice,
-    /// What is listed, shown or followed.
+    /// Data that is listed, shown or followed.
     Lists,
-    /// How the store, the queue and the keys are.
+    /// The condition of the store, the queue and the keys.
     Probes,
 }
 
@@ -52,22 +52,22 @@ impl Query {
         self
     }
 
-    /// Nobody else changes or locks the rows found until this transaction ends; waits for whoever does now.
+    /// Locks the rows found against changes and other locks until this transaction ends; waits for current holders.
     pub(super) fn for_update(self) -> Self {
         Query { lock: " FOR UPDATE", ..self }
     }
 
-    /// As [`Query::for_update`], but others may add rows that refer to those found.
+    /// Locks like [`Query::for_update`], but lets others add rows that refer to those found.
     pub(super) fn for_update_but_references(self) -> Self {
         Query { lock: " FOR NO KEY UPDATE", ..self }
     }
 
-    /// As [`Query::for_update`], but passes over rows that another transaction holds.
+    /// Locks like [`Query::for_update`], but skips rows that another transaction holds.
     pub(super) fn for_update_of_free(self) -> Self {
         Query { lock: " FOR UPDATE SKIP LOCKED", ..self }
     }
 
-    /// Nobody changes the rows found until this transaction ends; others may hold them likewise.
+    /// Locks the rows found against changes until this transaction ends; others may hold the same lock.
     pub(super) fn for_share(self) -> Self {
         Query { lock: " FOR SHARE", ..self }
     }
@@ -112,7 +112,8 @@ where
 }
 
 impl Value {
-    /// PostgreSQL's text cannot hold NUL. Nothing we name has one, so a name with one still finds nothing.
+    /// Replaces NUL, which PostgreSQL's text cannot hold. No stored name contains NUL, so a name with one still finds
+    /// nothing.
     fn without_nul(self) -> Self {
         match self {
             Value::Text(text) if text.contains('\0') => Value::Text(text.replace('\0', "\u{fffd}")),
@@ -168,7 +169,7 @@ pub(super) enum Row {
     Postgres(PgRow),
 }
 
-/// What a column can be read as, from either engine.
+/// A type that a column can be read as, from either engine.
 pub(super) trait Column:
     for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
 {
@@ -189,7 +190,7 @@ impl Row {
     }
 }
 
-/// A connection in the hands of one operation; for a write, in its transaction.
+/// A connection used by one operation; for a write, inside its transaction.
 pub(super) enum Connection<'c> {
     Sqlite(&'c mut SqliteConnection),
     Postgres(&'c mut PgConnection),
@@ -207,7 +208,7 @@ impl Connection<'_> {
                         Either::Right(row) => rows.push(Row::Sqlite(row)),
                     }
                 }
-                // Where the engine's thread dies its rows end as if there were no more.
+                // If the engine's thread dies, its rows end as if there were no more.
                 if has_ended { Ok(rows) } else { Err(Failure::sqlite(sqlx::Error::WorkerCrashed)) }
             }
             Connection::Postgres(connection) => {
@@ -217,12 +218,12 @@ impl Connection<'_> {
         }
     }
 
-    /// The first row, where there is one.
+    /// Returns the first row, if there is one.
     pub(super) async fn row(&mut self, query: Query) -> Result<Option<Row>, Failure> {
         Ok(self.rows(query).await?.into_iter().next())
     }
 
-    /// Holds the rows a decision rests on until the end of the transaction, where anybody else could change them.
+    /// Locks the rows a decision depends on until the transaction ends. SQLite needs no lock.
     pub(super) async fn lock(&mut self, query: Query) -> Result<(), Failure> {
         match self {
             Connection::Sqlite(_) => Ok(()),
@@ -230,7 +231,7 @@ impl Connection<'_> {
         }
     }
 
-    /// Number of rows changed.
+    /// Runs a statement and returns the number of rows changed.
     pub(super) async fn execute(&mut self, query: Query) -> Result<u64, Failure> {
         match self {
             Connection::Sqlite(connection) => {

@@ -1,12 +1,13 @@
-//! How much a tenant may keep: jobs queued, sessions, bytes.
+//! The quotas of a tenant: jobs queued, sessions, bytes.
 //!
-//! What a tenant keeps is a row of totals, changed in the transaction that changes what they are the totals of, as its last
-//! statement: whoever waits for the row waits for a commit and no more. Queued jobs are counted where they stand, up to
-//! the quota; those made for sessions have a bound of their own (`super::session_trainings`).
+//! The usage of a tenant is a row of totals. Each change of the totals is the last statement of the transaction that
+//! changes the counted rows, so another writer waits for a commit only. Queued jobs are counted in their own table, up
+//! to the quota; jobs made for sessions have a bound of their own (`super::session_trainings`).
 //!
-//! Bytes are those of requests, reports, policies, histories, plans and labels, and [`ROW_BYTES`] for each job, policy and session.
-//! A session takes the room of all its observations when it is opened, each what the longest takes: no return that an investor reports is ever refused
-//! for a quota, nor is what a worker finished. Checkpoints are not counted; they go with the end of their job.
+//! The bytes counted are those of requests, reports, policies, histories, plans and labels, and [`ROW_BYTES`] for each
+//! job, policy and session. Opening a session reserves the bytes of all its observations, each at the longest size. So
+//! no quota ever rejects a reported return, nor the result of a worker. Checkpoints are not counted, because they are
+//! deleted when their job ends.
 //!
 //! Checked by: `tests/service/quotas.rs`, `tests/service/store_model.rs`.
 
@@ -18,23 +19,23 @@ use super::query::{Connection, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
-/// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
+/// Bytes of a row of jobs, policies or sessions with its index entries, beside the parts counted by length.
 pub(super) const ROW_BYTES: i64 = 1024;
-/// What one entry of a session takes with its report, its answer, its seal and its index entry: some 900 bytes, and up to 1,400
-/// where everything of a period is reported (`docs/capacity.md`).
+/// Bytes of one entry of a session with its report, its answer, its seal and its index entry. An entry takes some 900
+/// bytes, and up to 1,400 if everything of a period is reported (`docs/capacity.md`).
 pub(super) const ENTRY_BYTES: i64 = 1536;
-/// Of them, what every entry takes with its seal, its numbers and its index entry.
+/// The part of these bytes that the seal, the numbers and the index entry take in every entry.
 pub(super) const SEALED_BYTES: i64 = 160;
-/// What it takes more for each of several assets: eleven numbers, three of them reported and eight answered.
+/// Additional bytes of an entry for each of several assets: eleven numbers, three of them reported and eight answered.
 pub(super) const ASSET_BYTES: i64 = 11 * 8;
 
-/// What every tenant may keep; 0: any number.
+/// The quotas of every tenant; 0 means no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quotas {
     pub queued_jobs: u32,
     pub sessions: u32,
     pub bytes: u64,
-    /// Changes by one key that the audit keeps.
+    /// The number of changes by one key that the audit keeps.
     pub audit_entries: u32,
 }
 
@@ -43,13 +44,13 @@ impl Quotas {
 }
 
 impl Default for Quotas {
-    /// Far above what a tenant needs: they stop loops gone wild, not users.
+    /// Returns quotas far above what a tenant needs: they stop runaway loops, not users.
     fn default() -> Self {
         Quotas { queued_jobs: 1_000, sessions: 1_000_000, bytes: 100 << 30, audit_entries: 5_000_000 }
     }
 }
 
-/// What a tenant keeps.
+/// The usage of a tenant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Usage {
     pub sessions: i64,
@@ -61,18 +62,18 @@ impl Usage {
         Usage { sessions: 0, bytes }
     }
 
-    /// Of a session, with `room` for so many entries of so many assets.
+    /// Returns the usage of a session with `room` entries of `assets` assets.
     pub(super) fn of_session(start_bytes: i64, room: i64, assets: i64) -> Self {
         let entries = Usage::of_entries(room, assets).bytes;
         Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(start_bytes).saturating_add(entries) }
     }
 
-    /// Of so many entries of so many assets.
+    /// Returns the usage of `room` entries of `assets` assets.
     pub(super) fn of_entries(room: i64, assets: i64) -> Self {
         Usage::of_bytes(room.saturating_mul(entry_bytes(assets)))
     }
 
-    /// Of both together.
+    /// Returns the sum of both.
     pub(super) fn and(self, other: Usage) -> Self {
         Usage { sessions: self.sessions + other.sessions, bytes: self.bytes.saturating_add(other.bytes) }
     }
@@ -82,13 +83,13 @@ impl Usage {
     }
 }
 
-/// Bytes that an entry is counted with; 0 assets where there is one.
+/// Returns the bytes that an entry counts as; `assets` is 0 for a session with a single asset.
 pub(super) fn entry_bytes(assets: i64) -> i64 {
     ENTRY_BYTES.saturating_add(assets.saturating_mul(ASSET_BYTES))
 }
 
 impl Store {
-    /// What a tenant keeps.
+    /// Returns the usage of a tenant.
     pub async fn usage(&self, tenant: &Tenant) -> Result<Usage, StoreError> {
         let totals = query("SELECT sessions, bytes FROM usage WHERE tenant = $1").bind(tenant.as_str());
         self.list("reading what a tenant keeps", totals, |rows| {
@@ -99,8 +100,10 @@ impl Store {
     }
 }
 
+/// Checks the quota of queued jobs before a caller's job is queued.
+///
 /// # Errors
-/// The tenant's callers have as many jobs queued as they may.
+/// Fails if the tenant's callers have used up the quota of queued jobs.
 pub(super) async fn admit_job(connection: &mut Connection<'_>, tenant: &Tenant, quotas: Quotas) -> Result<(), Failure> {
     if quotas.queued_jobs == 0 {
         return Ok(());
@@ -120,10 +123,10 @@ async fn queued_by_callers(connection: &mut Connection<'_>, tenant: &Tenant, lim
     connection.row(queued.bind(i64::from(limit))).await?.map_or(Ok(0), |row| row.get("queued"))
 }
 
-/// Adds to what a tenant keeps.
+/// Adds to the usage of a tenant.
 ///
 /// # Errors
-/// It would keep more than it may; the transaction is to be undone.
+/// Fails if the usage would exceed a quota; the transaction must then be rolled back.
 pub(super) async fn take(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -135,7 +138,7 @@ pub(super) async fn take(
     within(Quota::Bytes, kept.bytes - more.bytes, more.bytes, quotas.bytes)
 }
 
-/// Changes what a tenant keeps, whatever it may; what it keeps now.
+/// Changes the usage of a tenant without checking the quotas, and returns the new usage.
 pub(super) async fn change(connection: &mut Connection<'_>, tenant: &Tenant, by: Usage) -> Result<Usage, Failure> {
     let change = query(
         "INSERT INTO usage (tenant, sessions, bytes) VALUES ($1, $2, $3)
@@ -156,7 +159,7 @@ pub(super) fn within(quota: Quota, kept: i64, wanted: i64, limit: u64) -> Result
     Err(Failure::OverQuota(OverQuota { quota, kept, wanted, limit }))
 }
 
-/// The bytes of a text or of bytes, as totals count them.
+/// Returns the number of bytes as the totals count them.
 pub(super) fn length(bytes: &[u8]) -> i64 {
     to_sql(bytes.len())
 }

@@ -1,8 +1,8 @@
-//! A folder's rows moved into a database that replicas share.
+//! Moves a folder's rows into a database that replicas share.
 //!
-//! Both engines have the same tables with columns of the same names, so a row is copied by the types of its columns. All is
-//! one transaction: each row is compared with what the database answers that it stored, each table is counted, and where
-//! anything differs nothing is moved. The folder stays as it was.
+//! Both engines have the same tables with columns of the same names, so a row is copied by the types of its columns.
+//! The whole move is one transaction: each row is compared with what the database reports that it stored, and each
+//! table is counted. If anything differs, nothing is moved. The folder stays as it was.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ use super::statement::Statement;
 
 const DOING: &str = "moving the store";
 
-/// Every table, after those that it refers to, and how many of its rows are copied at a time: few where one may be large.
+/// Every table, after those it refers to, and how many of its rows are copied at a time: few if a row may be large.
 const TABLES: [(&str, usize); 19] = [
     ("jobs", 100),
     ("job_requests", 1),
@@ -43,7 +43,7 @@ const TABLES: [(&str, usize); 19] = [
     ("heartbeat", 1),
 ];
 
-/// What a column holds.
+/// The type of a column.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Text,
@@ -53,7 +53,7 @@ enum Kind {
     Boolean,
 }
 
-/// A value of either engine; a real number by its bits.
+/// A value of either engine; a real number is compared by its bits.
 #[derive(Debug, Clone, PartialEq)]
 enum Cell {
     Null,
@@ -69,11 +69,12 @@ struct Table {
     columns: Vec<(String, Kind)>,
 }
 
-/// Moves the rows of the folder `dir`, which no process holds, into an empty database, telling what was moved and verified.
+/// Moves the rows of the folder `dir`, which no process holds, into an empty database. Reports through `tell` what was
+/// moved and verified.
 ///
 /// # Errors
-/// A process holds `dir`, a thing in it is damaged, the database has rows or is not reached, or it did not store what it was
-/// given; nothing is moved then.
+/// Fails if a process holds `dir` or something in it is damaged. Fails too if the database has rows, cannot be reached,
+/// or did not store what it was given. Nothing is moved then.
 pub async fn relocate(dir: &Path, url: &PostgresUrl, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     existing(&dir.join(DATABASE))?;
     let held = lock(dir)?;
@@ -93,7 +94,7 @@ pub async fn relocate(dir: &Path, url: &PostgresUrl, tell: &mut impl FnMut(Strin
     Ok(())
 }
 
-/// A table that this file does not know would be left behind.
+/// Rejects a table that this file does not list, because it would be left behind.
 async fn refuse_unknown_tables(folder: &mut SqliteConnection) -> Result<(), StoreError> {
     let tables =
         "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%' AND substr(name, 1, 1) <> '_'";
@@ -124,7 +125,7 @@ async fn all(
     Ok(())
 }
 
-/// The columns of a table, as the database has them.
+/// Reads the columns of a table from the database.
 async fn columns(database: &mut Connection<'_>, table: &str) -> Result<Vec<(String, Kind)>, Failure> {
     let find = query(
         "SELECT CAST(column_name AS TEXT) AS name, CAST(data_type AS TEXT) AS type FROM information_schema.columns
@@ -150,7 +151,7 @@ impl Table {
         self.columns.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Copies every row, and compares it with what the database stored; how many there are.
+    /// Copies every row, compares it with what the database stored, and returns the number of rows.
     async fn copy(&self, folder: &mut SqliteConnection, database: &mut Connection<'_>) -> Result<usize, Failure> {
         let select = format!("SELECT {} FROM {}", self.names(), self.name);
         let rows = sqlx::query(AssertSqlSafe(select)).fetch(folder).map_err(Failure::sqlite);
@@ -204,7 +205,7 @@ impl Table {
         self.columns.iter().map(|(name, kind)| cell(row, name, *kind)).collect()
     }
 
-    /// Numbers that were given out are not given out again.
+    /// Advances the sequence, so that numbers already used are not used again.
     async fn go_on(&self, folder: &mut SqliteConnection, database: &mut Connection<'_>) -> Result<(), Failure> {
         let last = "SELECT seq FROM sqlite_sequence WHERE name = ?";
         let last: Option<i64> =

@@ -1,4 +1,4 @@
-//! The policies that sessions go on by, beside the entries that tell of them.
+//! The policies that sessions continue with, stored beside the entries that record the renewals.
 
 use futures_util::FutureExt;
 
@@ -13,30 +13,30 @@ use super::tenant::Tenant;
 use super::training_names::withdraw;
 use super::{Store, StoreError, policies};
 
-/// What a renewal leads to.
+/// The result of a renewal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Onto {
     pub policy: String,
     /// The last period that the policy advises.
     pub horizon: usize,
-    /// Periods that the session may pass now and could not before.
+    /// Additional periods that the session may now pass.
     pub periods: usize,
-    /// Periods after which the session is due to be renewed by itself.
+    /// The number of periods after which the session is due for automatic renewal.
     pub due: Option<usize>,
 }
 
 impl Store {
-    /// As [`Store::append`], of a renewal. The policy stays as long as the session does.
+    /// Appends a renewal like [`Store::append`]. Its policy stays as long as the session does.
     ///
     /// # Errors
-    /// [`StoreError::OverQuota`] where there is no room for it and for the periods that it adds.
+    /// [`StoreError::OverQuota`] if the quota has no room for the entry and the periods that it adds.
     pub async fn renew(&self, new: EntryRow, onto: Onto) -> Result<Append, StoreError> {
         let (by, session) = ((self.quotas, self.actor.clone()), new.session.clone());
         self.write_to(&session, APPENDING, move |connection| renew(connection, new, onto, by).boxed()).await
     }
 
-    /// At most `limit` sessions that are due to be renewed by themselves, in the order they were opened, with their
-    /// tenants and sequences; `after` is the sequence of the last one of the page before.
+    /// Returns at most `limit` sessions that are due for automatic renewal, in the order they were opened, with their
+    /// tenants and sequences. `after` is the sequence of the last session of the page before.
     pub async fn due_sessions(&self, limit: usize, after: i64) -> Result<Vec<(i64, Tenant, String)>, StoreError> {
         let found = |row: &Row| {
             let tenant = Tenant::stored(&row.get::<String>("tenant")?);
@@ -68,8 +68,8 @@ async fn renew(
     Ok(append)
 }
 
-/// Whether the tenant of a session has the policy, which then stays until this transaction ends; true where there is no such
-/// session.
+/// Returns whether the tenant of a session has the policy, which is then locked until this transaction ends. Returns
+/// true if there is no such session.
 async fn may_go_on(connection: &mut Connection<'_>, session: &str, policy: &str) -> Result<bool, Failure> {
     policies::lock(connection, policy).await?;
     let owned = query(
@@ -80,7 +80,7 @@ async fn may_go_on(connection: &mut Connection<'_>, session: &str, policy: &str)
     found.map_or(Ok(true), |row| row.get::<i64>("owned").map(|owned| owned > 0))
 }
 
-/// What finds the policy of a renewal without its entry.
+/// Stores the row that finds the policy of a renewal without its entry.
 async fn refer(connection: &mut Connection<'_>, new: &EntryRow, onto: &Onto) -> Result<(), Failure> {
     let refer = query("INSERT INTO renewals (session, number, policy, horizon) VALUES ($1, $2, $3, $4)");
     let refer = refer.bind(new.session.as_str()).bind(to_sql(new.number)).bind(onto.policy.as_str());

@@ -1,11 +1,10 @@
-//! One damaged thing of a folder, put back from a backup of it: a session, a policy or a key; or totals, from their rows.
+//! Repairs one damaged thing of a folder: a session, a policy or a key from a backup, or the totals from their rows.
 //!
-//! Only rows that are damaged or gone are taken from the backup, and only those that are sound there; what was written after
-//! the backup and is sound stays. Either the thing is sound then, or nothing is changed. Nothing comes back that somebody
-//! ended: neither a session that was deleted nor a key that was changed after the backup. The repair is an entry of the
-//! audit.
+//! Only damaged or missing rows are taken from the backup, and only if they are sound there. Sound rows written after
+//! the backup stay. Either the thing is sound afterwards, or nothing is changed. A repair restores neither a session
+//! that was deleted nor a key that was changed after the backup. The repair is recorded in the audit.
 //!
-//! Not done, and why: entries of the audit. What was done to them is to be seen, not mended.
+//! Not done, and why: repairing entries of the audit. Damage to them must stay visible.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -33,11 +32,11 @@ const DOING: &str = "repairing the store";
 pub enum Repair<'a> {
     /// A session, a policy or a key, by its name, from a backup.
     Thing { name: &'a str, from: &'a Path },
-    /// The totals of each tenant, summed anew.
+    /// The totals of each tenant, recomputed.
     Totals,
 }
 
-/// Why nothing is repaired.
+/// The reason why nothing is repaired.
 enum Refusal {
     Failure(Failure),
     Reason(String),
@@ -52,13 +51,13 @@ impl From<Failure> for Refusal {
 /// A table whose rows can be put back.
 struct Table {
     name: &'static str,
-    /// The name of the thing that a row is of.
+    /// The column with the name of the thing that a row belongs to.
     of: &'static str,
-    /// The column that tells its rows apart, if a thing has several.
+    /// The column that distinguishes its rows, if a thing has several.
     number: Option<&'static str>,
-    /// The columns that are put back; the rest of a row that is there stays.
+    /// The columns that are restored; the other columns of an existing row stay.
     columns: &'static [&'static str],
-    /// The columns that a row that is gone needs besides.
+    /// The additional columns that a missing row needs.
     others: &'static [&'static str],
     verify: fn(&Row) -> Result<(), Failure>,
 }
@@ -108,10 +107,11 @@ const KEYS: Table = Table {
     verify: |row| KeyRow::from_row(row).map(drop),
 };
 
-/// Repairs a thing of the folder `dir`, which no process holds; how many rows it took or changed.
+/// Repairs a thing of the folder `dir`, which no process holds, and returns how many rows were restored or changed.
 ///
 /// # Errors
-/// A process holds `dir`; the thing is in no backup, is not to come back, or is not sound after all. Nothing is changed.
+/// Fails if a process holds `dir`. Fails too if the thing is not in the backup, must not be restored, or is still
+/// damaged afterwards. Nothing is changed then.
 pub async fn repair(dir: &Path, what: Repair<'_>, now_ms: i64) -> Result<usize, StoreError> {
     let held = lock(dir)?;
     let database = dir.join(DATABASE);
@@ -150,7 +150,7 @@ async fn in_transaction(connection: &mut SqliteConnection, what: &Repair<'_>, no
     Ok(rows)
 }
 
-/// Repairs under way, in one transaction.
+/// A repair in progress, in one transaction.
 struct Repairs<'c> {
     connection: Connection<'c>,
     rows: usize,
@@ -216,7 +216,7 @@ impl Repairs<'_> {
         Ok(owner.map(|owner| Tenant::stored(&owner)).unwrap_or_default())
     }
 
-    /// A key as it was at the backup is that of today if the audit has no more of it.
+    /// Restores a key. Its state at the backup is current only if the audit has no later changes of it.
     async fn key(&mut self, key: &str) -> Result<Tenant, Refusal> {
         let changes = query(
             "SELECT (SELECT count(*) FROM main.audit WHERE object = $1) AS now,
@@ -234,7 +234,7 @@ impl Repairs<'_> {
         Ok(row.map(|row| row.tenant).unwrap_or_default())
     }
 
-    /// Sums the totals of each tenant anew, or of one.
+    /// Recomputes the totals of each tenant, or of one.
     async fn totals(&mut self, only: Option<&Tenant>) -> Result<(), Failure> {
         for row in self.connection.rows(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES).bind(ASSET_BYTES)).await? {
             let tenant: String = row.get("tenant")?;
@@ -253,7 +253,7 @@ impl Repairs<'_> {
         Ok(())
     }
 
-    /// Puts back the rows of a thing that are damaged or gone and that the backup has sound.
+    /// Restores the rows of a thing that are damaged or missing and are sound in the backup.
     async fn put_back(&mut self, table: &Table, name: &str) -> Result<(), Failure> {
         let number = |row: &Row| table.number.map_or(Ok(0), |number| row.get::<i64>(number));
         let mut sound = HashSet::new();
@@ -271,7 +271,7 @@ impl Repairs<'_> {
         Ok(())
     }
 
-    /// Takes a row from the backup as it is.
+    /// Copies a row from the backup unchanged.
     async fn take(&mut self, table: &Table, name: &str, number: i64) -> Result<(), Failure> {
         let mut key = vec![table.of];
         key.extend(table.number);

@@ -1,7 +1,7 @@
-//! What is kept no longer: ended jobs, deleted by their tenant or by age, and the room that deleted things leave.
+//! Deletion of ended jobs, by their tenant or by age, and the space that deleted rows leave.
 //!
-//! A job goes with its report and its idempotency key: a key is good for as long as its job is there. What a job made, a
-//! policy, stays. A job that has not ended is not deleted but cancelled.
+//! A job is deleted with its report and its idempotency key, so a key is valid as long as its job exists. The policy
+//! that a job made stays. A job that has not ended is cancelled instead of deleted.
 
 use futures_util::FutureExt;
 
@@ -16,26 +16,26 @@ use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError};
 
-/// What became of a request to delete a job.
+/// The outcome of a request to delete a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeleteJob {
     Deleted,
     /// The tenant has no such job.
     Absent,
-    /// It is queued or runs; it stays.
+    /// It is queued or running; it stays.
     NotEnded,
 }
 
-/// The room a store takes, in bytes, as far as the engine tells.
+/// The space a store takes, in bytes, as far as the engine reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
-    /// Of the database.
+    /// Size of the database.
     pub database: u64,
-    /// Of its pages that hold nothing.
+    /// Size of its free pages.
     pub free: Option<u64>,
-    /// Of the write-ahead log.
+    /// Size of the write-ahead log.
     pub log: Option<u64>,
-    /// Of what the file system has left.
+    /// Free space on the file system.
     pub disk_left: Option<u64>,
 }
 
@@ -46,12 +46,12 @@ impl Store {
         self.write("deleting a job", move |connection| delete(connection, tenant, job, actor).boxed()).await
     }
 
-    /// Deletes jobs that ended before `ended_before_ms`, at most `limit` of them, oldest first; how many.
+    /// Deletes at most `limit` jobs that ended before `ended_before_ms`, oldest first, and returns how many.
     pub async fn expire_jobs(&self, ended_before_ms: i64, limit: usize) -> Result<usize, StoreError> {
         self.write("deleting old jobs", move |connection| expire(connection, ended_before_ms, limit).boxed()).await
     }
 
-    /// The room it takes.
+    /// Returns the space the store takes.
     pub async fn room(&self) -> Result<Room, StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.room().await,
@@ -61,8 +61,8 @@ impl Store {
         }
     }
 
-    /// Gives at most `pages` free pages back to the file system; the file is that much smaller once the log is copied into
-    /// it. PostgreSQL does so by itself.
+    /// Returns at most `pages` free pages to the file system; the file shrinks once the log is copied into it.
+    /// PostgreSQL does this by itself.
     pub async fn give_back_pages(&self, pages: u32) -> Result<(), StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.give_back_pages(pages).await,
@@ -89,7 +89,7 @@ async fn delete(
     Ok(DeleteJob::Deleted)
 }
 
-/// By tenant, so that two who expire jobs at the same moment wait for each other's totals in the same order.
+/// Deletes ended jobs sorted by tenant, so that two concurrent calls lock the totals of tenants in the same order.
 async fn expire(mut connection: Connection<'_>, before_ms: i64, limit: usize) -> Result<usize, Failure> {
     let ended = query("SELECT * FROM jobs WHERE finished_ms < $1 ORDER BY finished_ms LIMIT $2");
     let ended = connection.rows(ended.bind(before_ms).bind(to_sql(limit)).for_update_of_free()).await?;

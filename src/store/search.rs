@@ -1,15 +1,17 @@
-//! What a search finds, and the rows that a list looks at to find it.
+//! The sessions that match a search, and the rows that a list examines to find them.
 //!
-//! A search is words, each of which is to be the beginning of a word of a session's name or tags, of its policy's name or
-//! tags, or eight digits or more with which either's identifier begins. That is a condition on each row, [`matches`], which alone decides; the index of
-//! [`super::words`] says which rows it is put to:
+//! A search consists of words. Each must be the beginning of a word of the session's name or tags, or of its policy's
+//! name or tags; or it is eight or more digits that begin the identifier of either. [`matches`] is this condition, and
+//! alone decides about a row. The index of [`super::words`] selects the rows to test:
 //!
-//! - of the words searched for, the one that fewest sessions have, as the index counts them up to a bound;
-//! - if they are many, first the sessions next in the list, of which enough match unless those that match were opened
+//! - among the words of the search, the list uses the one that the fewest sessions have, counted in the index up to a
+//!   bound;
+//! - if they are many, it first tests the sessions next in the list, which suffices unless the matches were opened
 //!   together long ago; then some that the index finds; then all of those.
 //!
-//! Cost: of a word that few have, a look into the index for each; of one that many have, [`WINDOW`] rows, and where that is
-//! not enough one pass over the rows of the index. Checked by: `tests/service/search.rs`, `tests/operation/lists.rs`.
+//! Cost: for a rare word, an index lookup for each session that has it; for a common word, [`WINDOW`] rows, and if
+//! those are not enough, one pass over the rows of the index. Checked by: `tests/service/search.rs`,
+//! `tests/operation/lists.rs`.
 
 use super::error::Failure;
 use super::query::{Query, Row, Value};
@@ -18,26 +20,26 @@ use super::tenant::Tenant;
 use super::words::{self, Labelled};
 use super::{Store, StoreError};
 
-/// Sessions looked at before more of them are.
+/// The number of sessions tested before more are taken.
 const WINDOW: i64 = 500;
-/// Up to which the sessions of a word are counted.
+/// The sessions of a word are counted up to this bound.
 const COUNTED: i64 = 100_000;
-/// Policies of which a word may be; with more it narrows nothing.
+/// The most policies that a word may belong to; beyond this it does not narrow the search.
 const MOST_POLICIES: i64 = 100;
-/// Words of a search among which the one that fewest sessions have is looked for; the longest are taken.
+/// The most words of a search that are compared by how many sessions have them; the longest are used.
 const MOST_WORDS: usize = 8;
-/// Digits of an identifier that find it; fewer are rather the beginning of a number in a name.
+/// The fewest digits that find an identifier; fewer are more likely the beginning of a number in a name.
 const SHORTEST_IDENTIFIER: usize = 8;
-/// Above every character that a word has.
+/// Sorts above every character of a word.
 const LAST: char = char::MAX;
 
-/// The sessions that a statement looks at.
+/// The sessions that a statement examines.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Among {
     All,
-    /// So many after the page before, in the order in which they were opened.
+    /// This many after the page before, in the order in which they were opened.
     Next(i64),
-    /// Those that the index finds by a word; so many after the page before, if bounded.
+    /// Those that the index finds by a word; if bounded, this many after the page before.
     Of(Found, Option<i64>),
 }
 
@@ -48,13 +50,13 @@ pub(super) struct Found {
     policies: Vec<String>,
 }
 
-/// The word of a search that fewest sessions have, and how many do, up to a bound.
+/// The word of a search that the fewest sessions have, and how many do, up to a bound.
 pub(super) struct Rarest {
     found: Found,
     count: i64,
 }
 
-/// The order in which sessions were opened, from the place where a page begins.
+/// The order in which sessions were opened, from the point where a page begins.
 pub(super) struct Span {
     pub start: i64,
     pub order: &'static str,
@@ -62,7 +64,8 @@ pub(super) struct Span {
 }
 
 impl Store {
-    /// The word that fewest sessions have, of those of a search and a tag; `None` if the index finds nothing by them.
+    /// Returns the word that the fewest sessions have, among those of a search and a tag; `None` if no word narrows the
+    /// search.
     pub(super) async fn rarest(&self, tenant: &Tenant, search: &str, tag: &str) -> Result<Option<Rarest>, StoreError> {
         let mut sought = beginnings(search);
         sought.extend(words::words(tag));
@@ -88,7 +91,8 @@ impl Store {
 }
 
 impl Rarest {
-    /// The sessions to look at for a page in the order of opening, one after the other until it is full.
+    /// Returns the sets of sessions to examine for a page in the order of opening, one after the other until the page
+    /// is full.
     pub(super) fn windows(self) -> Vec<Among> {
         if self.count <= WINDOW {
             return vec![self.all()];
@@ -102,14 +106,14 @@ impl Rarest {
     }
 }
 
-/// The beginnings that a search is for: its words, of an identifier its digits.
+/// Returns the word beginnings to search for: the words, and the digits of an identifier.
 fn beginnings(search: &str) -> Vec<String> {
     let lower = search.to_lowercase();
     let words = lower.split_whitespace().map(|word| word.strip_prefix("session_").unwrap_or(word));
     words.flat_map(words::words).collect()
 }
 
-/// Adds the condition that a session is found by every word of the search.
+/// Adds the condition that every word of the search matches the session.
 pub(super) fn matches(statement: &mut Statement, search: &str) {
     let beginnings = beginnings(search);
     if beginnings.is_empty() {
@@ -136,7 +140,7 @@ impl Among {
             statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
             return;
         }
-        // Of an expression neither engine takes an index that would lead past the one that narrows.
+        // Neither engine can use an index on an expression, so none replaces the index that narrows.
         statement.and(" WHERE sessions.tenant || '' = ? AND sessions.sequence IN (", [tenant.as_str().into()]);
         let window = |limit: i64| -> (String, [Value; 2]) {
             (format!(" sequence {beyond} ? ORDER BY sequence {order} LIMIT ?)"), [start.into(), limit.into()])
@@ -165,7 +169,8 @@ impl Among {
 }
 
 impl Found {
-    /// Adds the statement of the sessions that the index finds; one that no longer goes by a policy is among them.
+    /// Adds the statement that selects the sessions that the index finds, including those that have since left a
+    /// policy.
     fn sequences(&self, statement: &mut Statement, tenant: &Tenant) {
         statement.and("SELECT sequence FROM words", []);
         of_beginning(statement, tenant, Labelled::Session, &self.beginning);
@@ -196,7 +201,7 @@ fn of_beginning(statement: &mut Statement, tenant: &Tenant, kind: Labelled, begi
     statement.and(range, [tenant, kind, beginning.into(), end.into()]);
 }
 
-/// The policies that the index finds by each of these beginnings, and one more than may narrow.
+/// Selects the policies that the index finds by each of these beginnings, up to one more than the limit.
 fn policies(tenant: &Tenant, sought: &[String]) -> Query {
     let mut statement = Statement::of("");
     for (place, word) in sought.iter().enumerate() {
@@ -212,7 +217,7 @@ fn policies(tenant: &Tenant, sought: &[String]) -> Query {
     statement.query()
 }
 
-/// The beginnings that narrow, each with its policies.
+/// Returns the beginnings that narrow the search, each with its policies.
 fn found(sought: &[String], rows: &[Row]) -> Result<Vec<Found>, Failure> {
     let mut found: Vec<_> = sought.iter().map(|word| Found { beginning: word.clone(), policies: Vec::new() }).collect();
     for row in rows {
@@ -223,7 +228,7 @@ fn found(sought: &[String], rows: &[Row]) -> Result<Vec<Found>, Failure> {
     Ok(found)
 }
 
-/// How many sessions the index finds by each of these, up to a bound.
+/// Counts the sessions that the index finds by each of these, up to a bound.
 fn counting(tenant: &Tenant, narrowing: &[Found]) -> Query {
     let mut statement = Statement::of("SELECT");
     for (place, found) in narrowing.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Whether a session is still what was read of it.
+//! Detects if a session has changed since it was read.
 
 use super::codec::from_sql;
 use super::entries::EntryRow;
@@ -6,11 +6,11 @@ use super::head::Head;
 use super::query::query;
 use super::{Engine, SessionRow, Store, StoreError};
 
-/// What tells later whether a session is still what was read of it.
+/// The version of a session when it was read, to detect later changes.
 #[derive(Debug, Clone)]
 pub struct Seen {
     pub(super) head: Head,
-    /// Of a folder: the number of the session's changes that all are in `head`.
+    /// For a folder: the number of the session's last change that `head` includes.
     pub(super) change: Option<u64>,
 }
 
@@ -20,15 +20,16 @@ impl Seen {
         self.head.entries
     }
 
-    /// The session as the caller knows it once `appended` is answered with [`Append::Appended`](super::Append).
+    /// Returns the version of the session once `appended` is answered with [`Append::Appended`](super::Append).
     pub fn followed_by(&self, appended: &EntryRow) -> Seen {
-        // Whoever else wrote meanwhile raised the number too, so that it is not this one.
+        // Another writer in the meantime raised the number too, so the numbers then differ.
         Seen { head: appended.head(), change: self.change.map(|change| change + 1) }
     }
 }
 
 impl Store {
-    /// Whether a session is still as it was `seen`: known without a read where a folder's session was not written to.
+    /// Returns whether a session is unchanged since it was `seen`; needs no read if a folder's session was not written
+    /// to.
     pub async fn is_as_seen(&self, session: &str, seen: &mut Seen) -> Result<bool, StoreError> {
         let change = self.change(session);
         if change.is_some() && change == seen.change {
@@ -41,12 +42,12 @@ impl Store {
         Ok(is_as_seen)
     }
 
-    /// A session that is about to be stored, as it is until somebody writes to it.
+    /// Returns the version of a session that is about to be stored, valid until the next write to it.
     pub fn about_to_open(&self, row: &SessionRow) -> Seen {
         Seen { change: self.change(&row.session), ..row.as_opened() }
     }
 
-    /// A number that is another after every write to `session`, where this process makes all of them.
+    /// Returns a number that changes with every write to `session`; `None` if other processes may write to it.
     pub(super) fn change(&self, session: &str) -> Option<u64> {
         match &self.engine {
             Engine::Sqlite(folder) => Some(folder.change(session)),
@@ -54,7 +55,7 @@ impl Store {
         }
     }
 
-    /// The head of a session: where it is the one of what was read, that is still the session.
+    /// Returns the head of a session; if it equals the head of an earlier read, the session is unchanged.
     pub async fn head(&self, session: &str) -> Result<Option<Head>, StoreError> {
         let last = query(
             "SELECT sessions.seal AS start_seal, entries.entry, entries.seal

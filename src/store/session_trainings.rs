@@ -1,11 +1,11 @@
-//! Trainings that sessions request for their renewals: sessions of one tenant that need one policy share one job.
+//! Trainings that sessions request for their renewals: sessions of one tenant that need the same policy share one job.
 //!
-//! Idempotency keys tell which job is whose, under names that no caller can send, since no header has a line break. The
-//! request of a session names its job, and so does the specification, which is one text whatever session it was made for.
-//! A training that a caller queued is named by its specification too: its policy serves sessions as well.
+//! Idempotency keys record the owners of a job, under names that no caller can send, because no header contains a line
+//! break. A session's request names its job. So does the specification, which is the same text for every session. A
+//! training that a caller queued is also named by its specification, so its policy serves sessions as well.
 //!
-//! A training made for sessions that none requests any more is cancelled. Few of them wait in a tenant's queue at a time, and
-//! none counts among the jobs that its callers may queue.
+//! A training made for sessions is cancelled once no session requests it. Only a few of them wait in a tenant's queue
+//! at a time, and none counts towards the quota of queued jobs.
 //!
 //! Checked by: `tests/operation/renewal_scale.rs`.
 
@@ -23,26 +23,26 @@ use super::training_names::{OF_SESSION, TrainingRequest, name, next_renewal, of_
 use super::{Store, StoreError, turns};
 use crate::control::policy::content_hash;
 
-/// Trainings for sessions that a tenant has in the queue at a time; the next is queued as one begins. A worker takes one at a
-/// time, so that more would only make the tenant's own jobs wait.
+/// The most trainings for sessions in a tenant's queue at a time; the next is queued once one begins. A worker runs one
+/// at a time, so more would only delay the tenant's own jobs.
 const QUEUED_FOR_SESSIONS: i64 = 8;
 
-/// How a session's request was answered.
+/// The answer to a session's request.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SessionTraining {
-    /// The job that trains its policy, or did.
+    /// The job that is training its policy, or has trained it.
     Job(JobRow),
-    /// The queue has as many trainings for sessions as it may.
+    /// The queue already holds the most trainings for sessions.
     Later,
-    /// The session is gone, or was renewed already.
+    /// The session is gone, or was already renewed.
     Obsolete,
 }
 
 impl Store {
-    /// Finds the job that trains what `new` would, for a session; queues `new` if there is none.
+    /// Finds the job that trains the same specification as `new`, for a session; queues `new` if there is none.
     ///
     /// # Errors
-    /// [`StoreError::OverQuota`] if the tenant keeps as many bytes as it may.
+    /// [`StoreError::OverQuota`] if the tenant's quota of bytes is used up.
     pub async fn train_for_session(
         &self,
         new: NewJob,
@@ -52,7 +52,7 @@ impl Store {
         self.write("creating a job", move |connection| train(connection, new, request, by).boxed()).await
     }
 
-    /// Cancels the trainings made for sessions that none requests any more; their jobs.
+    /// Cancels the trainings made for sessions that no session requests any more, and returns their jobs.
     pub async fn cancel_unrequested(&self, now_ms: i64) -> Result<Vec<String>, StoreError> {
         let find = query(
             "SELECT DISTINCT jobs.job, jobs.tenant FROM jobs JOIN idempotency_keys AS named ON named.job = jobs.job
@@ -80,7 +80,7 @@ impl Store {
     }
 }
 
-/// The tenant's turn stays locked, as where a caller queues a job.
+/// Finds or queues the training. The tenant's turn stays locked, as when a caller queues a job.
 async fn train(
     mut connection: Connection<'_>,
     new: NewJob,
@@ -114,7 +114,7 @@ async fn train(
     count(connection, &new, bytes, quotas, actor).await.map(SessionTraining::Job)
 }
 
-/// Whether the session is there and waits for this renewal; it stays so until this transaction ends.
+/// Returns whether the session exists and waits for this renewal; it stays so until this transaction ends.
 async fn is_awaited(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -128,7 +128,7 @@ async fn is_awaited(
     next_renewal(connection, &request.session).await.map(|next| next == request.renewal)
 }
 
-/// The tenant's turn is locked: no session requests the job in between.
+/// Cancels a job that no session requests. The tenant's turn is locked, so that no session requests it in between.
 async fn cancel_if_unrequested(
     mut connection: Connection<'_>,
     (tenant, job): (Tenant, String),

@@ -1,4 +1,4 @@
-//! Sessions: where a live investor started.
+//! Sessions: the start of each live investor.
 
 use futures_util::FutureExt;
 
@@ -18,7 +18,7 @@ use super::training_names::withdraw_all;
 use super::words::{self, Labelled, Worded};
 use super::{Store, StoreError, policies};
 
-/// What became of a session to open.
+/// The outcome of opening a session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CreateSession {
     Created,
@@ -28,33 +28,34 @@ pub enum CreateSession {
     KeyConflict,
     /// The tenant has no such policy.
     NoPolicy,
-    /// The identifier is taken.
+    /// The identifier is already used.
     Exists,
 }
 
-/// The start of a session; as read, verified against its seal.
+/// The start of a session; verified against its seal when it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionRow {
     pub session: String,
     pub tenant: Tenant,
     pub policy: String,
     pub initial_wealth: f64,
-    /// Share of it in the risky asset.
+    /// The share of the initial wealth in the risky asset.
     pub initial_holding: f64,
     /// The log-returns known at the start.
     pub initial_history: Vec<f64>,
-    /// Periods by its first policy.
+    /// The number of periods that its first policy advises.
     pub horizon: usize,
-    /// What else was fixed when it was opened.
+    /// The other facts fixed when it was opened.
     pub plan_json: String,
-    /// Periods after which it is due to be renewed by itself. It finds sessions, and no seal covers it.
+    /// The number of periods after which it is due for automatic renewal. It only finds sessions, and no seal covers
+    /// it.
     pub due: Option<usize>,
-    /// Number of assets where there are several, 0 of one. It counts bytes, and no seal covers it.
+    /// The number of assets if there are several, 0 for one. It only counts bytes, and no seal covers it.
     pub assets: usize,
     pub created_ms: i64,
 }
 
-/// A session as it was read: its start and every entry.
+/// A session as read: its start and every entry.
 #[derive(Debug, Clone)]
 pub struct SessionFacts {
     pub row: SessionRow,
@@ -64,10 +65,10 @@ pub struct SessionFacts {
 }
 
 impl Store {
-    /// Opens a session, calls it what it is to be called and records its idempotency key, all or nothing.
+    /// Opens a session, sets its labels and records its idempotency key, all or nothing.
     ///
     /// # Errors
-    /// [`StoreError::OverQuota`] where the tenant has as many sessions, or keeps as many bytes, as it may.
+    /// [`StoreError::OverQuota`] if the tenant's quota of sessions or of bytes is used up.
     pub async fn create_session(
         &self,
         new: SessionRow,
@@ -78,22 +79,22 @@ impl Store {
         self.write("creating a session", move |connection| create(connection, new, labels, key, by).boxed()).await
     }
 
-    /// A session of a tenant.
+    /// Reads a session of a tenant.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where the row is not what was written.
+    /// [`StoreError::Corrupt`] if the row is not what was written.
     pub async fn session(&self, tenant: &Tenant, session: &str) -> Result<Option<SessionRow>, StoreError> {
         let find = query("SELECT * FROM sessions WHERE session = $1 AND tenant = $2");
         let find = find.bind(session).bind(tenant.as_str());
         self.read("reading a session", find, |rows| rows.first().map(SessionRow::from_row).transpose()).await
     }
 
-    /// A session of a tenant with all its entries.
+    /// Reads a session of a tenant with all its entries.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where a row is not what was written or one is missing.
+    /// [`StoreError::Corrupt`] if a row is not what was written or one is missing.
     pub async fn session_facts(&self, tenant: &Tenant, session: &str) -> Result<Option<SessionFacts>, StoreError> {
-        // Before the rows: what is written from here on shows.
+        // Read before the rows, so that every later write changes it.
         let change = self.change(session);
         let Some(row) = self.session(tenant, session).await? else { return Ok(None) };
         let Some(entries) = self.entries(session).await? else { return Ok(None) };
@@ -101,8 +102,8 @@ impl Store {
         Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
     }
 
-    /// Bytes of the entries of a session as they are read: of several assets with their names, which a plan has half as often as an entry;
-    /// none where it is no session.
+    /// Returns the bytes that the entries of a session take when they are read; 0 if there is no such session. With
+    /// several assets an entry also carries their names, twice as often as the plan does.
     pub async fn entry_bytes(&self, session: &str) -> Result<usize, StoreError> {
         let sum = query(
             "SELECT CAST(coalesce(sum(octet_length(content_json) + octet_length(answer_json)
@@ -114,7 +115,7 @@ impl Store {
         Ok(usize::try_from(bytes).unwrap_or_default())
     }
 
-    /// The newest observations of a session, newest first, as the audit shows them; none where it is no session.
+    /// Returns the newest observations of a session, newest first, as audit rows; none if there is no such session.
     pub(super) async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
         let newest = query(
             "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
@@ -124,7 +125,7 @@ impl Store {
         self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
     }
 
-    /// Deletes a session of a tenant and its entries. False where there was none.
+    /// Deletes a session of a tenant and its entries. Returns false if there was none.
     pub async fn delete_session(&self, tenant: &Tenant, session: &str) -> Result<bool, StoreError> {
         let (tenant, name, actor) = (tenant.clone(), session.to_owned(), self.actor.clone());
         self.write_to(session, "deleting a session", move |connection| delete(connection, tenant, name, actor).boxed())
@@ -179,7 +180,7 @@ async fn create(
     Ok(CreateSession::Created)
 }
 
-/// What a key used before answers; `None` for a new key.
+/// Returns the answer for an idempotency key that was used before; `None` for a new key.
 async fn repeated(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -197,7 +198,8 @@ async fn repeated(
     }
 }
 
-/// The sequence of the session, or why there is none. The policy stays locked until the session is there: it cannot be deleted in between.
+/// Inserts a session and returns its sequence, or the outcome if it cannot be inserted. The policy stays locked until
+/// then, so that it cannot be deleted in between.
 async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Result<i64, CreateSession>, Failure> {
     if !policies::lock(connection, &row.policy).await?
         || !policies::is_owned(connection, &row.tenant, &row.policy).await?
@@ -228,7 +230,7 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Res
     Ok(inserted.ok_or(CreateSession::Exists))
 }
 
-/// The audit says how many entries went with the session.
+/// Deletes a session. The audit records how many entries were deleted with it.
 async fn delete(
     mut connection: Connection<'_>,
     tenant: Tenant,
@@ -255,12 +257,12 @@ async fn delete(
 }
 
 impl SessionRow {
-    /// The head of the session before its first entry.
+    /// Returns the head of the session before its first entry.
     pub fn head(&self) -> Head {
         Head { entries: 0, seal: self.seal().finish() }
     }
 
-    /// The session before its first entry; whether it still is that is found out by a read.
+    /// Returns the version of the session before its first entry; only a read shows if it is still current.
     pub fn as_opened(&self) -> Seen {
         Seen { head: self.head(), change: None }
     }
@@ -269,7 +271,7 @@ impl SessionRow {
         self.seal_with(&history_seal(&self.initial_history))
     }
 
-    /// Over the start, of whose history the seal alone is needed.
+    /// Computes the seal over the start; of the history it needs only the seal.
     pub(super) fn seal_with(&self, history_seal: &[u8]) -> Seal {
         Seal::of("session")
             .text(&self.session)
@@ -283,7 +285,7 @@ impl SessionRow {
             .integer(self.created_ms)
     }
 
-    /// The start of a session in a list, verified; its history is not read.
+    /// Reads and verifies the start of a session in a list, without its history.
     pub(super) fn start_of(row: &Row) -> Result<Self, Failure> {
         let start = SessionRow {
             session: row.get("session")?,

@@ -1,10 +1,10 @@
-//! A statement over sessions as a list shows them, put together from parts.
+//! A statement over sessions as a list shows them, composed of parts.
 
 use std::fmt;
 
 use super::query::{Query, Value, query};
 
-/// The tables of a list: a session, its labels, the policy that advises it, and the last entry that moved it.
+/// The tables of a list: a session, its labels, the policy that advises it, and the last entry that changed it.
 pub(super) const TABLES: &str = "FROM sessions
     LEFT JOIN labels ON labels.tenant = sessions.tenant AND labels.object = sessions.session
     LEFT JOIN renewals ON renewals.session = sessions.session
@@ -15,13 +15,13 @@ pub(super) const TABLES: &str = "FROM sessions
     LEFT JOIN entries AS last ON last.session = sessions.session
          AND last.entry = (SELECT entry FROM entries AS made WHERE made.session = sessions.session
                            AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)";
-/// The answer of the entry in a table, or in the one of a statement, unless it is damaged so that it cannot be read.
+/// The answer column of an entry, prefixed with the table `$of`; NULL if it is not valid JSON.
 macro_rules! answer {
     ($of:literal) => {
         concat!("CASE WHEN json_valid(", $of, "answer_json) THEN ", $of, "answer_json END")
     };
 }
-/// Periods observed, as that entry says.
+/// The number of periods observed, according to that entry.
 macro_rules! observations {
     ($of:literal) => {
         concat!(
@@ -39,16 +39,16 @@ macro_rules! observations {
 pub(super) const ANSWER: &str = answer!("last.");
 pub(super) const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
 pub(super) const OBSERVATIONS: &str = observations!("last.");
-/// Whether the next policy of a session is to be trained. Until it is there the session goes on, past its horizon too.
+/// True if the next policy of a session is to be trained. Until it exists the session continues, even past its horizon.
 pub(super) const IS_WAITING: &str =
     concat!("(sessions.due IS NOT NULL AND sessions.due <= ", observations!("last."), ")");
-/// What a session has now.
+/// The current wealth of a session.
 pub(super) const WEALTH: &str = concat!(
     "coalesce(CAST(json_extract(",
     answer!("last."),
     ", '$.wealth') AS DOUBLE PRECISION), sessions.initial_wealth)"
 );
-/// Sessions that are due to be renewed, after the sequence $1, at most $2.
+/// Selects sessions that are due for renewal, after the sequence $1, at most $2.
 pub(super) const DUE: &str = concat!(
     "SELECT sequence, tenant, session FROM sessions WHERE due IS NOT NULL AND sequence > $1
      AND due <= (SELECT ",
@@ -57,7 +57,7 @@ pub(super) const DUE: &str = concat!(
      ORDER BY sequence LIMIT $2"
 );
 
-/// A statement under way: its text and its values.
+/// A statement being composed: its text and its values.
 pub(super) struct Statement {
     sql: String,
     values: Vec<Value>,
@@ -68,7 +68,7 @@ impl Statement {
         Statement { sql: sql.to_owned(), values: Vec::new() }
     }
 
-    /// Adds a part whose `?` stand for the values, in their order.
+    /// Adds a part in which each `?` stands for the next value.
     pub(super) fn and<const N: usize>(&mut self, part: &str, values: [Value; N]) {
         let mut values = values.into_iter();
         for (index, piece) in part.split('?').enumerate() {

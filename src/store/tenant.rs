@@ -1,4 +1,4 @@
-//! Whose a thing is.
+//! The owners of stored things.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::control::error::FieldError;
 
-/// The name of a tenant. The default one owns what is made where nobody is asked for a key.
+/// The name of a tenant. The default tenant owns what is made while no key is required.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Tenant(Arc<str>);
 
@@ -18,7 +18,7 @@ impl Tenant {
         &self.0
     }
 
-    /// As stored, where it was checked when it was made.
+    /// Reads a stored name, which was checked when it was made.
     pub(super) fn stored(name: &str) -> Self {
         Tenant(name.into())
     }

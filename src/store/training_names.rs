@@ -1,6 +1,7 @@
-//! The names of trainings: which session requested a job, and which specification it is of.
+//! The names of trainings: the sessions that requested a job, and the specification it trains.
 //!
-//! They are idempotency keys that no caller can send, since no header has a line break, and go with their job.
+//! They are idempotency keys that no caller can send, because no header contains a line break. They are deleted with
+//! their job.
 
 use super::error::Failure;
 use super::idempotency::FOR_SESSIONS;
@@ -10,18 +11,18 @@ use super::query::{Connection, query};
 use super::tenant::Tenant;
 use crate::control::policy::content_hash;
 
-/// Before the request of a session.
+/// Prefix of the key of a session's request.
 pub(super) const OF_SESSION: &str = "renewal\n";
-/// Before that of one which a caller queued.
+/// Prefix of the key of a training that a caller queued.
 const OF_CALLER: &str = "trained\n";
 
 /// A session's request for the policy of its next renewal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TrainingRequest {
     pub session: String,
-    /// Number of the renewal.
+    /// The number of the renewal.
     pub renewal: usize,
-    /// Requests for that renewal before this one, whose jobs failed.
+    /// The number of earlier requests for that renewal, whose jobs failed.
     pub attempt: usize,
 }
 
@@ -33,14 +34,14 @@ impl TrainingRequest {
     }
 }
 
-/// Number of the next renewal of a session.
+/// Returns the number of the next renewal of a session.
 pub(super) async fn next_renewal(connection: &mut Connection<'_>, session: &str) -> Result<usize, Failure> {
     let made = query("SELECT coalesce(max(number), 0) AS made FROM renewals WHERE session = $1").bind(session);
     let made: i64 = connection.row(made).await?.map_or(Ok(0), |row| row.get("made"))?;
     Ok(usize::try_from(made).unwrap_or_default() + 1)
 }
 
-/// The job that trains a specification, or did and its policy is still there; that is preferred.
+/// Finds the job that trains a specification, or that has trained it if its policy still exists. Prefers the latter.
 pub(super) async fn of_specification(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -69,7 +70,7 @@ pub(super) async fn queued_for_sessions(connection: &mut Connection<'_>, tenant:
     connection.row(queued).await?.map_or(Ok(0), |row| row.get("queued"))
 }
 
-/// Names the training that a caller queued by its specification.
+/// Names a training that a caller queued by its specification.
 pub(super) async fn name_training(connection: &mut Connection<'_>, new: &NewJob) -> Result<(), Failure> {
     if new.kind != JobKind::Train {
         return Ok(());
@@ -78,7 +79,7 @@ pub(super) async fn name_training(connection: &mut Connection<'_>, new: &NewJob)
     name(connection, &new.tenant, &new.job, &format!("{OF_CALLER}{specification}")).await
 }
 
-/// Gives a job a name, which is the name of no other from here on.
+/// Gives a job a name, which no other job has from then on.
 pub(super) async fn name(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -92,7 +93,7 @@ pub(super) async fn name(
     connection.execute(name.bind(tenant.as_str()).bind(key).bind(job)).await.map(drop)
 }
 
-/// Takes back what a session requested for its next renewal: it is deleted, or about to be renewed.
+/// Withdraws the requests of a session for its next renewal, because it is deleted or about to be renewed.
 pub(super) async fn withdraw(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
@@ -109,7 +110,7 @@ pub(super) async fn withdraw(
     Ok(())
 }
 
-/// Takes back what a session requested that is about to be deleted, which nobody renews in between.
+/// Withdraws the requests of a session that is about to be deleted, and locks it against a renewal in between.
 pub(super) async fn withdraw_all(
     connection: &mut Connection<'_>,
     tenant: &Tenant,

@@ -1,8 +1,8 @@
 //! The words by which sessions and policies are found, each in a row of an index.
 //!
-//! A word is a run of letters and digits, in lower case. The words of a session or a policy are those of its name and its
-//! tags, and its identifier without what it begins with. A row is written with what it finds and goes with it; rows that are
-//! left out would hide a session from a search, and nothing else.
+//! A word is a run of letters and digits, in lower case. The words of a session or a policy are those of its name and
+//! its tags, and its identifier without the prefix. A row is written and deleted with the thing it finds. A missing row
+//! would hide a session from a search, and do nothing else.
 
 use std::collections::BTreeSet;
 
@@ -12,40 +12,40 @@ use super::quotas;
 use super::statement::Statement;
 use super::tenant::Tenant;
 
-/// What a row of the index takes beside its word, about as much over either engine.
+/// Bytes that a row of the index takes beside its word, about the same in either engine.
 const ROW_BYTES: i64 = 64;
 
-/// What has words: a session or a policy of a tenant.
+/// A thing that has words: a session or a policy of a tenant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Worded<'a> {
     pub tenant: &'a Tenant,
     pub kind: Labelled,
-    /// Of the row of `sessions` or of `policy_owners`.
+    /// The sequence of its row in `sessions` or `policy_owners`.
     pub sequence: i64,
 }
 
-/// The words of a text, each once.
+/// Returns the words of a text, each once.
 pub(super) fn words(text: &str) -> BTreeSet<String> {
     let lower = text.to_lowercase();
     lower.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
 }
 
-/// The word of an identifier: its digits.
+/// Returns the word of an identifier: its digits.
 pub(super) fn digits(identifier: &str) -> &str {
     identifier.rsplit_once('_').map_or(identifier, |(_, digits)| digits)
 }
 
-/// Words as a column has them: a space before each, so that a beginning of one is found as a part.
+/// Encodes words for their column: a space before each, so that a substring search finds the beginning of a word.
 pub(super) fn column(words: &BTreeSet<String>) -> String {
     words.iter().flat_map(|word| [" ", word]).collect()
 }
 
-/// Bytes that words are counted with: their column, and a row for each, as `check::TOTALS` counts them too.
+/// Returns the bytes that words count as: their column, and a row for each, as in `check::TOTALS`.
 pub(super) fn bytes(words: &BTreeSet<String>) -> i64 {
     words.iter().map(|word| 2 * (1 + quotas::length(word.as_bytes())) + ROW_BYTES).sum()
 }
 
-/// What has labels.
+/// The kinds of things that have labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Labelled {
     Policy,

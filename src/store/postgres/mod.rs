@@ -1,14 +1,14 @@
 //! A PostgreSQL database that any number of processes share.
 //!
-//! Isolation is `READ COMMITTED`: each decision locks the row it rests on, then reads what the decision needs by a
-//! statement of its own. Only an observation is first tried without a lock, by one statement that the keys of its table
-//! refuse where another came before. One statement that locks and reads would not do: after waiting for the lock it would still read
-//! what was there when it began.
+//! Isolation is `READ COMMITTED`: each decision locks the row it depends on, then reads what it needs by a separate
+//! statement. One statement that locks and reads would not do: after waiting for the lock, it would still read the
+//! state from when it began. Only an observation is first tried without a lock, by one statement, which the keys of its
+//! table reject if another came first.
 //!
-//! Nothing waits without end: PostgreSQL bounds statements, waits for locks and transactions whose client fell silent
-//! (a stopped worker must not hold a job's row), and this side bounds whole operations, for a server that answers no
-//! more. A connection that met any of it is closed rather than trusted. An operation cut off during its commit may have
-//! happened; callers find out by repeating it, which every operation here allows.
+//! No wait is unbounded. PostgreSQL bounds statements, waits for locks and transactions whose client fell silent (a
+//! stopped worker must not hold a job's row). This side bounds whole operations, in case the server stops answering. A
+//! connection that hit such a bound is closed, because its state is unknown. An operation cut off during its commit may
+//! have been committed; callers find out by repeating it, which every operation here allows.
 
 mod url;
 
@@ -26,13 +26,13 @@ use super::query::{Connection, Purpose, Query, Row, query};
 
 pub use url::{PostgresUrl, UrlError};
 
-/// Connections of one process, ten in all. A server takes 100 unless told otherwise: a few replicas, and room for an operator.
+/// Connections of one process, ten in all. A server allows 100 by default: a few replicas, and some for an operator.
 const WORK_CONNECTIONS: u32 = 6;
 const LIST_CONNECTIONS: u32 = 3;
 const PROBE_CONNECTIONS: u32 = 1;
-/// A request waits this long for a connection before it is told to come back.
+/// A request waits this long for a connection before it is rejected with advice to retry.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
-/// Past the server's own bounds below, and within the time of a request.
+/// Longer than the server's own bounds below, and within the time of a request.
 const OPERATION_TIMEOUT: Duration = Duration::from_secs(20);
 /// The server's bounds, for every connection. Some run databases with `synchronous_commit` off, which would break the
 /// first promise; a setting that waits for standbys stays.
@@ -44,7 +44,7 @@ const SETTINGS: &str = "SELECT set_config('statement_timeout', '15s', false),
 
 #[derive(Clone)]
 pub(super) struct Database {
-    /// Writes, and what advice is read from.
+    /// For writes, and for reads behind advice.
     work: PgPool,
     lists: PgPool,
     probes: PgPool,
@@ -53,10 +53,10 @@ pub(super) struct Database {
 impl Database {
     pub(super) async fn connect(url: &PostgresUrl) -> Result<Database, StoreError> {
         let options = url.options().disable_statement_logging();
-        // Without the time limits of the pool: a migration may take what it takes.
+        // Without the time limits of the pool, because a migration may take long.
         let mut connection = connect(&options).await?;
         migrate(&mut connection).await?;
-        // Everything is committed; a server that does not say goodbye changes nothing.
+        // Everything is committed, so an error while closing changes nothing.
         let _ = connection.close().await;
         Ok(Database {
             work: pool(WORK_CONNECTIONS, &options),
@@ -84,7 +84,7 @@ impl Database {
         time.map_err(|failure| failure.during(doing))
     }
 
-    /// The size of the database, in bytes.
+    /// Returns the size of the database, in bytes.
     pub(super) async fn size(&self) -> Result<u64, StoreError> {
         let doing = "measuring the database";
         let size = query("SELECT pg_database_size(current_database()) AS size");
@@ -99,7 +99,7 @@ impl Database {
         }
     }
 
-    /// Runs `work` in a transaction and answers after its commit.
+    /// Runs `work` in a transaction and returns after its commit.
     pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
@@ -109,7 +109,7 @@ impl Database {
             async move {
                 let mut transaction = connection.begin().await.map_err(Failure::postgres)?;
                 let answer = work(Connection::Postgres(&mut transaction)).await;
-                // Were it only dropped, what failed would keep its locks for a while after it is answered.
+                // If the transaction were only dropped, a failed one would keep its locks for a while after the answer.
                 match answer {
                     Ok(_) => transaction.commit().await,
                     Err(_) => transaction.rollback().await,
@@ -139,7 +139,7 @@ impl Database {
         .await
     }
 
-    /// Runs one statement, a transaction of its own; the number of rows it changed.
+    /// Runs one statement as a transaction of its own, and returns the number of rows it changed.
     pub(super) async fn execute(&self, doing: &'static str, query: Query) -> Result<u64, StoreError> {
         self.bounded(&self.work, doing, |connection| {
             async move { Connection::Postgres(connection).execute(query).await }.boxed()
@@ -147,7 +147,8 @@ impl Database {
         .await
     }
 
-    /// Runs `work` on a connection for no longer than [`OPERATION_TIMEOUT`]; one that failed is not used again.
+    /// Runs `work` on a connection for at most [`OPERATION_TIMEOUT`]; a connection that became unavailable is not used
+    /// again.
     async fn bounded<T>(
         &self,
         pool: &PgPool,
@@ -186,7 +187,7 @@ async fn connect(options: &PgConnectOptions) -> Result<PgConnection, StoreError>
     }
 }
 
-/// One connection to the database, to be read only.
+/// Opens one read-only connection to the database.
 pub(super) async fn inspect(url: &PostgresUrl) -> Result<PgConnection, StoreError> {
     let mut connection = connect(&url.options().disable_statement_logging()).await?;
     let read_only = "SET default_transaction_read_only = on";
@@ -194,14 +195,14 @@ pub(super) async fn inspect(url: &PostgresUrl) -> Result<PgConnection, StoreErro
     Ok(connection)
 }
 
-/// One connection to a database whose schema is made, or brought up to date.
+/// Opens one connection to the database, and creates its schema or brings it up to date.
 pub(super) async fn open_new(url: &PostgresUrl) -> Result<PgConnection, StoreError> {
     let mut connection = connect(&url.options().disable_statement_logging()).await?;
     migrate(&mut connection).await?;
     Ok(connection)
 }
 
-/// The version of the schema; 0 where there is none yet.
+/// Returns the version of the schema; 0 if there is none yet.
 pub(super) async fn version(connection: &mut PgConnection) -> Result<i64, StoreError> {
     let table = "SELECT to_regclass('_sqlx_migrations') IS NOT NULL";
     if !sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)? {

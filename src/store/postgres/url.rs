@@ -1,4 +1,4 @@
-//! Where a PostgreSQL database is, and with which password.
+//! The address of a PostgreSQL database, including its password.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,12 +6,12 @@ use std::str::FromStr;
 use sqlx::postgres::PgConnectOptions;
 use thiserror::Error;
 
-/// A parsed `postgres://user:password@host:port/database`. What it lacks comes from libpq's variables (`PGPASSWORD`, ...)
-/// and password file. It prints without the password.
+/// A parsed `postgres://user:password@host:port/database`. Missing parts come from libpq's variables (`PGPASSWORD`,
+/// ...) and password file. It prints without the password.
 #[derive(Clone)]
 pub struct PostgresUrl(Box<PgConnectOptions>);
 
-/// Why a text is no such address. The text is not shown: it may hold a password.
+/// The reason why a text is no such address. The text is not shown, because it may hold a password.
 #[derive(Debug, Error)]
 pub enum UrlError {
     #[error("the store must be given as postgres://user:password@host:port/database")]

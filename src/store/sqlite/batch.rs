@@ -1,5 +1,5 @@
-//! Observations that wait together go into the table together: one statement for all of them, since handing a statement
-//! to SQLite, which has a thread of its own, costs more than what it does to one row.
+//! Observations that wait together are inserted together, by one statement. SQLite has a thread of its own, and handing
+//! a statement to it costs more than its work on one row.
 
 use std::collections::VecDeque;
 
@@ -11,14 +11,14 @@ use crate::store::entries::{self, APPENDING, Append, EntryRow, append};
 use crate::store::error::StoreError;
 use crate::store::query::Connection;
 
-/// An observation to append, and where its answer goes.
+/// An observation to append, and the channel for its answer.
 pub(super) struct Appending {
     pub new: EntryRow,
     pub reply: Reply<Append>,
 }
 
 impl Appending {
-    /// As an operation like every other, which finds out why it is refused where it is.
+    /// Returns a separate operation for this observation, which finds the reason if it is rejected.
     pub(super) fn alone(self) -> Operation {
         let Appending { new, reply } = self;
         Operation::new(
@@ -29,13 +29,13 @@ impl Appending {
         )
     }
 
-    /// How to answer it once it is appended and its group's end is known.
+    /// Returns how to answer it once it is appended and the outcome of its group is known.
     fn appended(self) -> Answer {
         Box::new(move |group: Result<(), StoreError>| self.reply.send(group.map(|()| Append::Appended)))
     }
 }
 
-/// What the next group is made of.
+/// The contents of the next group.
 #[derive(Default)]
 pub(super) struct Waiting {
     pub operations: VecDeque<Operation>,
@@ -48,11 +48,11 @@ impl Waiting {
     }
 }
 
-/// Appends what waits by one statement, which is a transaction of its own where none is open. Where one of them cannot be
-/// appended none is, and all are left to go alone: which of them it was is found out one by one.
+/// Appends all waiting observations by one statement, which is its own transaction if none is open. If one of them
+/// cannot be appended, none is, and each is retried as a separate operation, which finds the one at fault.
 ///
 /// # Errors
-/// What ended the group; those that ran are among the answers.
+/// Returns the error that ended the group; the answers include the observations that ran.
 pub(super) async fn append_all(
     connection: &mut SqliteConnection,
     waiting: &mut Waiting,

@@ -1,12 +1,12 @@
-//! Which sessions were written to: a number each, that every write changes.
+//! A version number for each session, which every write to the session changes.
 //!
-//! The folder is written by this process alone, so a session whose number is the one that was seen before its rows were
-//! read still has those rows, and nobody needs to read them to know. A [`Change`] goes with a write and raises the number
-//! when it ends: after the commit, before the answer, whatever the outcome and even where nobody waits for it any more.
-//! Between commit and answer the number is the old one, when either state of the session may be shown.
+//! Only this process writes to the folder. If a session's number still equals the one noted before its rows were read,
+//! the rows are unchanged and need no further read. A [`Change`] accompanies a write and raises the number when the
+//! write ends: after the commit and before the answer. It does so whatever the outcome, and even if no caller waits any
+//! more. Between commit and answer the number is the old one, and either state of the session may be shown.
 //!
-//! Sessions share the numbers, of which there is a fixed count: nothing grows with the sessions, and nothing is ever
-//! forgotten. Who shares a number that was raised reads the head of its session once more than it had to.
+//! Sessions share a fixed count of numbers, so memory does not grow with the sessions, and no number is ever dropped.
+//! If a shared number was raised, a session that was not written to has its head read once more than necessary.
 
 use std::hash::{BuildHasher, RandomState};
 
@@ -17,7 +17,7 @@ pub(super) const NUMBERS: usize = 1 << 19;
 
 pub(super) struct Changes {
     numbers: Box<[AtomicU64]>,
-    /// Keyed by chance: nobody can choose whose number to share.
+    /// Keyed at random, so that no client can choose whose number to share.
     hasher: RandomState,
 }
 
@@ -27,23 +27,23 @@ impl Changes {
         Arc::new(Changes { numbers, hasher: RandomState::new() })
     }
 
-    /// The number of `session` now. To be asked before its rows are read.
+    /// Returns the current number of `session`. Call this before its rows are read.
     pub(super) fn number(&self, session: &str) -> u64 {
         self.numbers[self.place(session)].load(Ordering::Acquire)
     }
 
-    /// A write to `session` that has yet to be committed.
+    /// Returns the change of a write to `session` that is not committed yet.
     pub(super) fn of(self: &Arc<Self>, session: &str) -> Change {
         Change { place: self.place(session), changes: self.clone() }
     }
 
     fn place(&self, session: &str) -> usize {
-        // Below the count of numbers, so of an address's width.
+        // Below the count of numbers, so it fits a `usize`.
         (self.hasher.hash_one(session) % self.numbers.len() as u64) as usize
     }
 }
 
-/// A write under way; dropped once it ended, before it is answered.
+/// A write in progress; dropped once it has ended, before it is answered.
 pub(super) struct Change {
     changes: Arc<Changes>,
     place: usize,

@@ -1,11 +1,12 @@
-//! The files that a process holds: locked, and compared with what their names lead to.
+//! The files that a process holds: locked, and compared with the files that their names refer to.
 //!
-//! SQLite goes on writing to a file that was moved away or removed, and over one that was copied over, so what it
-//! acknowledges then is lost. The writer therefore looks before it acknowledges a commit and each half second: the name must
-//! lead to the file that is held, and the file must have the stamp of this process.
+//! SQLite continues writing to a file that was moved or removed, and over one that was overwritten by a copy; what it
+//! acknowledges then is lost. The writer therefore checks before it acknowledges a commit and each half second: the
+//! name must refer to the held file, and the file must have the stamp of this process.
 //!
-//! The lock is `flock`'s, which on Linux does not meet the locks that SQLite itself takes. Those, however, are lost once
-//! any descriptor of the file is closed in the process: a held database is closed after every connection.
+//! The lock is `flock`'s, which on Linux is independent of the locks that SQLite takes. SQLite's locks, however, are
+//! lost once any descriptor of the file is closed in the process. A held database is therefore closed after every
+//! connection.
 
 use std::cell::Cell;
 use std::fs::{File, TryLockError};
@@ -17,10 +18,10 @@ use sqlx::SqliteConnection;
 
 use crate::store::error::{Failure, StoreError, unusable};
 
-/// The place at which SQLite has the number of `PRAGMA user_version` in its file, which it leaves to its user.
+/// The offset of `PRAGMA user_version` in an SQLite file, a number that SQLite leaves to its user.
 const STAMP_AT: u64 = 60;
 
-/// A file that is locked and was not replaced yet.
+/// A file that is locked and has not been replaced yet.
 pub(in crate::store) struct HeldFile {
     path: PathBuf,
     file: File,
@@ -28,13 +29,13 @@ pub(in crate::store) struct HeldFile {
 }
 
 struct Stamp {
-    /// The stamp that the file has until the log with ours is copied into it.
+    /// The stamp that the file has until the log with our stamp is copied into it.
     before: Cell<Option<u32>>,
     ours: u32,
 }
 
 impl HeldFile {
-    /// Locks a file, made if it is absent, that its owner alone can read.
+    /// Locks a file that only its owner can read, and creates it if it is absent.
     ///
     /// # Errors
     /// [`StoreError::Locked`] if another process holds it.
@@ -48,8 +49,8 @@ impl HeldFile {
         }
     }
 
-    /// Stamps the database in the file with a number that no other process gives it. A disk too full for that is no reason
-    /// not to start.
+    /// Stamps the database in the file with a random number that identifies this process. A disk too full for that does
+    /// not prevent the start.
     pub(super) async fn stamp(&mut self, connection: &mut SqliteConnection) -> Result<(), StoreError> {
         let ours = RandomState::new().hash_one(&self.path) as u32 | 1;
         let stamp = sqlx::AssertSqlSafe(format!("PRAGMA user_version = {}", ours.cast_signed()));
@@ -64,8 +65,10 @@ impl HeldFile {
         Ok(())
     }
 
+    /// Checks that the file was not replaced.
+    ///
     /// # Errors
-    /// [`StoreError::Replaced`] if the name leads to another file or to none, or the file has another's content.
+    /// [`StoreError::Replaced`] if the name refers to another file or to none, or if the file has other content.
     pub(super) fn verify(&self) -> Result<(), StoreError> {
         let is_same = match (self.path.metadata(), self.file.metadata()) {
             (Ok(named), Ok(held)) => (named.dev(), named.ino()) == (held.dev(), held.ino()),
@@ -91,7 +94,7 @@ impl HeldFile {
     }
 }
 
-/// Takes the stamp from a database that nobody has open, so that it is none of the process that it was copied from.
+/// Removes the stamp from a database that no process has open, so that a copy does not carry the stamp of its source.
 pub(in crate::store) fn unstamp(path: &Path) -> Result<(), StoreError> {
     let unstamp = || File::options().write(true).open(path)?.write_all_at(&[0; 4], STAMP_AT);
     unstamp().map_err(|error| unusable(path, error))

@@ -33,7 +33,7 @@ pub(super) struct Folder {
     readers: Readers,
     requests: mpsc::Sender<Request>,
     changes: Arc<Changes>,
-    /// The first fatal error, from whichever side met it.
+    /// The first fatal error, of a read or of a write.
     fatal: watch::Sender<Option<StoreError>>,
 }
 
@@ -42,7 +42,7 @@ impl Folder {
         Folder::over(dir, opening::open(dir).await?)
     }
 
-    /// A folder that another process may hold, for writes that meet none of its own.
+    /// Opens a folder that another process may hold, for writes that do not conflict with that process's own.
     pub(super) async fn open_beside(dir: &Path) -> Result<Folder, StoreError> {
         Folder::over(dir, opening::open_beside(dir).await?)
     }
@@ -83,12 +83,12 @@ impl Folder {
         self.readers.close().await;
         let (answer, closed) = oneshot::channel();
         if self.requests.send(Request::Close(answer)).await.is_ok() {
-            // An error means that the writer ended first: closed as well.
+            // An error means that the writer ended first, so the folder is closed as well.
             let _ = closed.await;
         }
     }
 
-    /// Runs `work` in the writer and answers after its commit.
+    /// Runs `work` in the writer and returns after its commit.
     pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
@@ -98,7 +98,7 @@ impl Folder {
         self.request(doing, writing(doing, work, reply), answer).await
     }
 
-    /// As [`Self::write`], where `work` may change rows of `session`.
+    /// Runs `work` like [`Self::write`], if it may change rows of `session`.
     pub(super) async fn write_to<T, W>(&self, session: &str, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
@@ -108,13 +108,13 @@ impl Folder {
         self.request(doing, writing(doing, work, reply), answer).await
     }
 
-    /// Appends in the writer, many observations to a statement, and answers after the commit.
+    /// Appends in the writer, many observations to a statement, and returns after the commit.
     pub(super) async fn append(&self, new: EntryRow) -> Result<Append, StoreError> {
         let (reply, answer) = Reply::new(Some(self.changes.of(&new.session)));
         self.request(APPENDING, Request::Append(Appending { new, reply }), answer).await
     }
 
-    /// A number that is another after every write to `session`.
+    /// Returns a number that changes with every write to `session`.
     pub(super) fn change(&self, session: &str) -> u64 {
         self.changes.number(session)
     }
@@ -126,7 +126,7 @@ impl Folder {
         answer: oneshot::Receiver<Result<T, StoreError>>,
     ) -> Result<T, StoreError> {
         self.refuse_after_fatal()?;
-        // A writer that ended drops the request, and the answer with it.
+        // A writer that has ended drops the request and its answer channel.
         let _ = self.requests.send(request).await;
         match answer.await {
             Ok(result) => result,
@@ -134,7 +134,7 @@ impl Folder {
         }
     }
 
-    /// Reads, and remembers a fatal failure.
+    /// Reads rows, and remembers a fatal failure.
     pub(super) async fn read(
         &self,
         purpose: Purpose,
@@ -145,7 +145,7 @@ impl Folder {
             let acquired = self.readers.of_purpose(purpose).acquire().await;
             let mut reader = acquired.map_err(|error| Failure::sqlite(error).during(doing))?;
             let result = Connection::Sqlite(&mut reader).rows(query).await.map_err(|failure| failure.during(doing));
-            // Its thread may have died: one that failed is not used again.
+            // Its thread may have died, so a failed connection is not used again.
             if result.is_err() {
                 drop(reader.detach());
             }

@@ -1,4 +1,4 @@
-//! Opening a folder: the lock, the engine's age, the schema, the leases of the dead, the connections.
+//! Opening a folder: the lock, the engine's version, the schema, the leases of dead workers, the connections.
 
 use std::path::Path;
 use std::time::Duration;
@@ -20,31 +20,31 @@ pub(super) const LOG: &str = "ballast.sqlite-wal";
 const LOCK: &str = "ballast.lock";
 /// The first release without the reset bug of the write-ahead log.
 const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
-/// A reader waits this long for recovery after a crash, and a writer for one that adds or revokes a key.
+/// A reader waits this long for recovery after a crash, and a writer for a process that adds or revokes a key.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
-/// Bytes of a page: three observations of 30 assets fill one, where each would take a page of 4 KB alone.
+/// Bytes of a page: three observations of 30 assets fit one page, while each would take a page of 4 KB alone.
 const PAGE: u32 = 8192;
-/// Pages of the log at which they are copied into the database: many observations change the same page of the
-/// index, which is then copied once for all of them. SQLite's own 1000 copies most of them a second time.
+/// The number of pages in the log at which they are copied into the database. Many observations change the same index
+/// page, which is then copied once for all of them. SQLite's default of 1000 copies most of them twice.
 const COPIED_AT: &str = "4000";
-/// Memory for the pages of a connection that writes, in KiB: the pages of the index that observations find their places in.
+/// Memory for the page cache of a writing connection, in KiB: for the index pages that appending observations uses.
 const CACHE: &str = "-16384";
-/// A log that grew beyond this, in bytes, is cut back to it once it is copied into the database.
+/// A log longer than this, in bytes, is truncated to it once it is copied into the database.
 const LOG_KEPT: &str = "67108864";
-/// Each read connection is a thread; reads are short. Advice has most of them. Of lists, two of sessions take their turns at a
-/// time, and one connection is for what is shown at once.
+/// Each read connection is a thread; reads are short. Advice has most of them. Of the list connections, lists of
+/// sessions take turns on two, and one serves data that is shown at once.
 const ADVICE_READERS: u32 = 4;
 const LIST_READERS: u32 = 3;
 const PROBE_READERS: u32 = 1;
 
-/// A folder, its schema up to date, with the files that are held of it: none if another process may hold it.
+/// An opened folder, its schema up to date. `held` is empty if another process may hold the folder.
 pub(super) struct Opened {
     pub held: Vec<HeldFile>,
     pub writer: SqliteConnection,
     pub readers: Readers,
 }
 
-/// The read connections, by what they are for.
+/// The read connections, by purpose.
 #[derive(Clone)]
 pub(super) struct Readers {
     advice: SqlitePool,
@@ -56,7 +56,7 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     let lock = lock(dir)?;
     refuse_damaged_log(dir)?;
     let file = dir.join(DATABASE);
-    // The database too: a lock file that was removed is made anew by whoever comes second.
+    // The database is locked too, because a second process could recreate a lock file that was removed.
     let mut database = HeldFile::lock(file.clone())?;
     let mut writer = connect(&file).await?;
     refuse_old_engine(&mut writer).await?;
@@ -67,8 +67,8 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     Ok(Opened { held: vec![lock, database], writer, readers: Readers::of(&file) })
 }
 
-/// As [`open`], without holding the folder and without touching what its holder does. The lock is needed only to bring
-/// the schema up to date and to look at a log that nobody writes, and given up after.
+/// Opens a folder like [`open`], without holding it and without disturbing the process that holds it. The lock is
+/// needed only to bring the schema up to date and to check a log that no process writes, and is released afterwards.
 pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     let file = dir.join(DATABASE);
     refuse_damaged_log_unless_held(dir)?;
@@ -85,7 +85,7 @@ pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     Ok(Opened { held: Vec::new(), writer, readers: Readers::of(&file) })
 }
 
-/// The database of a folder, whether or not a process holds it, to be read only.
+/// Opens the database of a folder read-only, even if a process holds it.
 pub(in crate::store) async fn inspect(dir: &Path) -> Result<SqliteConnection, StoreError> {
     let file = dir.join(DATABASE);
     existing(&file)?;
@@ -94,7 +94,7 @@ pub(in crate::store) async fn inspect(dir: &Path) -> Result<SqliteConnection, St
     options.disable_statement_logging().connect().await.map_err(opening)
 }
 
-/// A database in a file that nobody writes to, without leaving anything beside it.
+/// Opens a database file that nothing writes to, without leaving any file beside it.
 pub(in crate::store) async fn inspect_file(file: &Path) -> Result<SqliteConnection, StoreError> {
     existing(file)?;
     let options = SqliteConnectOptions::new().filename(file).read_only(true).immutable(true);
@@ -105,7 +105,7 @@ pub(in crate::store) fn existing(file: &Path) -> Result<(), StoreError> {
     file.metadata().map(drop).map_err(|error| unusable(file, error))
 }
 
-/// Whether the file is there with the schema of this binary.
+/// Returns whether the file exists with the schema of this binary.
 async fn is_current(file: &Path) -> Result<bool, StoreError> {
     if !file.exists() {
         return Ok(false);
@@ -155,17 +155,17 @@ pub(in crate::store) fn lock(dir: &Path) -> Result<HeldFile, StoreError> {
     HeldFile::lock(dir.join(LOCK))
 }
 
-/// Looks at the log where nobody writes it; a process that holds the folder looked when it started.
+/// Checks the log if no process holds the folder; a process that holds it checked the log when it started.
 fn refuse_damaged_log_unless_held(dir: &Path) -> Result<(), StoreError> {
     match lock(dir) {
-        // Whoever is the last to close a log takes what is left of it for all of it.
+        // The last process to close a log treats what is left of it as complete.
         Ok(_held) => refuse_damaged_log(dir),
         Err(StoreError::Locked { .. }) => Ok(()),
         Err(error) => Err(error),
     }
 }
 
-/// SQLite would drop every commit from the damage on, without a word.
+/// Rejects a damaged log, because SQLite would silently drop every commit from the damage on.
 fn refuse_damaged_log(dir: &Path) -> Result<(), StoreError> {
     let path = dir.join(LOG);
     let found = write_ahead_log::damage(&path);
@@ -175,8 +175,8 @@ fn refuse_damaged_log(dir: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// Empties the log: what a crash left torn in it must not be there when the next one comes. A disk too full for that, or a
-/// reader beside, is no reason not to start.
+/// Empties the log, so that what a crash left torn in it is gone before the next crash. A full disk or a concurrent
+/// reader does not prevent the start.
 async fn empty_log(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     match sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)").execute(connection).await.map_err(opening) {
         Err(error) if error.is_fatal() => Err(error),
@@ -204,7 +204,7 @@ pub(in crate::store) async fn connect(file: &Path) -> Result<SqliteConnection, S
     Ok(connection)
 }
 
-/// The driver takes the names of columns from the schema, and panics where they are not text.
+/// Rejects a damaged schema: the driver takes column names from the schema, and panics if they are not text.
 async fn refuse_damaged_schema(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     let statements = "SELECT CAST(coalesce(sql, '') AS BLOB) AS statement FROM sqlite_schema";
     let statements: Vec<Vec<u8>> = sqlx::query_scalar(statements).fetch_all(connection).await.map_err(opening)?;
@@ -229,7 +229,7 @@ pub(in crate::store) async fn migrate(connection: &mut SqliteConnection) -> Resu
     migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::sqlite))
 }
 
-/// The version of the schema; 0 where there is none yet.
+/// Returns the version of the schema; 0 if there is none yet.
 pub(in crate::store) async fn version(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
     let table = "SELECT count(*) FROM sqlite_schema WHERE name = '_sqlx_migrations'";
     let tables: i64 = sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)?;
@@ -240,7 +240,8 @@ pub(in crate::store) async fn version(connection: &mut SqliteConnection) -> Resu
     sqlx::query_scalar(newest).fetch_one(connection).await.map_err(opening)
 }
 
-/// The lock shows that whoever held a lease can no longer write: its jobs may be claimed at once.
+/// Ends all leases. The lock shows that earlier holders of leases can no longer write, so their jobs may be claimed at
+/// once.
 async fn end_leases(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     sqlx::query("UPDATE jobs SET lease_until_ms = ? WHERE state = ?")
         .bind(i64::MIN)

@@ -1,4 +1,4 @@
-//! What the writer is asked to do: an operation, how it is undone, and how its caller is answered after the commit.
+//! The operations of the writer: how each is undone, and how its caller is answered after the commit.
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
@@ -8,34 +8,35 @@ use tokio::sync::oneshot;
 use super::changes::Change;
 use crate::store::error::{Failure, StoreError};
 
-/// One caller's reads and writes. Given an error instead of a connection, it passes that on as its own.
+/// One caller's reads and writes. If it gets an error instead of a connection, it returns that error to its caller.
 pub(super) struct Operation {
     pub undo: Undo,
     pub run: Run,
 }
 
-/// How what an operation changed before it failed is undone.
+/// The way to undo the changes of an operation that failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Undo {
-    /// By a savepoint, two statements more.
+    /// By a savepoint, which takes two more statements.
     Savepoint,
-    /// By SQLite, as it changes rows by one statement.
+    /// By SQLite itself, because the operation changes rows by one statement.
     Statement,
 }
 
 pub(super) type Run =
     Box<dyn for<'c> FnOnce(Result<&'c mut SqliteConnection, StoreError>) -> BoxFuture<'c, Ran> + Send>;
 
-/// An operation that ran: whether its savepoint may be kept, and how to answer its caller once the group's end is known.
+/// An operation that ran: the outcome that decides its savepoint, and how to answer its caller once its group has
+/// ended.
 pub(super) struct Ran {
     pub end: Result<(), StoreError>,
     pub answer: Answer,
 }
 
-/// Tells a caller how its group ended.
+/// Answers a caller with the outcome of its group.
 pub(super) type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
-/// Where the outcome of a write goes, and the change it may be.
+/// The channel for the outcome of a write, and the change to mark when it ends.
 pub(super) struct Reply<T> {
     change: Option<Change>,
     sender: oneshot::Sender<Result<T, StoreError>>,
@@ -47,7 +48,7 @@ impl<T> Reply<T> {
         (Reply { change, sender }, answer)
     }
 
-    /// Call after the end of the transaction.
+    /// Sends the outcome. Call this after the end of the transaction.
     pub(super) fn send(self, outcome: Result<T, StoreError>) {
         drop(self.change);
         // A caller that stopped waiting needs no answer.
@@ -56,7 +57,7 @@ impl<T> Reply<T> {
 }
 
 impl Operation {
-    /// `work` as an operation, answered to `reply`.
+    /// Wraps `work` as an operation, answered through `reply`.
     pub(super) fn new<T, W>(doing: &'static str, undo: Undo, work: W, reply: Reply<T>) -> Self
     where
         T: Send + 'static,

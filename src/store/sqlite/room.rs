@@ -1,4 +1,4 @@
-//! The room a folder's database takes, and pages that hold nothing given back.
+//! The space a folder's database takes, and the return of free pages to the file system.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ impl Folder {
     }
 }
 
-/// What somebody without privileges may still write to the file system of `dir`.
+/// Returns how many bytes an unprivileged process may still write to the file system of `dir`.
 fn disk_left(dir: &Path) -> Result<u64, StoreError> {
     let found = rustix::fs::statvfs(dir).map_err(|error| unusable(dir, error.into()))?;
     Ok(found.f_bavail.saturating_mul(found.f_frsize))

@@ -1,4 +1,5 @@
-//! What the numbers of changes are made of. `tests/slots.rs` compiles the same code over a checker's primitives instead.
+//! The primitives behind the version numbers. `tests/slots.rs` compiles the same code over a checker's primitives
+//! instead.
 
 pub(super) use std::sync::Arc;
 pub(super) use std::sync::atomic::{AtomicU64, Ordering};

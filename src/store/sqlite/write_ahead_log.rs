@@ -1,10 +1,10 @@
-//! The write-ahead log, read before SQLite does: whether damage in it hides commits.
+//! Checks the write-ahead log before SQLite reads it, for damage that hides commits.
 //!
-//! SQLite takes the first frame whose checksum fails for the end of the log, which is right after a crash: the last commit
-//! may be torn. It is wrong where the disk changed a byte, since every later commit would vanish without a word, and a
-//! session would be advised from a law it has long left. The two are told apart by what follows: each commit is on the disk
-//! before the next is begun, so a crash leaves at most one commit behind a frame that fails, and more mean damage. Damage to
-//! the last two commits is not seen.
+//! SQLite treats the first frame whose checksum fails as the end of the log. This is right after a crash, because the
+//! last commit may be torn. It is wrong if the disk changed a byte: every later commit would vanish silently, and a
+//! session would be advised from a state it has long left. What follows the frame distinguishes the two. Each commit is
+//! on the disk before the next begins, so a crash leaves at most one commit after a failing frame, and more mean
+//! damage. Damage to the last two commits is not detected.
 //!
 //! The format is SQLite's, <https://www.sqlite.org/fileformat2.html#walformat>; a log is read in one pass.
 
@@ -17,22 +17,24 @@ use thiserror::Error;
 const HEAD_BYTES: usize = 32;
 const FRAME_HEAD_BYTES: usize = 24;
 const MAGIC: u32 = 0x377f_0682;
-/// Of pages that SQLite can have.
+/// The page sizes that SQLite allows.
 const PAGE_BYTES: std::ops::RangeInclusive<usize> = 512..=65_536;
 
-/// What of a log is not what was written.
+/// The damaged part of a log.
 #[derive(Debug, PartialEq, Eq, Error)]
 pub(super) enum Damage {
-    /// It is written and fsynced before the first frame.
+    /// The head, which is written and fsynced before the first frame.
     #[error("the head of the write-ahead log")]
     Head,
-    /// Counted from 0; commits follow it.
+    /// A frame, counted from 0, that is followed by commits.
     #[error("frame {0} of the write-ahead log")]
     Frame(usize),
 }
 
+/// Returns the damage of a log, if there is any.
+///
 /// # Errors
-/// The file cannot be read.
+/// Fails if the file cannot be read.
 pub(super) fn damage(path: &Path) -> std::io::Result<Option<Damage>> {
     match File::open(path) {
         Ok(file) => damage_in(BufReader::new(file)),
@@ -47,7 +49,7 @@ fn damage_in(mut log: impl Read) -> std::io::Result<Option<Damage>> {
         return Ok(None);
     }
     let Some(mut chain) = Chain::start(&head) else {
-        // Nothing behind the head: it was still being written.
+        // Nothing follows the head, so it was still being written.
         return Ok(filled(&mut log, &mut [0])?.then_some(Damage::Head));
     };
     let mut frame = vec![0; FRAME_HEAD_BYTES + chain.page_bytes];
@@ -62,7 +64,7 @@ fn damage_in(mut log: impl Read) -> std::io::Result<Option<Damage>> {
     Ok(failed.filter(|_| commits > 1).map(Damage::Frame))
 }
 
-/// Whether there were bytes enough.
+/// Fills `bytes` from the log; returns false if there are too few.
 fn filled(log: &mut impl Read, bytes: &mut [u8]) -> std::io::Result<bool> {
     match log.read_exact(bytes) {
         Ok(()) => Ok(true),
@@ -71,18 +73,18 @@ fn filled(log: &mut impl Read, bytes: &mut [u8]) -> std::io::Result<bool> {
     }
 }
 
-/// The checksum that runs through a log: each frame's continues the one before.
+/// The running checksum of a log: each frame's checksum continues the one before.
 struct Chain {
-    /// How the words of the checksum lie in memory.
+    /// The byte order of the checksum's words.
     word: fn([u8; 4]) -> u32,
     page_bytes: usize,
-    /// In the head and in every frame; a log begun anew has others.
+    /// The same in the head and in every frame; a log that was restarted has another salt.
     salt: [u8; 8],
     sum: [u32; 2],
 }
 
 impl Chain {
-    /// `None` where the head is not one.
+    /// Reads the head; returns `None` if it is invalid.
     fn start(head: &[u8; HEAD_BYTES]) -> Option<Chain> {
         let magic = big_endian(head, 0);
         let word = if magic & 1 == 0 { u32::from_le_bytes } else { u32::from_be_bytes };
@@ -110,7 +112,7 @@ impl Chain {
         frame[8..16] == self.salt && self.sum == [big_endian(frame, 16), big_endian(frame, 20)]
     }
 
-    /// Whether the frame calls itself the end of a commit to this log.
+    /// Returns whether the frame claims to end a commit of this log.
     fn is_commit(&self, frame: &[u8]) -> bool {
         frame[8..16] == self.salt && big_endian(frame, 4) > 0
     }

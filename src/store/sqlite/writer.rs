@@ -1,10 +1,11 @@
-//! The one writer: operations that wait together are committed together.
+//! The single writer: operations that wait together are committed together.
 //!
-//! A commit costs one fsync however much it holds, so each transaction takes every operation that waits, up to [`GROUP`].
-//! Observations alone, which is what a busy service writes, are one statement and so a transaction of their own. Of other
-//! groups each operation runs in a savepoint, or changes rows by a single statement: one that fails is undone alone. Answers
-//! leave after the commit. Errors after which SQLite may have rolled back by itself (disk full, I/O) fail every operation
-//! that ran in the group; those that had not run yet go to the next one. After a fatal error the writer stops for good.
+//! A commit costs one fsync however much it holds, so each transaction takes every waiting operation, up to [`GROUP`].
+//! A busy service writes mostly observations; a group of observations alone is one statement and therefore its own
+//! transaction. In other groups each operation runs in a savepoint, or changes rows by a single statement, so that a
+//! failed one is undone alone. Answers are sent after the commit. Errors after which SQLite may have rolled back by
+//! itself (disk full, I/O) fail every operation that ran in the group; those that had not run yet go to the next one.
+//! After a fatal error the writer stops for good.
 
 use std::time::Duration;
 
@@ -17,22 +18,22 @@ use super::operation::{Answer, Operation, Undo};
 use crate::store::entries::ROWS_AT_ONCE;
 use crate::store::error::{Failure, StoreError};
 
-/// Operations in one transaction: the observations that one statement takes. A row then costs a hundredth of what it costs
-/// alone; more only adds waiting.
+/// The most operations in one transaction: as many observations as one statement takes. A row then costs a hundredth of
+/// what it costs alone; a larger group only adds waiting.
 const GROUP: usize = ROWS_AT_ONCE;
-/// A file that is held is looked at so often while nothing is written.
+/// The interval between checks of a held file while nothing is written.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
-/// Requests that may wait before callers do.
+/// The number of requests that may wait in the queue before callers have to wait.
 pub(super) const QUEUE: usize = 1024;
 
 pub(super) enum Request {
     Write(Operation),
     Append(Appending),
-    /// Commit what waits, then close and answer.
+    /// Commits waiting writes, then closes and answers.
     Close(oneshot::Sender<()>),
 }
 
-/// Starts the writer on a thread of its own: its many short waits for SQLite do not queue behind requests.
+/// Starts the writer on its own thread, so that its many short waits for SQLite do not queue behind requests.
 pub(super) fn start(
     connection: SqliteConnection,
     requests: mpsc::Receiver<Request>,
@@ -45,8 +46,8 @@ pub(super) fn start(
     std::thread::Builder::new().name("writer".into()).spawn(serving).map(drop).map_err(unavailable)
 }
 
-/// Serves requests until the last [`Folder`](super::Folder) is dropped, one closes it, or a write fails fatally.
-/// Holds the folder's files, where it has them, as long as it can write, and ends once one of them is another.
+/// Serves requests until the last [`Folder`](super::Folder) is dropped, one closes it, or a write fails fatally. Keeps
+/// the folder's files locked, if it has them, as long as it can write, and ends once one of them is replaced.
 async fn serve(
     mut connection: SqliteConnection,
     mut requests: mpsc::Receiver<Request>,
@@ -74,7 +75,7 @@ async fn serve(
             return;
         }
     }
-    // The commits are durable already; what closing adds is a shorter log to read at the next start.
+    // The commits are already durable; closing only shortens the log that the next start reads.
     let _ = connection.close().await;
     drop(held);
     for closed in closed {
@@ -82,7 +83,7 @@ async fn serve(
     }
 }
 
-/// True where the thread that SQLite runs on has died: every write to come would fail.
+/// Returns true if the thread that SQLite runs on has died, because every later write would fail.
 fn has_lost_its_engine(error: &StoreError) -> bool {
     matches!(error, StoreError::Unavailable { source: Some(source), .. } if matches!(**source, sqlx::Error::WorkerCrashed))
 }
@@ -91,8 +92,8 @@ fn verify(held: &[HeldFile]) -> Result<(), StoreError> {
     held.iter().try_for_each(HeldFile::verify)
 }
 
-/// Waits for a request, unless some wait already, and takes those behind it, a group at most. False once there will be no
-/// more.
+/// Waits for a request, unless some wait already, and takes those queued behind it, up to a group. Returns false once
+/// there will be no more.
 async fn receive(
     requests: &mut mpsc::Receiver<Request>,
     waiting: &mut Waiting,
@@ -116,10 +117,10 @@ async fn receive(
     count > 0
 }
 
-/// Runs what waits as one transaction and answers every operation that ran.
+/// Runs the waiting operations as one transaction and answers every operation that ran.
 ///
 /// # Errors
-/// What ended the group before its commit.
+/// Returns the error that ended the group before its commit.
 async fn commit_group(
     connection: &mut SqliteConnection,
     waiting: &mut Waiting,
@@ -127,10 +128,10 @@ async fn commit_group(
 ) -> Result<(), StoreError> {
     let mut answers = Vec::new();
     let end = run_group(connection, waiting, &mut answers).await;
-    // What was committed to a file that is not there any more is not acknowledged.
+    // A commit to a file that is no longer there is not acknowledged.
     let end = end.and_then(|()| verify(held));
     if end.is_err() {
-        // Refused where SQLite rolled back by itself, which is as good.
+        // It is refused if SQLite rolled back by itself, which has the same effect.
         let _ = execute(connection, "ROLLBACK").await;
     }
     for answer in answers {
