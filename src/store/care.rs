@@ -30,7 +30,7 @@ pub struct Today {
     pub first_days: Vec<FirstDay>,
 }
 
-/// The first day on which a report is not yet late, for sessions whose policy has this many periods a year.
+/// A session is overdue if its last report is before this day and its policy has this many periods a year.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstDay {
     pub periods_per_year: f64,

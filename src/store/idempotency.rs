@@ -21,9 +21,9 @@ pub struct RequestKey {
 
 /// The earlier use of a key.
 pub(super) enum Used {
-    /// The same request, which opened this session.
+    /// It was used for an identical request, which opened this session.
     BySame { session: Option<String> },
-    /// Another request.
+    /// It was used for another request.
     ByAnother,
 }
 

@@ -22,7 +22,7 @@ pub enum JobState {
     Cancelled,
 }
 
-/// What can happen to a job.
+/// An event in the life of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JobEvent {
     /// A worker takes it, or takes it over from a worker whose lease ran out.

@@ -25,7 +25,7 @@ use crate::control::request::text::check_text;
 pub const LONGEST_NAME: usize = 100;
 pub const LONGEST_NOTES: usize = 2_000;
 pub const LONGEST_TAG: usize = 50;
-/// Tags of one thing.
+/// The most tags of a policy or a session.
 pub const MOST_TAGS: usize = 20;
 
 /// The labels of a policy or a session; a part that was not set is empty.

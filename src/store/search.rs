@@ -20,7 +20,7 @@ use super::tenant::Tenant;
 use super::words::{self, Labelled};
 use super::{Store, StoreError};
 
-/// The number of sessions tested before more are taken.
+/// The number of sessions tested before more are.
 const WINDOW: i64 = 500;
 /// The sessions of a word are counted up to this bound.
 const COUNTED: i64 = 100_000;

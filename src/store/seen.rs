@@ -22,7 +22,7 @@ impl Seen {
 
     /// Returns the version of the session once `appended` is answered with [`Append::Appended`](super::Append).
     pub fn followed_by(&self, appended: &EntryRow) -> Seen {
-        // Another writer in the meantime raised the number too, so the numbers then differ.
+        // Another write in the meantime also raises the number, so that the numbers then differ.
         Seen { head: appended.head(), change: self.change.map(|change| change + 1) }
     }
 }

@@ -1,4 +1,4 @@
-//! Clients that are slow, greedy or hostile: they are refused, and nobody else notices.
+//! Clients that are slow, greedy or hostile: they are rejected, and other clients are not affected.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -12,7 +12,7 @@ use futures_util::future::join_all;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-/// Eight clients send bodies of 4 MB, each of which takes far longer to decode than anybody should wait.
+/// Eight clients send bodies of 4 MB, each of which takes far longer to decode than any client should wait.
 #[tokio::test(flavor = "multi_thread")]
 async fn large_bodies_are_decoded_in_nobodys_way() {
     let folder = tempfile::tempdir().unwrap();
@@ -48,19 +48,19 @@ async fn large_bodies_are_decoded_in_nobodys_way() {
 }
 
 const SLOW_SOCKETS: usize = 1000;
-/// What a call may take at most while all of them are open, on a machine that builds something else meanwhile.
+/// The most time that a call may take while all of them are open, on a machine that builds something else meanwhile.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 
-/// Sends `bytes` and leaves the connection as it is.
+/// Sends `bytes` and leaves the connection open.
 fn open_socket(address: &str, bytes: &str) -> TcpStream {
     let mut socket = TcpStream::connect(address).unwrap();
     socket.set_nonblocking(true).unwrap();
-    // Past what the buffers between the two take, the rest stays unsent.
+    // Bytes beyond the socket buffers stay unsent.
     let _ = socket.write(bytes.as_bytes());
     socket
 }
 
-/// Whether the other side has closed; what it sent is taken.
+/// Drains the socket and returns whether the other side has closed it.
 fn is_closed(socket: &mut TcpStream) -> bool {
     let mut taken = [0; 1024];
     loop {
@@ -72,7 +72,7 @@ fn is_closed(socket: &mut TcpStream) -> bool {
     }
 }
 
-/// The slowest of 30 rounds of calls, each answered with 200.
+/// Returns the slowest of 30 calls, each answered with 200.
 async fn slowest(app: &App, first: usize) -> Duration {
     let mut slowest = Duration::ZERO;
     for round in 0..30 {
@@ -177,7 +177,7 @@ async fn a_tenant_that_calls_too_often_is_put_off_and_another_is_not() {
     app.hold(&south);
     assert_eq!(app.get("/jobs").await.0, 200);
     app.hold(&north);
-    // A refused call takes nothing of the allowance, so that asking again and again puts nothing off.
+    // A rejected call uses up no allowance, so that repeated calls do not postpone the next one.
     let asked = Instant::now();
     until("the allowance to come back", async || (app.get("/jobs").await.0 == 200).then_some(())).await;
     assert_within(Duration::from_secs(pause), asked, "the allowance");
@@ -208,11 +208,11 @@ async fn heavy_calls_past_the_bound_come_back_later_and_starve_nobody() {
     let put_off = heavy.into_iter().map(Result::unwrap).find(|answer| answer.status() == 429).unwrap();
     assert_eq!(put_off.headers()["retry-after"], "1");
     assert!(slowest < within(ANSWERED_WITHIN), "{slowest:?}");
-    // Every place was given up again.
+    // Every permit was released.
     assert_eq!(app.post("/what-if", &sweep).await.0, 200);
 }
 
-/// A question is what it says once it is decoded, however it was written.
+/// A query counts by its decoded text, however it was encoded.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_class_of_a_call_is_that_of_what_it_asks() {
     let mut app = App::configured(|config| config.limits = Limits::new([0, 2, 0], 4)).await;
@@ -230,13 +230,13 @@ async fn the_class_of_a_call_is_that_of_what_it_asks() {
         assert!(statuses.iter().filter(|status| **status == 429).count() >= 10, "{question}: {statuses:?}");
         assert_eq!(app.action().await.0, 200, "{question}");
     }
-    // No word of a name makes a cheap question a dear one.
+    // A word in the name of a session does not make a cheap query a heavy one.
     let session = app.get("/action?session=session_resolve_explain").await;
     assert_eq!(session.0, 404, "{}", session.1);
 }
 
-/// Advice for a state outside the design is solved, and counts as what it is from then on; so does the observation that
-/// needs it.
+/// Advice for a state outside the design needs a solve, and counts as heavy once that is known. So does an observation
+/// that needs such advice.
 #[tokio::test(flavor = "multi_thread")]
 async fn advice_that_must_solve_is_heavy_from_then_on() {
     let mut app = App::configured(|config| config.limits = Limits::new([0, 3, 0], 4)).await;
@@ -259,7 +259,7 @@ async fn advice_that_must_solve_is_heavy_from_then_on() {
         statuses.push(status.as_u16());
     }
     assert!(statuses.contains(&200) && statuses.contains(&429), "{statuses:?}");
-    // What was put off is recorded in its turn.
+    // An observation that was rejected is recorded when its permit comes.
     until("its turn", async || (app.observe(1, 0.01).await.0 == 200).then_some(())).await;
     let deadline = Instant::now() + patience();
     let put_off = loop {
@@ -274,8 +274,8 @@ async fn advice_that_must_solve_is_heavy_from_then_on() {
     assert_eq!(put_off["value"], "heavy", "{put_off}");
 }
 
-/// What is opened, observed and put right of several assets solves the one-step problem, and is heavy from the moment that is
-/// known: a report that is refused is not, nor is one of a fund whose shares are given.
+/// Opening, observing and correcting a session of several assets solves the one-step problem, and is heavy once that is
+/// known. An invalid report is not heavy, nor is one for a fund whose shares are given.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_several_assets_report_is_heavy_where_it_solves() {
     let mut app = App::configured(|config| config.limits = Limits::new([0, 4, 0], 4)).await;
@@ -286,7 +286,7 @@ async fn what_several_assets_report_is_heavy_where_it_solves() {
             "radius": { "rule": "fixed", "radius": 0.01 }, "composition": composition }, "design": { "count": 20 } })
     };
     let report = json!({ "log_returns": { "stocks": 0.01, "bonds": 0.002 } });
-    // Opens a session, reports a period of it and puts it right, again and again, until something is put off.
+    // Opens a session, reports a period and corrects it, again and again, until a call is rejected.
     let put_off = async |app: &mut App, rounds: usize| {
         for _ in 0..rounds {
             let (status, session) = app.post("/sessions", &json!({ "policy": app.policy })).await;
@@ -328,7 +328,7 @@ async fn what_several_assets_report_is_heavy_where_it_solves() {
     }
 }
 
-/// Pointers to everything in a document; of a list only the ends, for its entries are alike.
+/// Collects pointers to all parts of a document; of a list only to the ends, because its entries are alike.
 fn pointers(value: &Value, at: String, found: &mut Vec<String>) {
     found.push(at.clone());
     match value {
@@ -345,7 +345,7 @@ fn pointers(value: &Value, at: String, found: &mut Vec<String>) {
     }
 }
 
-/// Documents that differ from a sound one in one place.
+/// Returns documents that differ from a sound one at one pointer.
 fn mutations(sound: &Value) -> Vec<(String, Value)> {
     let mut places = Vec::new();
     pointers(sound, String::new(), &mut places);
@@ -379,7 +379,7 @@ fn mutations(sound: &Value) -> Vec<(String, Value)> {
     mutations
 }
 
-/// A mutated policy is refused with the field named, or it advises within the bounds of an allocation all the same.
+/// A mutated policy is rejected with the field named, or its advice is still within the bounds of an allocation.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_mutated_policy_is_refused_or_advises_within_bounds() {
     let app = App::start().await;
@@ -407,6 +407,6 @@ async fn a_mutated_policy_is_refused_or_advises_within_bounds() {
             assert_eq!(app.post("/observe", &report).await.0, 200, "{what}");
         }
     }
-    // Diagnostics, and numbers that may be what they will.
+    // Accepted mutations change diagnostics, or numbers that may have any value.
     assert!(accepted > 10, "{accepted}");
 }

@@ -1,5 +1,6 @@
-//! Every answer that may be large takes its part of one budget before it is made: each operation of the description is asked for its
-//! largest answer, and in a development build an answer above 64 KB without its part ends the call with 500.
+//! Every answer that may be large reserves its size in one budget before it is made. Each operation of the description
+//! is called for its largest answer. In a development build an answer above 64 KB without a reservation ends the call
+//! with 500.
 
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -8,10 +9,10 @@ use crate::support::App;
 
 /// Answers up to this size are not counted.
 const COUNTED_FROM: usize = 64 << 10;
-/// Letters of four bytes each.
+/// A letter of four bytes.
 const NAME: &str = "\u{10348}";
 
-/// Labels at all their limits.
+/// Returns labels at all their limits.
 fn labels() -> Value {
     let tags: Vec<String> = (0..20).map(|tag| format!("{}{tag:02}", NAME.repeat(48))).collect();
     json!({ "name": NAME.repeat(100), "notes": NAME.repeat(2000), "tags": tags })
@@ -27,14 +28,14 @@ fn returns(count: usize) -> Vec<f64> {
     (0..count).map(|k| 0.004 + 0.02 * (1.7 * k as f64).sin()).collect()
 }
 
-/// What the largest answers are made of.
+/// A store with everything that the largest answers contain.
 struct Store {
     app: App,
     /// A training that has ended, and an evaluation.
     jobs: [String; 2],
-    /// Of a long history.
+    /// A policy with a long history.
     policy: String,
-    /// Of many periods.
+    /// A session of many periods.
     session: String,
 }
 
@@ -62,7 +63,7 @@ impl Store {
             .as_str()
             .unwrap();
         let jobs = [training.to_owned(), evaluated];
-        // Enough of each kind for a list above 64 KB.
+        // Enough of each kind to make a list above 64 KB.
         let small: Value = serde_json::from_slice(&crate::support::trained(&crate::support::specification(2))).unwrap();
         for seed in 1..=8 {
             let mut other = small.clone();
@@ -87,7 +88,7 @@ impl Store {
         Store { app, jobs, policy: trained, session }
     }
 
-    /// The largest legal request of an operation, and whether its answer is above 64 KB.
+    /// Returns the largest valid request of an operation, and whether its answer is above 64 KB.
     fn largest(&self, operation: &str) -> (String, Option<Value>, bool) {
         let Store { jobs: [training, evaluation], policy, session, .. } = self;
         let (of_policy, of_session, of_job) =
@@ -185,7 +186,7 @@ async fn every_operation_has_its_part_of_the_budget_before_its_largest_answer_is
         paths[path].as_object().unwrap().keys().map(|method| format!("{method} {path}")).collect::<Vec<_>>()
     };
     let mut operations: Vec<String> = paths.keys().flat_map(|path| methods(path)).collect();
-    // What others ask about is deleted last.
+    // Deletions come last, because other operations need what they delete.
     operations.sort_by_key(|operation| operation.starts_with("delete"));
     for operation in operations {
         let (path, body, is_large) = store.largest(&operation);
@@ -197,7 +198,7 @@ async fn every_operation_has_its_part_of_the_budget_before_its_largest_answer_is
         let answer = body.iter().fold(request, |request, body| request.json(body)).send().await.unwrap();
         let status = answer.status();
         let bytes = answer.bytes().await.unwrap();
-        // A policy that sessions live by stays.
+        // A policy that sessions use is not deleted.
         let is_answered = status.is_success() || status.is_redirection() || status == StatusCode::CONFLICT;
         let told = String::from_utf8_lossy(&bytes[..bytes.len().min(400)]).into_owned();
         assert!(is_answered, "{operation}: {status} {told}");

@@ -1,7 +1,7 @@
-//! Whoever holds connections keeps nobody else from being answered.
+//! Clients that hold many connections do not keep other clients from being answered.
 //!
-//! The crowds are as large as the service's table and larger: they need as many descriptors, which the tests ask for and
-//! say so where they do not get them.
+//! The tests open as many connections as the service's table holds, or more. They need as many descriptors, which they
+//! request, and they print a message if they do not get them.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -16,17 +16,17 @@ use serde_json::{Value, json};
 
 /// More than the service holds at a time.
 const CROWD: usize = 4300;
-/// What a call may take at most beside them, on a machine that builds something else meanwhile.
+/// The most time that a call may take beside them, on a machine that builds something else meanwhile.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 
-/// How long a crowd is held; in full 15 s by `BALLAST_TEST_CROWD_SECONDS=15`.
+/// Returns how long the connections are held; in full 15 s by `BALLAST_TEST_CROWD_SECONDS=15`.
 fn held_for() -> Duration {
     let asked = std::env::var("BALLAST_TEST_CROWD_SECONDS").ok().and_then(|seconds| seconds.parse().ok());
     Duration::from_secs(asked.unwrap_or(4))
 }
 
-/// Whether this process may open a crowd. Where it may not, the test runs once more in a process that may, or says that it
-/// did not run at all.
+/// Returns whether this process may open that many connections. If not, the test runs again in a process that may, or
+/// prints that it did not run at all.
 fn may_open_a_crowd(test: &str) -> bool {
     const ENOUGH: usize = 2 * CROWD;
     let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
@@ -43,13 +43,13 @@ fn may_open_a_crowd(test: &str) -> bool {
             Command::new("sh").args(["-c", &raised]).arg(program).args([test, "--exact", "--nocapture"]).status();
         assert!(child.unwrap().success(), "{test} failed with more descriptors");
     } else {
-        // Past the capture of test output: a suite that ran half must not look whole.
+        // This bypasses the capture of test output: a suite that ran only half must not look complete.
         let _ = writeln!(std::io::stderr(), "SKIPPED, TOO FEW DESCRIPTORS ({hard} of {ENOUGH}): {test} did not run");
     }
     false
 }
 
-/// A service with a door for the operator, and where that is.
+/// Starts a service with a separate listener for the operator, and returns the addresses of both.
 fn serve(folder: &std::path::Path) -> (Process, String, String) {
     let operations = free_address();
     let (child, url) = process::serve(|command| {
@@ -68,7 +68,8 @@ fn health_check(address: &str) -> bool {
     check.unwrap().status.success()
 }
 
-/// Asks both doors and another tenant's advice, each over a connection of its own, until `until`; the slowest.
+/// Calls both listeners and another tenant's advice, each over a connection of its own, until `until`; returns the
+/// slowest time.
 async fn answered_throughout(
     url: &str,
     operations: &str,
@@ -99,7 +100,7 @@ async fn answered_throughout(
     (rounds, slowest)
 }
 
-/// A live session of the tenant `north`, as the path of its advice and the key to ask by.
+/// Opens a session of the tenant `north`, and returns the path of its advice and the key to use.
 async fn another_tenant(app: &mut App) -> (String, String) {
     let key = app.key("north", "read,operate,train").await;
     app.enter(&key).await;
@@ -109,7 +110,7 @@ async fn another_tenant(app: &mut App) -> (String, String) {
     (format!("/action?session={}", app.session), key)
 }
 
-/// Connections of somebody who shows no key and asks politely, now and then, on each.
+/// Connections of a client without a key that sends occasional valid requests on each.
 struct Polite {
     address: String,
     sockets: Vec<Option<TcpStream>>,
@@ -216,7 +217,8 @@ async fn a_crowd_of_streams_of_one_key_keeps_nobody_out() {
     println!(
         "{CROWD} streams were answered {statuses:?}; {rounds} rounds beside them, the slowest call in {slowest:?}"
     );
-    // A stream that gives way to a new caller leaves its place to another: more than 256 in all, never at a time.
+    // A stream that is closed for a new caller frees its slot for another. So there are more than 256 in all, but never
+    // at a time.
     assert!(statuses.get("200").copied().unwrap_or(0) <= 2 * 256 && statuses.contains_key("429"), "{statuses:?}");
     assert!(slowest < within(ANSWERED_WITHIN), "{slowest:?}");
     assert_eq!(app.cancel(&job).await, 202);
@@ -250,7 +252,7 @@ async fn streams_are_bounded_in_number_and_age_and_go_on_where_they_were() {
     assert!(rest.contains("cancelled") && !rest.contains(&format!("id: {last}\n")), "{rest}");
 }
 
-/// What came back until the other side closed, or `None` where it broke.
+/// Reads the answer until the other side closes; returns `None` if the connection broke.
 fn whole_answer(mut socket: TcpStream) -> Option<String> {
     let mut answer = Vec::new();
     socket.set_read_timeout(Some(patience())).unwrap();
@@ -258,7 +260,7 @@ fn whole_answer(mut socket: TcpStream) -> Option<String> {
     Some(String::from_utf8_lossy(&answer).into_owned())
 }
 
-/// A client that sends its whole body before it reads, as most do.
+/// Sends the whole body before it reads the answer, as most clients do.
 fn send_all(address: &str, path: &str, headers: &str, length: usize) -> Option<String> {
     let mut socket = TcpStream::connect(address).unwrap();
     let head = format!("POST {path} HTTP/1.1\r\nHost: localhost\r\n{headers}Content-Length: {length}\r\n\r\n");
@@ -298,7 +300,7 @@ async fn who_is_refused_early_reads_why() {
             assert!(answer.contains("connection: close") && answer.ends_with('}'), "{answer}");
         }
     }
-    // A small body is taken after all, and the connection goes on.
+    // A small body is read even so, and the connection stays open.
     let small = tokio::task::spawn_blocking(move || {
         let mut socket = TcpStream::connect(address).unwrap();
         let refused = "POST /train HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\n{}";
@@ -311,7 +313,7 @@ async fn who_is_refused_early_reads_why() {
     assert!(small.contains("keep-alive: timeout="), "{small}");
 }
 
-/// The status of the answer to these header lines.
+/// Returns the status of the answer to these header lines.
 async fn status(url: &str, lines: &str) -> String {
     let address = url.strip_prefix("http://").unwrap().to_owned();
     let request = format!("GET /jobs HTTP/1.1\r\n{lines}Connection: close\r\n\r\n");
@@ -366,7 +368,7 @@ async fn the_log_is_not_filled_by_who_shows_no_key() {
     assert!(longest < 1000, "{longest}");
 }
 
-/// Where every place is taken by work, the probes are answered and nothing else is.
+/// If work uses every connection slot, only the probes are answered.
 #[tokio::test(flavor = "multi_thread")]
 async fn places_are_kept_for_the_probes() {
     let app = App::configured(|config| {
@@ -374,7 +376,8 @@ async fn places_are_kept_for_the_probes() {
     })
     .await;
     let lock = crate::support::lock_out(app.folder()).await;
-    // One that comes while a poll below has the second place is sent away, perhaps before its body, and comes again.
+    // A call that comes while a poll below has the second slot is rejected, perhaps before its body is sent, and
+    // retries.
     let train = async || loop {
         match app.client.post(format!("{}/train", app.url)).json(&specification(3)).send().await {
             Ok(answer) if answer.status() != 503 => return answer.status(),

@@ -1,4 +1,5 @@
-//! Questions that take long: they stop when nobody waits for them, keep nobody else waiting, and do not outlive the process.
+//! Long computations: they stop once no client waits for them, do not delay other calls, and do not outlive the
+//! process.
 
 use std::os::unix::process::ExitStatusExt;
 use std::process::Command;
@@ -9,7 +10,7 @@ use crate::support::patience::{until, within};
 use crate::support::process::{self, Process};
 use serde_json::{Value, json};
 
-/// The largest question of several assets that is taken: some minutes of work.
+/// Returns the largest request of several assets that is accepted: some minutes of work.
 fn largest() -> Value {
     let (dates, assets) = (2000, 30);
     let mut state = 7_u64;
@@ -30,7 +31,7 @@ fn service() -> (Process, App) {
     (Process(child), App::at(url, folder))
 }
 
-/// Seconds of processor that the process has used.
+/// Returns the seconds of processor time that the process has used.
 fn processor_seconds(process: &Process) -> f64 {
     const TICKS_A_SECOND: f64 = 100.0;
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.0.id())).unwrap();
@@ -43,10 +44,10 @@ fn terminate(process: &Process) {
     assert!(Command::new("kill").args(["-TERM", &process.0.id().to_string()]).status().unwrap().success());
 }
 
-/// A call under way.
+/// A call in progress.
 type Call = tokio::task::JoinHandle<reqwest::Result<reqwest::Response>>;
 
-/// So many of the largest questions, once all are being solved.
+/// Sends `count` of the largest requests, and returns once all are being solved.
 async fn asked(app: &App, process: &Process, count: usize) -> Vec<Call> {
     let (question, before) = (largest(), processor_seconds(process));
     let calls: Vec<_> = (0..count)
@@ -95,7 +96,7 @@ async fn long_questions_keep_no_short_one_waiting() {
         busy.push(time().await);
     }
     busy.sort();
-    // Two cores, of which the long ones have one: three times leaves room for a slow machine.
+    // There are two cores, and the long computations have one of them; the factor of three allows for a slow machine.
     assert!(busy[4] < within(3 * idle + Duration::from_millis(100)), "{busy:?}, idle {idle:?}");
     calls.iter().for_each(Call::abort);
 }

@@ -1,4 +1,4 @@
-//! Lists read what they show: how large the requests behind them are does not matter.
+//! Lists read only what they show: the size of the requests behind them does not matter.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -13,24 +13,24 @@ use serde_json::json;
 
 const JOBS: usize = 1000;
 const REQUEST_BYTES: usize = 418_000;
-/// Of one list, and of `/action` while 16 lists at a time are asked for.
+/// The time limits of one list, and of `/action` while 16 lists at a time are requested.
 const LIST: Duration = Duration::from_millis(100);
 const ACTION: Duration = Duration::from_millis(50);
-/// The same where a database on the same machine takes the processor for eight times as many lists.
+/// The limit of `/action` while a database on the same machine uses the processor for eight times as many lists.
 const ACTION_BESIDE_A_DATABASE: Duration = Duration::from_millis(200);
 /// What the lists may add to the process, in bytes.
 const MEMORY: u64 = 50 << 20;
 
-/// The largest resident size since the last call, in bytes.
+/// Returns the largest resident size since the last call, in bytes.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
-    // Writing 5 sets the peak back to the present size.
+    // Writing 5 resets the peak to the present size.
     std::fs::write("/proc/self/clear_refs", "5").unwrap();
     1024 * line.trim().trim_end_matches(" kB").trim().parse::<u64>().unwrap()
 }
 
-/// The one worker has enough to do with the first of them; nobody claims the rest.
+/// These jobs are marked as running with a lease far in the future, so no worker claims them.
 const QUEUED: &str = "INSERT INTO jobs (job, tenant, kind, state, steps_total, created_ms, worker, lease_until_ms)
     SELECT 'large_' || n, 'default', 'train', 'running', 1, 1, 'nobody', 9000000000000000 FROM numbers";
 
@@ -47,7 +47,7 @@ async fn a_list_of_large_jobs_is_quick_small_and_in_nobodys_way() {
     }
     are_quick_small_and_in_nobodys_way(app, ACTION).await;
 
-    // One after the other, for both are timed.
+    // One after the other, because both are timed.
     let Some(url) = postgres::database().await else { return };
     let store = url.parse().unwrap();
     let mut app = App::configured(|config| config.store = StoreLocation::Postgres(store)).await;
@@ -62,13 +62,13 @@ async fn a_list_of_large_jobs_is_quick_small_and_in_nobodys_way() {
     are_quick_small_and_in_nobodys_way(app, ACTION_BESIDE_A_DATABASE).await;
 }
 
-/// Sessions of one tenant; `BALLAST_LISTED_SESSIONS` asks for another number, as for the table of `docs/capacity.md`.
+/// Sessions of one tenant; `BALLAST_LISTED_SESSIONS` sets another number, as for the table of `docs/capacity.md`.
 const SESSIONS: usize = 20_000;
-/// Of a list and of a search in the order of opening.
+/// The time limit of a list and of a search in the order of opening.
 const PAGE: Duration = Duration::from_millis(100);
-/// The same where a database that has not counted its rows yet takes the processor too.
+/// That limit while a database without statistics of its rows also uses the processor.
 const PAGE_BESIDE_A_DATABASE: Duration = Duration::from_millis(400);
-/// Of a list of another tenant while eight lists at a time read all the sessions.
+/// The time limit of another tenant's list while eight lists at a time read all the sessions.
 const OTHER_LIST: Duration = Duration::from_millis(400);
 /// Sessions that are opened at the same time.
 const AT_ONCE: usize = 24;
@@ -77,10 +77,10 @@ fn sessions() -> usize {
     std::env::var("BALLAST_LISTED_SESSIONS").map_or(SESSIONS, |count| count.parse().expect("a number"))
 }
 
-/// Sessions of another tenant: a list of its own to be timed.
+/// Sessions of another tenant, whose list is timed.
 const OTHERS: usize = 50;
 
-/// Opens sessions like this one, of which each has a number; those of the first eighth have a tag.
+/// Opens `count` sessions like `first`, each with a number in its name; those of the first eighth have a tag.
 async fn open_many(store: &Store, first: SessionFacts, count: usize) {
     let opened = stream::iter(1..=count).map(|number| {
         let session =
@@ -97,7 +97,7 @@ async fn open_many(store: &Store, first: SessionFacts, count: usize) {
     opened.buffer_unordered(AT_ONCE).for_each(async |()| {}).await;
 }
 
-/// The median and the slowest of so many answers, and how many of its sessions the last one has.
+/// Returns the median and the slowest of `times` answers, and how many sessions the last one lists.
 async fn timed(app: &App, path: &str, times: usize) -> (Duration, Duration, usize) {
     let (mut taken, mut listed) = (Vec::new(), 0);
     for _ in 0..times {
@@ -114,13 +114,13 @@ async fn timed(app: &App, path: &str, times: usize) -> (Duration, Duration, usiz
 #[tokio::test(flavor = "multi_thread")]
 async fn lists_and_searches_of_many_sessions_are_quick_and_in_nobodys_way() {
     are_listed_quickly_and_in_nobodys_way(App::start().await, PAGE).await;
-    // One after the other, for both are timed.
+    // One after the other, because both are timed.
     if let Some(app) = App::over_a_database().await {
         are_listed_quickly_and_in_nobodys_way(app, PAGE_BESIDE_A_DATABASE).await;
     }
 }
 
-/// One tenant lists, searches and puts in order many sessions; another's lists find a connection.
+/// One tenant lists, searches and sorts many sessions while another's lists still find a connection.
 async fn are_listed_quickly_and_in_nobodys_way(mut app: App, page: Duration) {
     let count = sessions();
     let (north, south) = (app.key("north", "admin").await, app.key("south", "admin").await);
@@ -141,7 +141,7 @@ async fn are_listed_quickly_and_in_nobodys_way(mut app: App, page: Duration) {
     .await;
     println!("{count} sessions opened in {:?}", started.elapsed());
     app.enter(&north).await;
-    // Nobody has it, one, about one in nine, the oldest eighth, all.
+    // The searches match no session, one, about one in nine, the oldest eighth, and all.
     let last = format!("fund {count}");
     for (search, listed) in
         [("", 50), ("?search=zz", 0), (&last, 1), ("fund 1", 50), ("legacy", 50), ("FUND", 50), ("growth", 1)]
@@ -176,7 +176,7 @@ async fn are_listed_quickly_and_in_nobodys_way(mut app: App, page: Duration) {
         }
     }));
     let others = async {
-        // Until the lists read.
+        // Until the lists are reading.
         tokio::time::sleep(Duration::from_millis(300)).await;
         for (path, idle) in paths.iter().zip(idle) {
             let (median, slowest, _) = timed(&app, path, 101).await;

@@ -1,4 +1,4 @@
-//! Crowds, kills, races and memory: real processes, several at a time, under clocks.
+//! Load, kills, races and memory: real processes, several at a time, with time limits.
 
 #[macro_use]
 #[path = "../support/mod.rs"]

@@ -1,5 +1,5 @@
-//! No job and no policy takes the process down: what cannot fit is refused by name, what is kept ready stays within its
-//! bytes, and the memory of what is dropped goes back.
+//! No job and no policy exhausts the memory of the process. A request that cannot fit is rejected by name, the caches
+//! stay within their bytes, and freed memory is returned.
 
 use std::fs;
 use std::process::{Child, Command};
@@ -21,7 +21,7 @@ fn monthly_returns() -> Vec<f64> {
     (0..36).map(|k| 0.002 + 0.02 * ((k * 7919 % 1013) as f64 / 506.5 - 1.0)).collect()
 }
 
-/// A process that may not address more than 900 MB; `arguments` are added to its command line.
+/// Starts a process that may not address more than 900 MB; `arguments` are added to its command line.
 fn confined(arguments: &[&str]) -> (Child, App) {
     let folder = tempfile::tempdir().unwrap();
     let (child, url) = start_confined(folder.path(), arguments);
@@ -69,7 +69,7 @@ async fn a_job_larger_than_memory_is_refused_and_the_service_lives() {
     child.wait().unwrap();
 }
 
-/// Bridges of 25,000 paths for 1,000 returns take 50 MB, and a quarter of 160 MiB is kept ready.
+/// Bridges of 25,000 paths for 1,000 returns take 50 MB, and the cache holds a quarter of 160 MiB.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_cannot_be_kept_ready_is_refused_wherever_it_is_asked_for() {
     let (mut child, mut app) = confined(&["--memory-limit", "160MiB"]);
@@ -92,7 +92,8 @@ async fn what_cannot_be_kept_ready_is_refused_wherever_it_is_asked_for() {
     child.wait().unwrap();
 }
 
-/// The policy of [`crate::support::specification`] with `points` design points of noise in every step but the first.
+/// Returns the policy of [`crate::support::specification`] with `points` design points of noise in every step but the
+/// first.
 fn inflated(policy: &[u8], points: usize, seed: u64) -> Value {
     let mut policy: Value = serde_json::from_slice(policy).unwrap();
     policy["specification"]["seed"] = json!(seed);
@@ -111,7 +112,7 @@ fn inflated(policy: &[u8], points: usize, seed: u64) -> Value {
     policy
 }
 
-/// Bytes of a part, as `/metrics` shows them.
+/// Returns the bytes of a part, as `/metrics` shows them.
 async fn part(app: &App, part: &str) -> usize {
     let (_, metrics) = app.get("/metrics").await;
     let start = format!("ballast_memory_bytes{{part=\"{part}\"}} ");
@@ -119,14 +120,14 @@ async fn part(app: &App, part: &str) -> usize {
     line.parse::<f64>().unwrap() as usize
 }
 
-/// A figure of a process, as `/proc` shows it.
+/// Returns a figure of a process, as `/proc` shows it.
 fn figure(child: &Child, name: &str) -> usize {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap();
     line.split_whitespace().next().unwrap().parse().unwrap()
 }
 
-/// Resident bytes of a process.
+/// Returns the resident bytes of a process.
 fn resident(child: &Child) -> usize {
     figure(child, "VmRSS:") * 1024
 }
@@ -156,7 +157,7 @@ async fn imported_policies_asked_once_each_stay_within_the_budget() {
     child.wait().unwrap();
 }
 
-/// Clients that send a request and read next to nothing of the answer.
+/// Opens clients that send a request and read almost nothing of the answer.
 async fn slow_readers(app: &App, count: usize, request: &str) -> Vec<TcpStream> {
     let address = app.url.strip_prefix("http://").unwrap().parse().unwrap();
     let mut held = Vec::new();
@@ -170,8 +171,8 @@ async fn slow_readers(app: &App, count: usize, request: &str) -> Vec<TcpStream> 
     held
 }
 
-/// Thirty clients ask for a sweep whose laws are some 10 MB, and read next to nothing of it; a wider sweep is refused with the
-/// numbers.
+/// Thirty clients request a sweep whose laws are some 10 MB, and read almost nothing of it. A wider sweep is rejected
+/// with the numbers.
 #[tokio::test(flavor = "multi_thread")]
 async fn sweeps_that_explain_are_bounded_and_take_no_more_than_their_part() {
     const RETURNS: usize = 2000;
@@ -205,7 +206,7 @@ async fn sweeps_that_explain_are_bounded_and_take_no_more_than_their_part() {
     child.wait().unwrap();
 }
 
-/// Forty clients ask for a document of some 10 MB and read next to nothing of it: none keeps all of it in memory.
+/// Forty clients request a document of some 10 MB and read almost nothing of it: none keeps all of it in memory.
 #[tokio::test(flavor = "multi_thread")]
 async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     let (mut child, mut app) = confined(&["--memory-limit", "400MiB"]);
@@ -217,7 +218,7 @@ async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     let before = resident(&child);
     let held = slow_readers(&app, 40, &format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n")).await;
     tokio::time::sleep(Duration::from_secs(2)).await;
-    // One document at a time, twice while it is read, and what forty connections take.
+    // One document at a time, twice while it is read, and the memory of forty connections.
     let taken = resident(&child).saturating_sub(before);
     assert!(taken < 60 << 20, "{taken} bytes for forty slow readers");
     assert!(part(&app, "large_answers").await > 0);
@@ -232,8 +233,8 @@ async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     child.wait().unwrap();
 }
 
-/// Two clients report for 200 sessions at a time. No period finds its bridges made, so each report is prepared on a thread that
-/// may block; threads that wait for one another would be as many as reports.
+/// Two clients report for 200 sessions at a time. No period finds its bridges in the cache, so each report is prepared
+/// on a blocking thread. If these threads waited for one another, there would be as many as reports.
 #[tokio::test(flavor = "multi_thread")]
 async fn batches_of_reports_take_few_threads_and_little_memory() {
     const SESSIONS: usize = 200;
@@ -258,7 +259,7 @@ async fn batches_of_reports_take_few_threads_and_little_memory() {
         let [first, second] = [&sessions[0], &sessions[1]].map(batch);
         let ((status, _), (other, _)) = tokio::join!(app.post("/observe", &first), app.post("/observe", &second));
         assert_eq!((status, other), (StatusCode::OK, StatusCode::OK));
-        // Threads of work that may block live on for ten seconds.
+        // Threads for blocking work live on for ten seconds.
         let (threads, resident) = (figure(&child, "Threads:"), resident(&child));
         assert!(threads < 64 && resident < 300 << 20, "{threads} threads, {resident} bytes resident");
     }
@@ -285,7 +286,8 @@ async fn policies_of_one_seed_share_their_bridges() {
         }
         kept.push(part(&app, "bridges").await);
     }
-    // 200 paths, which take a block of 256, at each of the sample sizes 36 to 40, in two bytes each, and where gaps count there.
+    // 200 paths, which take a block of 256, at each of the sample sizes 36 to 40, in two bytes each, and the positions
+    // where gaps count.
     let sizes = (36..=36 + PERIODS).map(|size| size * (256 * 2 + 128));
     assert_eq!(kept, vec![sizes.sum::<usize>(); 3]);
     assert_eq!(part(&app, "jobs_reserved").await, 0);

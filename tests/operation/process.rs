@@ -1,4 +1,4 @@
-//! The real binary, killed and asked to stop: nothing acknowledged is lost, nothing finished is computed again.
+//! The real binary, killed and stopped: nothing acknowledged is lost, and no finished step is computed again.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -57,7 +57,7 @@ impl Process {
         (self.child, self.app.url, self.app.client) = (child, url, Client::new());
     }
 
-    /// The job as the dead process left it.
+    /// Returns the job as the dead process left it.
     async fn left(&self, job: &str) -> JobRow {
         let store = Store::open(self.app.folder()).await.unwrap();
         let row = store.job(job).await.unwrap().unwrap();
@@ -75,7 +75,7 @@ impl Process {
         assert!(self.app.export().await == crate::support::trained(&specification(STEPS)), "the policies differ");
     }
 
-    /// Backward steps solved since this process started.
+    /// Returns the number of backward steps solved since this process started.
     async fn steps_solved(&self) -> usize {
         let (_, metrics) = self.app.get("/metrics").await;
         let count = "ballast_training_step_duration_seconds_count ";
@@ -131,7 +131,8 @@ async fn a_job_that_three_processes_died_under_fails_and_the_service_lives() {
     slow["design"]["count"] = json!(3000);
     let job = process.app.queue(&slow).await;
     for attempt in 1..=3 {
-        // The job reads as running from the moment its process died, so what is waited for is that this one took it.
+        // The job reads as running from the moment its process died, so the test waits until this process has claimed
+        // it.
         until("the next attempt", async || {
             let attempts = crate::support::attempts(process.app.folder()).await;
             assert!(attempts <= attempt, "attempt {attempts} of a process that should make attempt {attempt}");
@@ -178,7 +179,7 @@ async fn a_process_asked_to_stop_in_a_long_fit_does_not_wait_for_it() {
     assert_eq!(process.left(&job).await.state, JobState::Queued);
 }
 
-/// The processor time that a process tells of fits into the time that it ran, on as many processors as there are.
+/// The processor time that a process reports fits into the time that it ran, on as many processors as there are.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_process_tells_the_seconds_that_it_computed() {
     let started = Instant::now();
@@ -192,7 +193,7 @@ async fn a_process_tells_the_seconds_that_it_computed() {
     assert!(seconds <= most + 1.0, "{seconds} seconds computed, {most} at most");
 }
 
-/// A store that refuses is asked again in a while, and not at once.
+/// A store that rejects a claim is retried after a pause, not at once.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_worker_that_cannot_claim_says_so_once_a_second_until_it_can() {
     let folder = tempfile::tempdir().unwrap();
@@ -214,7 +215,7 @@ async fn a_worker_that_cannot_claim_says_so_once_a_second_until_it_can() {
     process.app.train(&specification(1)).await;
 }
 
-/// Between the signal and the end of accepting everything is answered, but for readiness, and connections close.
+/// Between the signal and the end of accepting, everything but readiness is answered as before, and connections close.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_service_that_leaves_says_so_before_it_stops_accepting() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Many sessions of one strategy renew by one training, what nobody requests any more is not trained, and a session whose next
-//! policy is late goes on.
+//! Many sessions of one strategy renew by one training. A training that no session requests any more is cancelled. A
+//! session whose next policy is late continues.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use futures_util::stream;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-/// Power utility, under which no design depends on wealth.
+/// Returns a training with power utility, under which no design depends on wealth.
 fn request(horizon: usize) -> Value {
     let mut request = specification(horizon);
     request["problem"]["utility"] = json!({ "kind": "power", "risk_aversion": 3.0 });
@@ -55,7 +55,7 @@ async fn job_of(app: &App, name: &str) -> String {
     until("the job of the renewal", job).await
 }
 
-/// Renews so many sessions of one strategy; the time that it took.
+/// Renews `count` sessions of one strategy, and returns the time that it took.
 async fn by_one_training(mut app: App, count: usize) -> Duration {
     app.train(&request(3)).await;
     let (sessions, before) = (open(&app, count, json!({ "every": 1 })).await, jobs(&app).await.len());
@@ -85,7 +85,7 @@ async fn by_one_training(mut app: App, count: usize) -> Duration {
     policies.dedup();
     assert_eq!(policies.len(), 1);
     assert_eq!(jobs(&app).await.len(), before + 1, "one training for all");
-    // Another session that comes to the same record finds the policy there.
+    // Another session that reaches the same record finds the policy there.
     let late = open(&app, 1, json!({ "every": 1 })).await;
     assert_eq!(observe(&app, &late[0], 1, 0.012).await.0, 200);
     let renewed = async || (session(&app, &late[0]).await["renewals"] == 1).then_some(());
@@ -105,7 +105,7 @@ async fn sessions_of_one_strategy_renew_by_one_training_over_a_database() {
     by_one_training(app, 40).await;
 }
 
-/// The figure of `docs/capacity.md`.
+/// Measures the figure of `docs/capacity.md`.
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "a measurement"]
 async fn a_thousand_sessions_renew() {
@@ -118,7 +118,7 @@ async fn a_deleted_session_takes_its_training_with_it(mut app: App) {
     app.train(&request(3)).await;
     let sessions = open(&app, 3, json!({ "every": 1 })).await;
     let busy = busy(&app).await;
-    // Two share a training, and the third has one of its own.
+    // Two sessions share a training, and the third has one of its own.
     for (session, log_return) in sessions.iter().zip([0.01, 0.01, 0.02]) {
         assert_eq!(observe(&app, session, 1, log_return).await.0, 200);
     }
@@ -131,7 +131,7 @@ async fn a_deleted_session_takes_its_training_with_it(mut app: App) {
     assert_eq!(app.delete(&format!("/sessions/{third}")).await, 204);
     until("the training of a deleted session", async || (state(&own).await == "cancelled").then_some(())).await;
     assert_eq!(state(&shared).await, "queued", "the other session needs it");
-    // Renewed by hand it needs it no more.
+    // After a manual renewal the session no longer needs the training.
     let renewal = json!({ "renewal": 1, "policy": app.policy });
     assert_eq!(app.post(&format!("/sessions/{second}/renewals"), &renewal).await.0, 200);
     until("a training that nobody needs", async || (state(&shared).await == "cancelled").then_some(())).await;
@@ -158,7 +158,8 @@ async fn what_no_session_requests_is_not_trained_over_a_database() {
     a_deleted_session_takes_its_training_with_it(app).await;
 }
 
-/// Sessions whose next policies all differ: few of their trainings wait at a time, and callers queue as many as they may.
+/// The next policies of these sessions all differ: few of their trainings wait at a time, and callers can use their
+/// whole quota.
 async fn trainings_of_sessions_are_in_no_callers_way(mut app: App) {
     app.train(&request(2)).await;
     let sessions = open(&app, 14, json!({ "every": 1 })).await;
@@ -168,7 +169,7 @@ async fn trainings_of_sessions_are_in_no_callers_way(mut app: App) {
     }
     let queued = async || jobs(&app).await.iter().filter(|job| job["state"] == "queued").count();
     until("trainings in the queue", async || (queued().await == 8).then_some(())).await;
-    // As many as the quota has, and no more.
+    // As many as the quota allows, and no more.
     let mut own = Vec::new();
     for _ in 0..3 {
         own.push(app.queue(&request(3)).await);
@@ -201,7 +202,7 @@ async fn trainings_of_sessions_are_bounded_apart_over_a_database() {
     trainings_of_sessions_are_in_no_callers_way(app).await;
 }
 
-/// Three quick reports by a policy of three periods.
+/// A session reports three periods in quick succession under a policy of three periods.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step() {
     let mut app = App::start().await;
@@ -224,8 +225,8 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
         assert_eq!(app.get(&format!("/sessions?count=total&state={state}")).await.1["total"], total, "{state}");
     }
 
-    // The last step of its policy, at the law of all returns reported: also what a session in its last period is told that
-    // has seen the same.
+    // The advice is that of the policy's last step, under the law of all returns reported. A session in its last period
+    // with the same record gets the same advice.
     for period in 4..=5 {
         let (status, action) = app.action().await;
         assert_eq!(status, 200, "{action}");
@@ -259,7 +260,7 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
         let (status, observed) = observe(&app, &app.session, period, returns[period - 1]).await;
         assert_eq!((status, &observed["completed"]), (StatusCode::OK, &json!(false)), "{observed}");
     }
-    // As many past the horizon as it has, and no more.
+    // As many periods past the horizon as the policy has, and no more.
     assert_eq!(observe(&app, &app.session, 6, 0.01).await.0, 200);
     assert_eq!(observe(&app, &app.session, 7, 0.01).await.0, 409);
     app.cancel(&busy).await;

@@ -14,9 +14,9 @@ use futures_util::future::{FutureExt, join_all};
 use reqwest::{Client, StatusCode};
 use serde_json::{Value, json};
 
-/// Long enough for a loaded machine to renew in, short enough to wait for.
+/// Long enough for a loaded machine to renew the lease in, short enough to wait for.
 const LEASE: Duration = Duration::from_secs(3);
-/// Trainings that last for seconds, so that a fault or a look every second falls inside.
+/// Trainings that last for seconds, so that a fault or a check every second falls inside.
 const STEPS: usize = 120;
 
 struct Replica {
@@ -29,7 +29,7 @@ impl Replica {
         let (child, url) = serve(|command| {
             command.args(["--role", role, "--training-threads", "1", "--lease-seconds"]);
             command.arg(LEASE.as_secs().to_string()).env("BALLAST_STORE", store);
-            // The faults made here are many, and logged.
+            // Logging is off, because the many faults caused here would be logged.
             command.env("RUST_LOG", "off");
         });
         Replica { child, app: App::at(url, tempfile::tempdir().unwrap()) }
@@ -56,7 +56,7 @@ async fn row(store: &str, job: &str) -> JobRow {
     row
 }
 
-/// The job ends well, and its policy is the one that a single undisturbed thread trains.
+/// Waits for the job and checks that its policy is the one that a single undisturbed thread trains.
 async fn ends_in_the_same_policy(app: &mut App, job: &str) {
     let done = app.until(job, |job| job["finished_ms"].is_i64()).await;
     assert_eq!(done["state"], "succeeded", "{done}");
@@ -64,7 +64,7 @@ async fn ends_in_the_same_policy(app: &mut App, job: &str) {
     assert!(app.export().await == crate::support::trained(&specification(STEPS)), "the policies differ");
 }
 
-/// `fault` befalls the worker in the middle of a training; the other takes over from its last finished step.
+/// Applies `fault` to the worker in the middle of a training; the other takes over from its last finished step.
 async fn a_worker_falls_silent(fault: &str) {
     let Some(store) = database().await else { return };
     let mut api = Replica::start(&store, "api");
@@ -85,7 +85,7 @@ async fn a_worker_falls_silent(fault: &str) {
         return;
     }
 
-    // It wakes in the middle of a step of a job that has ended, and works on: for the next job.
+    // The worker resumes in the middle of a step of a job that has ended, and continues with the next job.
     silent.signal("-CONT");
     drop(heir);
     let next = api.app.queue(&specification(2)).await;
@@ -183,8 +183,8 @@ async fn a_session_lives_on_two_replicas_at_once() {
     assert_eq!(first.app.action().await.0, 404);
 }
 
-/// A fund is composed once a period, whichever replica is asked: what one tells, the other does, and one alone that is told the same
-/// ends where they do.
+/// A fund is composed once a period, through either replica. A report to one replica shows at the other, and a single
+/// service with the same reports ends in the same state.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_fund_lives_on_two_replicas_at_once() {
     const HORIZON: usize = 4;
@@ -226,8 +226,8 @@ async fn a_fund_lives_on_two_replicas_at_once() {
     }
 }
 
-/// Eight contradicting corrections and the next period at once, through both replicas: each number has one winner, and the
-/// session is what one is that was reported as the history has it now.
+/// Eight contradicting corrections and the next period arrive at once, through both replicas. Each number has one
+/// winner, and the session equals one that was reported as the history now reads.
 #[tokio::test(flavor = "multi_thread")]
 async fn corrections_and_observations_of_two_replicas_have_one_order() {
     const HORIZON: usize = 6;
@@ -272,7 +272,7 @@ async fn corrections_and_observations_of_two_replicas_have_one_order() {
     assert_eq!(standing(&second.app).await, corrected);
 }
 
-/// What a session is advised, and its wealth.
+/// Returns the advice for a session, and its wealth.
 async fn standing(app: &App) -> Value {
     let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
     let (status, mut action) = app.action().await;
@@ -281,7 +281,7 @@ async fn standing(app: &App) -> Value {
     json!([session["wealth"], session["period"], session["sample_size"], action])
 }
 
-/// Reports periods one after the other, each until it is acknowledged; the answers.
+/// Reports periods one after the other, each until it is acknowledged, and returns the answers.
 async fn report_all(app: &App, periods: std::ops::RangeInclusive<usize>) -> Vec<Value> {
     let mut answers = Vec::new();
     for period in periods {

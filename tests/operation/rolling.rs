@@ -1,7 +1,7 @@
 //! A rolling restart of two replicas behind a plain TCP balancer, seen by clients that never retry.
 //!
-//! The balancer forwards bytes to the replicas in turn, and looks at the `/readyz` of each every 200 ms, as orchestrators
-//! do. `BALLAST_ROLLING_RESTARTS` asks for more restarts than the short form makes.
+//! The balancer forwards bytes to the replicas in turn, and checks the `/readyz` of each every 200 ms, as orchestrators
+//! do. `BALLAST_ROLLING_RESTARTS` sets more restarts than the short form makes.
 
 use std::collections::BTreeMap;
 use std::process::{Child, Command};
@@ -17,12 +17,12 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, copy_bidirectional};
 use tokio::net::{TcpListener, TcpStream};
 
 const RESTARTS: usize = 2;
-/// How often the balancer looks, and how long a replica waits between the signal and the end of accepting.
+/// The interval between the balancer's checks, and the delay of a replica between the signal and the end of accepting.
 const LOOK: Duration = Duration::from_millis(200);
 const DRAIN_DELAY: &str = "2";
-/// Of each kind: a connection for every call, or one for many.
+/// The number of clients of each kind: one connection for every call, or one for many.
 const CLIENTS: usize = 4;
-/// Calls that may fail, of ten thousand.
+/// The number of calls that may fail, of ten thousand.
 const MAY_FAIL: usize = 1;
 
 type Backends = Arc<Mutex<Vec<String>>>;
@@ -39,7 +39,7 @@ async fn is_ready(address: &str) -> bool {
     answer.is_ok_and(|answer| answer.status() == 200)
 }
 
-/// Forwards connections to the replicas that were ready at the last look, in turn; its address.
+/// Forwards connections to the replicas that were ready at the last check, in turn, and returns the balancer's address.
 async fn balance(all: Backends) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let (address, ready) = (listener.local_addr().unwrap().to_string(), Backends::default());
@@ -62,7 +62,7 @@ async fn balance(all: Backends) -> String {
             let (mut client, _) = listener.accept().await.unwrap();
             let ready = ready.lock().unwrap().clone();
             tokio::spawn(async move {
-                // One that refuses the connection is passed over.
+                // A replica that refuses the connection is skipped.
                 for place in 0..ready.len() {
                     let address = &ready[(turn + place) % ready.len()];
                     if let Ok(mut server) = TcpStream::connect(address).await {
@@ -76,7 +76,7 @@ async fn balance(all: Backends) -> String {
     address
 }
 
-/// One call over a connection; whether the connection may be used again.
+/// Makes one call over a connection, and returns whether the connection may be used again.
 async fn call(stream: &mut TcpStream, path: &str, keep: bool) -> Result<bool, String> {
     let connection = if keep { "keep-alive" } else { "close" };
     let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: {connection}\r\n\r\n");
@@ -101,7 +101,7 @@ async fn call(stream: &mut TcpStream, path: &str, keep: bool) -> Result<bool, St
     }
 }
 
-/// Calls until told to stop; what failed is counted by how.
+/// Calls until `stop` is set, and returns the failures, each with its cause.
 async fn client(
     address: String,
     path: String,

@@ -2,10 +2,10 @@
 
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
 
-/// An authority of its own.
+/// A certificate authority for tests.
 pub struct Authority {
     issuer: Issuer<'static, KeyPair>,
-    /// What who trusts it holds.
+    /// The certificate that clients need to trust this authority.
     pub pem: String,
 }
 
@@ -24,7 +24,7 @@ impl Authority {
         Authority { issuer: Issuer::new(params, key), pem }
     }
 
-    /// One for this name or address.
+    /// Issues a certificate for this name or address.
     pub fn certificate(&self, name: &str) -> Certificate {
         let key = KeyPair::generate().unwrap();
         let params = CertificateParams::new(vec![name.to_owned()]).unwrap();

@@ -1,4 +1,4 @@
-//! A real server on a free port, and a client that tells stories.
+//! A real server on a free port, and a client whose calls read like a story.
 #![allow(dead_code)]
 
 pub mod certificates;
@@ -32,12 +32,12 @@ pub struct App {
     pub session: String,
     pub policy: String,
     folder: TempDir,
-    /// Of the service that runs here.
+    /// The store of the service that runs in this process.
     store: Option<StoreLocation>,
     running: Option<Running>,
 }
 
-/// Runs each story over a folder, and over a database that replicas share.
+/// Runs each test over a folder, and over a database that replicas share.
 #[allow(unused_macros)]
 macro_rules! over_either_store {
     ($($story:ident),* $(,)?) => {
@@ -58,7 +58,7 @@ macro_rules! over_either_store {
     };
 }
 
-/// Stocks, bonds and gold: ten periods.
+/// Returns of stocks, bonds and gold in ten periods.
 pub const ROWS: [[f64; 3]; 10] = [
     [0.0231, 0.004, -0.011],
     [-0.0442, 0.009, 0.031],
@@ -72,7 +72,7 @@ pub const ROWS: [[f64; 3]; 10] = [
     [0.012, 0.005, 0.014],
 ];
 
-/// A small training for them.
+/// Returns a small training for these assets.
 pub fn several_assets(horizon: usize) -> Value {
     json!({
         "problem": {
@@ -87,7 +87,7 @@ pub fn several_assets(horizon: usize) -> Value {
     })
 }
 
-/// A small training: `horizon` steps, 20 design points.
+/// Returns a small training: `horizon` steps, 20 design points.
 pub fn specification(horizon: usize) -> Value {
     json!({
         "problem": {
@@ -102,7 +102,7 @@ pub fn specification(horizon: usize) -> Value {
     })
 }
 
-/// The policy of a specification, trained here and now, as its portable document.
+/// Trains the policy of a specification in this process and returns its portable document.
 pub fn trained(specification: &Value) -> Vec<u8> {
     policies::train(specification.clone()).to_json().expect("a document")
 }
@@ -112,20 +112,20 @@ async fn connection(folder: &Path) -> SqliteConnection {
     SqliteConnection::connect_with(&options).await.expect("the database")
 }
 
-/// Runs a statement behind the service's back.
+/// Runs a statement on the database without the service's knowledge.
 pub async fn execute(folder: &Path, statement: &str) {
     let mut connection = connection(folder).await;
     sqlx::query(sqlx::AssertSqlSafe(statement.to_owned())).execute(&mut connection).await.expect(statement);
     connection.close().await.expect("closed");
 }
 
-/// How often the one job of the folder was claimed.
+/// Returns how often the one job of the folder was claimed.
 pub async fn attempts(folder: &Path) -> i64 {
     let mut connection = connection(folder).await;
     sqlx::query_scalar("SELECT attempt FROM jobs").fetch_one(&mut connection).await.expect("one job")
 }
 
-/// Bytes of what each entry of the folder's sessions holds, in the order they were recorded.
+/// Returns the bytes of each entry of the folder's sessions, in the order they were recorded.
 pub async fn entry_bytes(folder: &Path) -> Vec<i64> {
     let mut connection = connection(folder).await;
     let bytes =
@@ -134,7 +134,7 @@ pub async fn entry_bytes(folder: &Path) -> Vec<i64> {
     sqlx::query_scalar(bytes).fetch_all(&mut connection).await.expect("entries")
 }
 
-/// Keeps the service from writing until it is given up.
+/// A lock that keeps the service from writing until it is released.
 pub struct Lock(SqliteConnection);
 
 /// Locks the database of the folder.
@@ -151,7 +151,7 @@ impl Lock {
     }
 }
 
-/// Makes a key; its text.
+/// Creates a key and returns its text.
 pub async fn issue_key(ring: &KeyRing, tenant: &str, roles: &str) -> String {
     let (tenant, roles) = (tenant.parse().expect("a tenant"), roles.parse().expect("roles"));
     let (_, secret) = keys::issue(ring, tenant, roles, None, &Clock::system()).await.expect("a key");
@@ -172,7 +172,7 @@ impl App {
         App::configured(|_| {}).await
     }
 
-    /// Starts with a configuration changed by `change`, of which a restart keeps the store alone.
+    /// Starts with a configuration changed by `change`; a restart keeps only its store.
     pub async fn configured(change: impl FnOnce(&mut Config)) -> App {
         let folder = tempfile::tempdir().expect("a folder");
         let mut config = config(folder.path());
@@ -183,25 +183,25 @@ impl App {
         App { running: Some(running), store, ..App::at(url, folder) }
     }
 
-    /// Starts over a new database; `None` where there is no PostgreSQL.
+    /// Starts over a new database; returns `None` if there is no PostgreSQL.
     pub async fn over_a_database() -> Option<App> {
         let store = StoreLocation::Postgres(postgres::database().await?.parse().expect("an address"));
         Some(App::configured(|config| config.store = store).await)
     }
 
-    /// A client of a service that somebody else runs over `folder`.
+    /// Returns a client of a service that another process runs over `folder`.
     pub fn at(url: String, folder: TempDir) -> App {
         let (session, policy) = (String::new(), String::new());
         App { client: Client::new(), url, session, policy, folder, store: None, running: None }
     }
 
-    /// Shows `key` with every request from now on; none where it is empty.
+    /// Sends `key` with every request from now on, or no key if it is empty.
     pub fn hold(&mut self, key: &str) {
         let shown = (!key.is_empty()).then(|| (AUTHORIZATION, format!("Bearer {key}").parse().expect("a header")));
         self.client = Client::builder().default_headers(HeaderMap::from_iter(shown)).build().expect("a client");
     }
 
-    /// Makes a key beside the service that runs over this folder or this database.
+    /// Creates a key while the service runs over this folder or this database.
     pub async fn key(&self, tenant: &str, roles: &str) -> String {
         let ring = match &self.store {
             Some(StoreLocation::Postgres(url)) => KeyRing::connect(url).await,
@@ -220,15 +220,15 @@ impl App {
         self.start_again().await;
     }
 
-    /// As [`Self::restart`], with a statement run on the database of the folder in between.
+    /// Restarts like [`Self::restart`], and runs a statement on the database of the folder in between.
     pub async fn restart_after(&mut self, statement: &'static str) {
         self.stop().await;
         execute(self.folder.path(), statement).await;
         self.start_again().await;
     }
 
-    /// As [`Self::restart`], with the answer of a session's last entry replaced in between, by an entry as sound as it was.
-    /// `database` is the address of the store where that is no folder.
+    /// Restarts like [`Self::restart`], and in between replaces the last entry of a session by a valid one with another
+    /// answer. `database` is the address of the store if it is not a folder.
     pub async fn retell(&mut self, session: &str, database: Option<&str>, change: impl Fn(&str) -> String) {
         self.stop().await;
         let store = match database {
@@ -263,7 +263,7 @@ impl App {
         self.start_again().await;
     }
 
-    /// Stops the service and starts one over a folder within this one.
+    /// Stops the service and starts one over a subfolder of this folder.
     pub async fn move_to(&mut self, folder: &str) {
         self.stop().await;
         self.store = Some(StoreLocation::Folder(self.folder.path().join(folder)));
@@ -317,7 +317,7 @@ impl App {
         self.send(Method::DELETE, path, None).await.0
     }
 
-    /// Waits until the keys made beside the service count, and shows this one from then on.
+    /// Waits until keys created beside the service are in force, and sends this one from then on.
     pub async fn enter(&mut self, key: &str) {
         for (shown, is_turned_away) in [("", true), (key, false)] {
             self.hold(shown);
@@ -330,14 +330,15 @@ impl App {
         self.send(Method::POST, &format!("/jobs/{job}/cancel"), None).await.0
     }
 
-    /// Queues a training; its job.
+    /// Queues a training and returns its job.
     pub async fn queue(&self, specification: &Value) -> String {
         let (status, job) = self.post("/train", specification).await;
         assert_eq!(status, 202, "{job}");
         job["job"].as_str().expect("a job").to_owned()
     }
 
-    /// Waits until the job satisfies `reached`. Beside the jobs of other tests it gets a small part of the processors.
+    /// Waits until the job satisfies `reached`. The deadline is long because the jobs of other tests share the
+    /// processors.
     pub async fn until(&self, job: &str, reached: impl Fn(&Value) -> bool) -> Value {
         let deadline = Instant::now() + 3 * patience::patience();
         let mut steps_done = 0;
@@ -375,18 +376,18 @@ impl App {
         self.session = session["session"].as_str().expect("a session").to_owned();
     }
 
-    /// Observes a return that is meant, whatever the record.
+    /// Observes a return and confirms it, even if it is unusual for the record.
     pub async fn observe(&self, period: usize, log_return: f64) -> (StatusCode, Value) {
         self.report(period, json!({ "log_return": log_return, "confirm": true })).await
     }
 
-    /// Observes what `report` says of the period.
+    /// Observes the period with the fields of `report`.
     pub async fn report(&self, period: usize, mut report: Value) -> (StatusCode, Value) {
         (report["session"], report["period"]) = (json!(self.session), json!(period));
         self.post("/observe", &report).await
     }
 
-    /// The exported policy, as bytes.
+    /// Returns the exported policy, as bytes.
     pub async fn export(&self) -> Vec<u8> {
         let answer = self.client.get(format!("{}/policies/{}/export", self.url, self.policy)).send().await;
         answer.expect("an answer").bytes().await.expect("a document").to_vec()
@@ -397,7 +398,7 @@ impl App {
     }
 }
 
-/// Every answer carries what the house promises: a client's error names field, value and rule.
+/// Reads an answer and checks that every error is a problem document; a client's error names field, value and rule.
 pub async fn read(response: Response) -> (StatusCode, Value) {
     let status = response.status();
     let media = response.headers().get("content-type").map(|media| media.to_str().expect("text").to_owned());
@@ -413,7 +414,7 @@ pub async fn read(response: Response) -> (StatusCode, Value) {
     (status, answer)
 }
 
-/// The status is one that `api/openapi.json` lists for the operation.
+/// Asserts that `api/openapi.json` lists the status for the operation.
 fn assert_described(method: &Method, path: &str, status: StatusCode) {
     let description: Value = serde_json::from_str(include_str!("../../api/openapi.json")).expect("JSON");
     let parts = |path: &str| path.split('?').next().unwrap_or("").split('/').map(str::to_owned).collect::<Vec<_>>();

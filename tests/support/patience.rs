@@ -1,23 +1,23 @@
-//! How long tests wait, and how soon what they wait for is promised: on a machine that does much else, all of it may take
-//! `BALLAST_TEST_PATIENCE` times as long.
+//! How long tests wait, and the promised times that they check. On a busy machine `BALLAST_TEST_PATIENCE` multiplies
+//! all of them.
 
 use std::time::{Duration, Instant};
 
-/// Between two looks at a level.
+/// The interval between two checks.
 const POLL: Duration = Duration::from_millis(10);
 
-/// `usual`, times what the environment grants.
+/// Returns `usual` times the factor from the environment.
 pub fn within(usual: Duration) -> Duration {
     let granted = std::env::var("BALLAST_TEST_PATIENCE").ok();
     usual.mul_f64(granted.map_or(1.0, |factor| factor.parse().expect("BALLAST_TEST_PATIENCE is a factor")))
 }
 
-/// Nothing that is waited for takes longer.
+/// Returns the longest time that any wait may take.
 pub fn patience() -> Duration {
     within(Duration::from_secs(60))
 }
 
-/// Waits for `reached`, a level that is asked for again and again.
+/// Polls `reached` until it returns a value.
 pub async fn until<T>(what: &str, mut reached: impl AsyncFnMut() -> Option<T>) -> T {
     let deadline = Instant::now() + patience();
     loop {
@@ -29,7 +29,7 @@ pub async fn until<T>(what: &str, mut reached: impl AsyncFnMut() -> Option<T>) -
     }
 }
 
-/// Asserts that what was asked at `asked` took no longer than `promised`.
+/// Asserts that a request sent at `asked` took no longer than `promised`.
 pub fn assert_within(promised: Duration, asked: Instant, what: &str) {
     let taken = asked.elapsed();
     assert!(taken < within(promised), "{what} took {taken:?}, where {promised:?} is promised");

@@ -1,4 +1,4 @@
-//! Where a store under test keeps its facts: a folder, or a database.
+//! The location of a store under test: a folder, or a database.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use super::patience::until;
 use super::postgres;
 
-/// Runs each test over either engine, in a place of its own.
+/// Runs each test over either engine, each with a store of its own.
 #[allow(unused_macros)]
 macro_rules! on_both_engines {
     ($($name:ident),* $(,)?) => {
@@ -41,7 +41,7 @@ impl Place {
         Place::Folder(tempfile::tempdir().unwrap())
     }
 
-    /// `None` where there is no PostgreSQL.
+    /// Returns `None` if there is no PostgreSQL.
     pub async fn database() -> Option<Place> {
         postgres::database().await.map(Place::Database)
     }
@@ -57,7 +57,7 @@ impl Place {
         }
     }
 
-    /// Its keys, beside whoever has it open.
+    /// Opens the keys, even while a process has the store open.
     pub async fn key_ring(&self) -> Result<KeyRing, StoreError> {
         match self {
             Place::Folder(folder) => KeyRing::open(&folder.path().join("data")).await,
@@ -65,7 +65,8 @@ impl Place {
         }
     }
 
-    /// A program that another test of this process starts has a copy of the folder's lock until it runs.
+    /// Reopens a closed store. Waits for the lock, because a program that another test starts inherits it until it
+    /// executes.
     pub async fn reopen(&self, store: Store) -> Store {
         store.close().await;
         let opened = async || match self.try_open().await {
@@ -75,7 +76,7 @@ impl Place {
         until("the lock of a folder that was closed", opened).await
     }
 
-    /// What a second worker or client holds: of the same process over a folder, else of another.
+    /// Returns the store of a second worker or client: in the same process over a folder, else in another.
     pub async fn second(&self, store: &Store) -> Store {
         match self {
             Place::Folder(_) => store.clone(),
@@ -83,7 +84,7 @@ impl Place {
         }
     }
 
-    /// Changes a database file without minding what refers to what.
+    /// Changes a database file without checking foreign keys.
     pub async fn break_references(file: &Path, statement: &'static str) {
         let options = SqliteConnectOptions::new().filename(file).foreign_keys(false);
         let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
@@ -92,7 +93,7 @@ impl Place {
         connection.close().await.unwrap();
     }
 
-    /// Changes one row behind a closed store's back.
+    /// Changes one row while the store is closed.
     pub async fn tamper(&self, statement: &str) {
         let changed = match self {
             Place::Folder(folder) => {

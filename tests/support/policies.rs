@@ -1,4 +1,4 @@
-//! Policies trained here and now, with no server.
+//! Policies trained in this process, without a server.
 
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
@@ -7,7 +7,7 @@ use ballast::control::request::specification::Specification;
 use ballast::control::training::Training;
 use serde_json::{Value, json};
 
-/// Of a problem that is the paper's where it says nothing else.
+/// Returns a specification whose problem is the paper's unless `value` says otherwise.
 pub fn specification(mut value: Value) -> Specification {
     let problem = value["problem"].as_object_mut().expect("a problem");
     if !problem.get("framework").is_some_and(|name| name.as_str().expect("a name").starts_with("parametric")) {

@@ -1,8 +1,8 @@
-//! A PostgreSQL server for tests, and a database of it for each.
+//! A PostgreSQL server for tests, with a database for each.
 //!
-//! `TEST_POSTGRES_URL` where set; else a private cluster in a temporary folder, made by the installed `initdb` and gone
-//! with this process, however that ends. Without either a test says so and passes, unless `BALLAST_TEST_POSTGRES` is
-//! `required`.
+//! Uses `TEST_POSTGRES_URL` if set; else a private cluster in a temporary folder, made by the installed `initdb` and
+//! deleted when this process ends, however it ends. Without either, a test prints that it was skipped and passes,
+//! unless `BALLAST_TEST_POSTGRES` is `required`.
 
 use std::io::{BufRead, BufReader, Lines, Write};
 use std::net::TcpListener;
@@ -14,7 +14,7 @@ use std::sync::{Mutex, OnceLock};
 use sqlx::postgres::PgConnection;
 use sqlx::{AssertSqlSafe, Connection};
 
-/// Runs as the owner of the cluster until its input ends, which it does with the process that holds the other end.
+/// A script that runs as the owner of the cluster until its input ends, which happens when this process ends.
 const KEEPER: &str = r#"
     set -eu
     # An interrupt reaches the whole group; the end of the input still ends this.
@@ -49,12 +49,13 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// `None` where no server is installed.
+    /// Returns `None` if no server is installed.
     pub fn start() -> Option<Cluster> {
         Cluster::start_with(&[])
     }
 
-    /// One that takes encrypted connections alone, by this certificate and key in PEM; `None` as for [`database`].
+    /// Starts a cluster that accepts only encrypted connections, with this certificate and key in PEM; `None` as for
+    /// [`database`].
     pub fn encrypted(certificate: &str, key: &str) -> Option<Cluster> {
         Cluster::start_with(&[("CERTIFICATE", certificate), ("PRIVATE_KEY", key)]).or_else(skip)
     }
@@ -94,7 +95,7 @@ impl Cluster {
         assert_eq!(answer.expect("the keeper of the cluster ended").unwrap(), "done");
     }
 
-    /// Stops the server as a crash does: no checkpoint, connections cut.
+    /// Stops the server like a crash: no checkpoint, connections cut.
     pub fn crash(&self) {
         self.tell("stop");
     }
@@ -104,7 +105,7 @@ impl Cluster {
         self.tell("start");
     }
 
-    /// The database that every server has, as its address.
+    /// Returns the address of the database that every server has.
     pub fn own_database(&self) -> String {
         self.url("postgres")
     }
@@ -113,7 +114,7 @@ impl Cluster {
         format!("postgres://ballast@127.0.0.1:{}/{database}", self.port)
     }
 
-    /// A new database, as its address.
+    /// Creates a database and returns its address.
     pub async fn database(&self) -> String {
         let name = new_name();
         create(&self.url("postgres"), &name).await;
@@ -123,12 +124,12 @@ impl Cluster {
 
 impl Drop for Cluster {
     fn drop(&mut self) {
-        // Waiting ends its input first.
+        // Waiting closes the child's input first.
         let _ = self.keeper.get_mut().unwrap().0.wait();
     }
 }
 
-/// The folder of `initdb` and `pg_ctl`: on the path, else the newest of Debian's.
+/// Returns the folder of `initdb` and `pg_ctl`: on the path, else the newest of Debian's.
 fn installed() -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let mut folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
@@ -148,7 +149,7 @@ async fn create(server: &str, name: &str) {
     execute(server, &format!("CREATE DATABASE {name}")).await;
 }
 
-/// Runs a statement on the database at `url`; the number of rows it changed.
+/// Runs a statement on the database at `url`, and returns the number of rows it changed.
 pub async fn execute(url: &str, statement: &str) -> u64 {
     let mut connection = PgConnection::connect(url).await.expect("the server");
     let done = sqlx::query(AssertSqlSafe(statement.to_owned())).execute(&mut connection).await;
@@ -157,12 +158,12 @@ pub async fn execute(url: &str, statement: &str) -> u64 {
     changed
 }
 
-/// A private cluster for a test that crashes it; `None` as for [`database`].
+/// Starts a private cluster for a test that crashes it; `None` as for [`database`].
 pub fn private_cluster() -> Option<Cluster> {
     Cluster::start().or_else(skip)
 }
 
-/// A new database for one test; `None` where there is no server, after saying so.
+/// Creates a new database for one test; if there is no server, prints so and returns `None`.
 pub async fn database() -> Option<String> {
     static SHARED: OnceLock<Option<Cluster>> = OnceLock::new();
     if let Ok(given) = std::env::var("TEST_POSTGRES_URL") {
@@ -181,7 +182,7 @@ pub async fn database() -> Option<String> {
 fn skip<T>() -> Option<T> {
     let required = std::env::var("BALLAST_TEST_POSTGRES").is_ok_and(|value| value == "required");
     assert!(!required, "no PostgreSQL: neither TEST_POSTGRES_URL nor an installed initdb");
-    // Past the capture of test output: a suite that ran half must not look whole.
+    // This bypasses the capture of test output: a suite that ran only half must not look complete.
     let _ = writeln!(std::io::stderr(), "SKIPPED, NO POSTGRESQL: a test of the shared store did not run");
     None
 }

@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-/// Ends with its test.
+/// A child process that is killed when its test ends.
 pub struct Process(pub Child);
 
 impl Drop for Process {
@@ -13,12 +13,12 @@ impl Drop for Process {
     }
 }
 
-/// Starts `ballast serve` on a free port, with what `configure` adds; the process and its address.
+/// Starts `ballast serve` on a free port, with what `configure` adds; returns the process and its address.
 pub fn serve(configure: impl FnOnce(&mut Command)) -> (Child, String) {
     try_serve(configure).unwrap_or_else(|(_, printed)| panic!("printed {printed:?}"))
 }
 
-/// As [`serve`]; where it does not get as far as listening, the process and what it printed instead.
+/// Starts like [`serve`]; if the service does not begin to listen, returns the process and what it printed instead.
 pub fn try_serve(configure: impl FnOnce(&mut Command)) -> Result<(Child, String), (Child, String)> {
     let mut command = quiet(Command::new(env!("CARGO_BIN_EXE_ballast")));
     command.arg("serve");
@@ -26,7 +26,7 @@ pub fn try_serve(configure: impl FnOnce(&mut Command)) -> Result<(Child, String)
     started(command)
 }
 
-/// As [`serve`], by a command that ends in the real binary.
+/// Starts like [`serve`], with a command that finally executes the real binary.
 pub fn serve_by(command: Command) -> (Child, String) {
     started(quiet(command)).unwrap_or_else(|(_, printed)| panic!("printed {printed:?}"))
 }
@@ -46,7 +46,7 @@ fn started(mut command: Command) -> Result<(Child, String), (Child, String)> {
     }
 }
 
-/// Backward steps that the process at `url` has solved since it started.
+/// Returns the number of backward steps that the process at `url` has solved since it started.
 pub async fn steps_solved(url: &str) -> usize {
     let metrics = reqwest::get(format!("{url}/metrics")).await.unwrap().text().await.unwrap();
     let count = "ballast_training_step_duration_seconds_count ";

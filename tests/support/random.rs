@@ -1,4 +1,4 @@
-//! Random stories, each over an empty store of either engine; one that fails is made as short as it still fails.
+//! Random stories, each over an empty store of either engine; a failing story is shrunk.
 
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, TestCaseError, TestRunner};
@@ -7,7 +7,7 @@ use tokio::runtime::Runtime;
 use super::place::Place;
 use super::postgres;
 
-/// Tells so many stories in folders of their own.
+/// Runs `cases` stories, each in a folder of its own.
 pub fn over_folders<S: Strategy>(
     cases: u32,
     stories: &S,
@@ -16,7 +16,7 @@ pub fn over_folders<S: Strategy>(
     run(&Runtime::new().unwrap(), cases, stories, Place::folder, tell);
 }
 
-/// Tells so many stories in one database, whose `tables` are emptied before each; none where there is no PostgreSQL.
+/// Runs `cases` stories in one database, whose `tables` are emptied before each; none if there is no PostgreSQL.
 pub fn over_a_database<S: Strategy>(
     tables: &str,
     cases: u32,

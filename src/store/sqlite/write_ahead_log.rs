@@ -78,7 +78,7 @@ struct Chain {
     /// The byte order of the checksum's words.
     word: fn([u8; 4]) -> u32,
     page_bytes: usize,
-    /// The same in the head and in every frame; a log that was restarted has another salt.
+    /// The salt in the head and in every frame; a log that was restarted has another.
     salt: [u8; 8],
     sum: [u32; 2],
 }
