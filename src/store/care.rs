@@ -34,7 +34,7 @@ pub struct Today {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstDay {
     pub periods_per_year: f64,
-    /// For example 2008-09-30.
+    /// The day, for example 2008-09-30.
     pub date: String,
     /// The beginning of that day.
     pub begin_ms: i64,

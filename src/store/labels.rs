@@ -23,7 +23,9 @@ use crate::control::request::text::check_text;
 
 /// The most letters of a name.
 pub const LONGEST_NAME: usize = 100;
+/// The most letters of notes.
 pub const LONGEST_NOTES: usize = 2_000;
+/// The most letters of a tag.
 pub const LONGEST_TAG: usize = 50;
 /// The most tags of a policy or a session.
 pub const MOST_TAGS: usize = 20;
