@@ -1,4 +1,4 @@
-//! What a period's observation was acknowledged with, as far as a replay reads it.
+//! The parts of an acknowledged answer to an observation that a replay reads.
 
 use serde::Deserialize;
 
@@ -16,7 +16,8 @@ pub(super) struct Acknowledged {
 }
 
 impl Acknowledged {
-    /// The report in the numbers that were acknowledged, which no other processor or library computes otherwise.
+    /// Returns the report with the acknowledged numbers, so that a replay on another processor or library agrees with
+    /// them.
     pub(super) fn report(&self, reported: &Report) -> Report {
         let Report { date, rate, flow, .. } = *reported;
         let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::default() };
@@ -36,7 +37,7 @@ impl Acknowledged {
         }
     }
 
-    /// The report, of several assets with what was advised for those that were held as advised.
+    /// Returns the report. Several assets that were held as advised get their advised allocations as the executed ones.
     pub(super) fn held_as_advised(&self, reported: &Report) -> Report {
         let mut report = reported.clone();
         if let Some(assets) = &self.assets {
@@ -45,7 +46,7 @@ impl Acknowledged {
         report
     }
 
-    /// The composition of several assets that was answered.
+    /// Returns the acknowledged composition if there are several assets.
     pub(super) fn composed(&self) -> Option<&Composed> {
         self.assets.as_ref().map(|assets| &assets.composed)
     }

@@ -16,34 +16,34 @@ use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::state::State;
 use crate::store::Tenant;
 
-/// What [`Sessions::action`] found.
+/// The advice for the coming period, as [`Sessions::action`] returns it.
 pub struct Action {
     pub period: usize,
-    /// Of several assets, of their fund.
+    /// For several assets, the advice of their fund.
     pub advice: Advice,
-    /// Where there are several.
+    /// Present if there are several assets.
     pub assets: Option<Box<Assets>>,
     pub worst_case: Option<WorstCase>,
     pub sensitivity: Option<Sensitivity>,
-    /// The last period that its policy was trained for, of a session whose next policy is to come.
+    /// The last period that the policy was trained for, if the session waits for its next policy.
     pub waiting: Option<usize>,
 }
 
-/// How an action is asked for.
+/// Options of a request for advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Question {
     pub mode: AdviceMode,
-    /// Re-solve, and show the worst-case law.
+    /// If true, re-solve and show the worst-case law.
     pub explain: bool,
-    /// Say how near the advice is to changing.
+    /// If true, say how near the advice is to changing.
     pub sensitivity: bool,
 }
 
 impl Sessions {
-    /// The robust allocation for the coming period.
+    /// Returns the robust allocation for the coming period.
     ///
     /// # Errors
-    /// There is no such session, it has reached its horizon, or it must be solved and too much is under way.
+    /// There is no such session, it has reached its horizon, or it needs a solve and too much work is under way.
     pub async fn action(
         &self,
         tenant: &Tenant,
@@ -93,22 +93,22 @@ impl Sessions {
         Ok(Large { value: solving.await?, room })
     }
 
-    /// The state of a session and the returns that it has seen, in their order, both as of the entries that `live` knows.
+    /// Returns the state of a session and its observed returns in order, both as of the entries that `live` has seen.
     ///
     /// # Errors
-    /// There is no such session; its sensitivity would take too long.
+    /// There is no such session, or its sensitivity would take too long.
     async fn record(&self, tenant: &Tenant, live: &Live, advisor: &Advisor) -> Result<(State, Vec<f64>), ServiceError> {
         if live.standing.assets.is_some() {
             let rule = "must be left out: it is not told of several assets";
             return Err(FieldError::new("sensitivity", true, rule).into());
         }
         let Large { value: mut facts, room: _room } = self.facts(tenant, &live.row.session).await?;
-        // What another process recorded since then is of the next question.
+        // Entries that another process has recorded since belong to the next request.
         facts.entries.truncate(live.seen.entries());
         advisor.check_sensitivity(live.standing.state.law.sample_size())?;
         let periods = Periods::of(&facts)?;
         let Passage { standing, record, .. } = periods.replay()?;
-        // The law is of the last of them.
+        // The law holds only the last returns.
         let older = record.all().len() - standing.state.law.sample_size();
         Ok((standing.state, record.all()[older..].to_vec()))
     }

@@ -21,20 +21,20 @@ use crate::control::request::specification::{ProblemSpecification, Specification
 use crate::control::request::warnings::Warning;
 use crate::store::Tenant;
 
-/// A question for one period.
+/// A request for one-period advice.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Advise {
-    /// As in a training, for a horizon of 1, which may be left out.
+    /// The problem as in a training. Its horizon must be 1 and may be left out.
     pub problem: ProblemSpecification,
     /// Wealth now. Default: the problem's initial wealth.
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset now, before trading. Default: 0.
     pub holding: Option<f64>,
-    /// Of the simulated bridges.
+    /// Seed of the simulated bridges.
     #[serde(default = "default_seed")]
     pub seed: u64,
-    /// Whether to say how near the advice is to changing.
+    /// If true, say how near the advice is to changing.
     #[serde(default)]
     pub sensitivity: bool,
 }
@@ -45,34 +45,34 @@ pub struct Advised {
     #[serde(flatten)]
     pub advice: Advice,
     pub worst_case: WorstCase,
-    /// What to know before the advice is followed.
+    /// Points to know before following the advice.
     pub caution: Vec<Caution>,
-    /// The levels of caution, where one of them is followed.
+    /// The levels of caution, if one of them is followed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<LevelsAdvised>,
-    /// Where nothing is held.
+    /// Why nothing is held, if nothing is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why_nothing: Option<WhyNothing>,
-    /// How near it is to changing, where that was asked for.
+    /// How near the advice is to changing, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<Sensitivity>,
-    /// Where `problem.periods_per_year` is given.
+    /// Annualised figures, if `problem.periods_per_year` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,
-    /// What in the question may be a mistake.
+    /// Parts of the request that may be a mistake.
     pub warnings: Vec<Warning>,
 }
 
-/// A question that keeps the rules.
+/// A validated request.
 struct Checked {
-    /// The training request of which it asks the one step.
+    /// The training request whose single step is solved.
     specification: Specification,
     holding: f64,
     asks_sensitivity: bool,
 }
 
 impl Advise {
-    /// The answer, found in this process for its own user: no store, no turns, and the memory that it takes.
+    /// Answers the request in this process for its own user, with no store, no queue and no memory budget.
     /// Checked by: `tests/project/advise_file.rs`.
     ///
     /// # Errors
@@ -117,8 +117,10 @@ impl Checked {
 }
 
 impl Sessions {
+    /// Answers the request.
+    ///
     /// # Errors
-    /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
+    /// A field breaks a rule, the radius needs more memory than can be kept, or no permit to solve became free.
     pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Large<Advised>, ServiceError> {
         let checked = question.checked()?;
         let investor = self.policies.one_period(&checked.specification)?;

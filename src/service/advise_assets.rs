@@ -22,7 +22,7 @@ use crate::control::request::specification::{
 use crate::control::request::warnings::Warning;
 use crate::store::Tenant;
 
-/// A question for one period of several assets.
+/// A request for one-period advice on several assets.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdviseAssets {
@@ -30,9 +30,9 @@ pub struct AdviseAssets {
     pub problem: AssetsProblem,
     /// Wealth now. Default: the problem's initial wealth.
     pub wealth: Option<f64>,
-    /// Share of wealth in each asset now, before trading, by its name. Default: nothing of any.
+    /// Share of wealth in each asset now, before trading, by its name. Default: 0 for each.
     pub holdings: Option<BTreeMap<String, f64>>,
-    /// Of the simulated bridges.
+    /// Seed of the simulated bridges.
     #[serde(default = "default_seed")]
     pub seed: u64,
 }
@@ -42,21 +42,21 @@ pub struct AdviseAssets {
 pub struct AssetsAdvised {
     #[serde(flatten)]
     pub advice: AssetsAdvice,
-    /// Where nothing is held, of the fund of inverse volatilities.
+    /// Why nothing is held, if nothing is; for the inverse-volatility fund.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why_nothing: Option<WhyNothing>,
-    /// Of the fund of inverse volatilities, where `problem.periods_per_year` is given.
+    /// Annualised figures of the inverse-volatility fund, if `problem.periods_per_year` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,
-    /// What in the question may be a mistake.
+    /// Parts of the request that may be a mistake.
     pub warnings: Vec<Warning>,
 }
 
 impl Sessions {
-    /// The training of a policy for several assets, of whose funds the joint radius is found.
+    /// Builds the training request for several assets, and finds the joint radius from their funds.
     ///
     /// # Errors
-    /// A field breaks a rule; no turn to solve.
+    /// A field breaks a rule, or no permit to solve became free.
     pub async fn training(
         &self,
         tenant: &Tenant,
@@ -67,8 +67,10 @@ impl Sessions {
         Ok(self.resolving.run(tenant, training).await??)
     }
 
+    /// Answers the request.
+    ///
     /// # Errors
-    /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
+    /// A field breaks a rule, the radius needs more memory than can be kept, or no permit to solve became free.
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
         let Checked { problem, holdings, fund } = question.checked()?;
         let fund = self.policies.one_period(&fund)?;
@@ -77,7 +79,7 @@ impl Sessions {
 }
 
 impl AdviseAssets {
-    /// The answer, found in this process for its own user, as [`super::advise::Advise::answer`].
+    /// Answers the request in this process for its own user, as [`super::advise::Advise::answer`] does.
     ///
     /// # Errors
     /// A field breaks a rule.
@@ -101,10 +103,10 @@ impl AdviseAssets {
     }
 }
 
-/// A question that keeps the rules, with the problem of its fund of inverse volatilities.
+/// A validated request with the problem of its inverse-volatility fund.
 struct Checked {
     problem: AssetsProblem,
-    /// Asset by asset.
+    /// One share for each asset.
     holdings: Vec<f64>,
     fund: Specification,
 }

@@ -1,10 +1,10 @@
-//! How much a tenant may ask: so many calls a second of each class, and so many heavy ones at a time.
+//! Limits on each tenant: a rate limit for each class of calls, and a limit on concurrent heavy calls.
 //!
-//! One tenant's flood is refused before any work, and cannot take the turns of another: calls that solve wait for places
-//! of their own, of which a tenant gets half at most, and advice and observations need none of them.
+//! A flood from one tenant is rejected before any work and cannot take the permits of other tenants. Calls that solve
+//! need heavy permits, of which one tenant gets at most half. Advice and observations need none.
 //!
-//! Some calls are known to be heavy only once they are under way: advice for a state outside the design, an observation
-//! that needs such advice. Each call therefore carries a [`HeavyTurn`], and what is about to solve begins it.
+//! Some calls turn out to be heavy only while they run: advice for a state outside the design, or an observation that
+//! needs such advice. So each call carries a [`HeavyTurn`], which is begun before a solve.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -13,14 +13,14 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// Calls that cost alike.
+/// A class of calls of similar cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
-    /// Advice, observations, sessions opened and deleted: milliseconds.
+    /// Advice, observations, opening and deleting sessions: milliseconds.
     Live,
     /// Robust steps solved on request, jobs queued, policies imported.
     Heavy,
-    /// The rest.
+    /// All other calls.
     Read,
 }
 
@@ -34,24 +34,24 @@ impl Class {
     }
 }
 
-/// What an operator sets for all tenants alike.
+/// Limits that an operator sets for all tenants alike.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    /// Calls a second of one tenant, by class in the order of [`Class`]; as many may come at once. 0: any number.
+    /// Calls a second for one tenant, by class in the order of [`Class`]; also the largest burst. 0: no limit.
     pub rates: [u32; 3],
-    /// Heavy calls of all tenants under way at a time.
+    /// Permits for concurrent heavy calls of all tenants.
     pub heavy: Arc<Semaphore>,
-    /// Those of one tenant.
+    /// Concurrent heavy calls of one tenant.
     pub heavy_of_one: usize,
-    /// Event streams of one tenant open at a time.
+    /// Concurrent event streams of one tenant.
     pub streams_of_one: usize,
-    /// A stream older than this ends; its client comes back and goes on where it was.
+    /// A stream ends at this age; its client reconnects and resumes.
     pub stream_age: Duration,
 }
 
-/// A page follows the jobs it shows, a program a few.
+/// Enough for pages that follow all the jobs they show and programs that follow a few.
 const STREAMS_OF_ONE: usize = 256;
-/// Long enough that coming back costs nothing, short enough that no stream is for ever.
+/// Long enough that reconnecting costs nothing, short enough that no stream lives for ever.
 const STREAM_AGE: Duration = Duration::from_secs(300);
 
 impl Limits {
@@ -67,13 +67,13 @@ impl Limits {
 }
 
 impl Default for Limits {
-    /// Far above what one process answers on two cores: they stop loops gone wild, not users.
+    /// Limits far above what one process answers on two cores: they stop runaway loops, not users.
     fn default() -> Self {
         Limits::new([50_000, 500, 10_000], 64)
     }
 }
 
-/// What one tenant has left.
+/// The remaining allowance of one tenant.
 #[derive(Debug)]
 pub struct Allowance {
     buckets: [Bucket; 3],
@@ -86,7 +86,7 @@ pub struct Allowance {
     epoch: Instant,
 }
 
-/// Why a call has to come back later.
+/// Why a call is rejected for now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Refused {
     #[error("more than {} {} calls in a second", .1.per_second, .0.name())]
@@ -99,15 +99,15 @@ pub enum Refused {
     OwnWork,
 }
 
-/// The call was one too many.
+/// The rejection of a call above the rate limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooMany {
     pub per_second: u32,
-    /// When the next may come.
+    /// Time until the next call is allowed.
     pub wait: Duration,
 }
 
-/// The place of an event stream, given up when dropped.
+/// The permit of an event stream, released on drop.
 #[derive(Debug)]
 pub struct StreamPlace {
     _place: OwnedSemaphorePermit,
@@ -115,7 +115,7 @@ pub struct StreamPlace {
     pub until: Instant,
 }
 
-/// The places of a heavy call, given up when dropped.
+/// The permits of a heavy call, released on drop.
 type Places = Vec<OwnedSemaphorePermit>;
 
 impl Allowance {
@@ -132,16 +132,16 @@ impl Allowance {
         }
     }
 
-    /// Takes one call off the class.
+    /// Takes one call from the rate of the class.
     ///
     /// # Errors
-    /// There is none left now.
+    /// The rate limit is reached.
     pub fn take(&self, class: Class) -> Result<(), TooMany> {
         let now = u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX / 2);
         self.buckets[class as usize].take(now)
     }
 
-    /// A place for an event stream.
+    /// Acquires a permit for an event stream.
     ///
     /// # Errors
     /// [`Refused::TooManyStreams`].
@@ -151,32 +151,32 @@ impl Allowance {
         Ok(StreamPlace { _place: place, until: Instant::now() + self.stream_age })
     }
 
-    /// The place of the one list of sessions that the tenant has read at a time.
+    /// Returns the semaphore that lets a tenant read one list of sessions at a time.
     pub(super) fn lists(&self) -> Arc<Semaphore> {
         self.lists.clone()
     }
 
-    /// Heavy calls of the tenant that may be under way at a time.
+    /// Returns how many heavy calls of the tenant may run at a time.
     pub fn heavy_of_one(&self) -> usize {
         self.heavy_of_one
     }
 
-    /// Places for a heavy call, the tenant's own first.
+    /// Acquires the permits for a heavy call, the tenant's own first.
     ///
     /// # Errors
-    /// All of either are taken.
+    /// No permit of one of the two kinds is free.
     fn places(&self) -> Result<Places, Refused> {
         let taken = self.heavy.iter().zip([Refused::OwnWork, Refused::NoPlace]);
         taken.map(|(places, refused)| places.clone().try_acquire_owned().map_err(|_| refused)).collect()
     }
 }
 
-/// What one call, or one element of a list, must take before it does heavy work: one call off the heavy rate and the
-/// places, each once, whoever asks first. The places are given up when it is dropped.
+/// The permits that one call, or one element of a list, needs before it does heavy work. One call of the heavy rate and
+/// the permits are each taken once, at the first request. The permits are released on drop.
 #[derive(Debug)]
 pub struct HeavyTurn {
     allowance: Arc<Allowance>,
-    /// Waited for first: elements of one list do not take each other's places.
+    /// Acquired first, so that elements of one list do not take each other's permits.
     lane: Option<Arc<Semaphore>>,
     counted: OnceLock<()>,
     places: OnceLock<Places>,
@@ -187,12 +187,12 @@ impl HeavyTurn {
         HeavyTurn { allowance, lane: None, counted: OnceLock::new(), places: OnceLock::new() }
     }
 
-    /// Of an element of a list, of whose elements as many do heavy work at a time as `lane` has places.
+    /// Builds the turn of a list element. At most as many elements do heavy work at a time as `lane` has permits.
     pub fn in_lane(allowance: Arc<Allowance>, lane: Arc<Semaphore>) -> Self {
         HeavyTurn { lane: Some(lane), ..HeavyTurn::new(allowance) }
     }
 
-    /// Takes the call off the heavy rate, before its body is read.
+    /// Takes the call from the heavy rate, before its body is read.
     ///
     /// # Errors
     /// [`Refused::TooOften`].
@@ -204,10 +204,10 @@ impl HeavyTurn {
         Ok(())
     }
 
-    /// Takes places too: heavy work comes next.
+    /// Also acquires the permits, just before heavy work.
     ///
     /// # Errors
-    /// [`Refused::TooOften`], or if all places are taken [`Refused::OwnWork`] or [`Refused::NoPlace`].
+    /// [`Refused::TooOften`], or [`Refused::OwnWork`] or [`Refused::NoPlace`] if no permit is free.
     pub async fn begin(&self) -> Result<(), Refused> {
         self.count()?;
         if self.places.get().is_none() {
@@ -223,10 +223,10 @@ impl HeavyTurn {
     }
 }
 
-/// A bucket of tokens as one number: the time at which it is full again, in nanoseconds.
+/// A token bucket stored as one number: the time at which it is full again, in nanoseconds.
 ///
-/// A call puts that time off by one interval, and is refused where it would lie more than a second ahead: the generic
-/// cell rate algorithm, ITU-T I.371.
+/// A call moves that time one interval later, and is rejected if it would lie more than a second ahead. This is the
+/// generic cell rate algorithm, ITU-T I.371.
 #[derive(Debug)]
 struct Bucket {
     per_second: u32,
@@ -302,7 +302,7 @@ mod tests {
         other.begin().await.unwrap();
     }
 
-    /// Two places, of which one is the tenant's: the second element waits for the first and is not refused.
+    /// Two permits, one of them the tenant's: the second element waits for the first and is not rejected.
     #[tokio::test]
     async fn elements_of_a_list_wait_for_each_other_and_count_one_by_one() {
         let allowance = Arc::new(Allowance::new(&Limits::new([0, 2, 0], 2)));

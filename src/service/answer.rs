@@ -1,4 +1,4 @@
-//! What is answered to a report and to a correction; kept with them, to be given again.
+//! Answers to observations and corrections. They are stored, so that a repeated request gets the same answer.
 
 use jiff::civil::Date;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -14,29 +14,30 @@ use crate::control::problem::actions::Band;
 pub struct Observed {
     pub session: String,
     pub period: usize,
-    /// Null where it is missing.
+    /// Null if it is missing.
     pub log_return: Option<f64>,
-    /// The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
+    /// The holdings that are best kept at the start of the period. If trading costs nothing, both ends are the advised
     /// allocation.
     #[schema(value_type = [f64; 2])]
     pub band: Band,
     pub advised_allocation: f64,
     pub executed_allocation: f64,
-    /// Wealth at the end of the period, with what was added to it.
+    /// Wealth at the end of the period, including what was added to it.
     pub wealth: f64,
-    /// Share of it in the risky asset, as the return left it.
+    /// Share of wealth in the risky asset after the return.
     pub holding: f64,
-    /// Of several assets, by their names: what is told beside is of their fund.
+    /// Figures of several assets by name. The figures beside it are then those of their fund.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assets: Option<ObservedAssets>,
-    /// Change of wealth by the period, what was added or reached otherwise included.
+    /// Change of wealth over the period, including flows and wealth reported otherwise.
     pub wealth_change: f64,
-    /// The last day of the period: as reported, else the next one due, or where that is not known of a period before.
+    /// The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
+    /// period.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
-    /// Whether the horizon is reached, and no policy is to follow.
+    /// True if the horizon is reached and no policy is to follow.
     pub completed: bool,
-    /// Whether the returns still come as they came.
+    /// The test of whether returns still come from the same law.
     pub drift: Drift,
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
@@ -47,31 +48,31 @@ pub struct Observed {
 pub struct Corrected {
     pub session: String,
     pub correction: usize,
-    /// The period put right, put in or taken out.
+    /// The period corrected, inserted or removed.
     pub period: usize,
-    /// What it is now; null where it is missing or taken out.
+    /// Its log-return now; null if it is missing or removed.
     pub log_return: Option<f64>,
     /// Periods observed now.
     pub observed: usize,
     /// Wealth now.
     pub wealth: f64,
-    /// Share of it in the risky asset.
+    /// Share of wealth in the risky asset.
     pub holding: f64,
-    /// Of several assets, before the coming period.
+    /// Figures of several assets before the coming period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assets: Option<Composed>,
-    /// Change of wealth by the last period observed, as it stands now.
+    /// Change of wealth over the last observed period, after the correction.
     pub wealth_change: f64,
-    /// The last day of the last period, where it is known.
+    /// The last day of the last period, if it is known.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
-    /// Whether the returns, as they stand, come as they came.
+    /// The test of whether the corrected returns still come from the same law.
     pub drift: Drift,
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
 }
 
-/// Where a session stands, as far as every answer that moves it says so.
+/// The state of a session, as far as every answer that changes it reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Stands {
     pub wealth: f64,
@@ -79,7 +80,7 @@ pub struct Stands {
     pub wealth_change: f64,
     pub date: Option<Date>,
     pub drift: Drift,
-    /// Standard deviation of the log-returns learned, where the moments tell it.
+    /// Standard deviation of the log-returns in the law, if the moments determine it.
     #[serde(default, rename = "moments", deserialize_with = "deviation")]
     pub deviation: Option<f64>,
 }

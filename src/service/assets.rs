@@ -1,4 +1,4 @@
-//! Several assets in a session: what is reported by their names, where they stand, and how that is told.
+//! Several assets in a session: reports by name, their state, and how answers show it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,29 +17,29 @@ use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::numerics::empirical::EmpiricalDistribution;
 
-/// What shares of wealth may sum to, beside rounding.
+/// The largest sum of shares of wealth, with room for rounding.
 const WHOLE: f64 = 1.0 + 1e-9;
 
 /// The assets of a session between two periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assets {
-    /// In the order of the columns.
+    /// The names, in the order of the columns.
     pub names: Arc<[String]>,
     pub fund: Fund,
-    /// The one-step problem behind the composition, as it was told.
+    /// The one-step problem behind the composition, as answers show it.
     pub one_step: Option<OneStep>,
-    /// The prices reported for the last period, if they were.
+    /// The prices reported for the last period, if any were.
     pub prices: Option<Vec<f64>>,
 }
 
 /// Several assets before the coming period, by their names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Composed {
-    /// Share of each asset in what is advised to be held; they sum to 1.
+    /// Share of each asset in the advised holdings; they sum to 1.
     pub composition: BTreeMap<String, f64>,
     /// Share of wealth in each asset, before trading.
     pub holdings: BTreeMap<String, f64>,
-    /// What is best for who looks one period ahead, where the composition is proposed by that.
+    /// The optimum one period ahead, if the composition is chosen by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub one_step: Option<OneStep>,
 }
@@ -54,22 +54,22 @@ pub struct PlannedAssets {
 /// A period of several assets, by their names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ObservedAssets {
-    /// Null where they are missing.
+    /// Null if they are missing.
     pub log_returns: Option<BTreeMap<String, f64>>,
-    /// Share of wealth in each asset that was advised.
+    /// Advised share of wealth in each asset.
     pub advised_allocations: BTreeMap<String, f64>,
-    /// Share of wealth in each asset that was held.
+    /// Executed share of wealth in each asset.
     pub executed_allocations: BTreeMap<String, f64>,
-    /// Before the coming period.
+    /// Figures before the coming period.
     #[serde(flatten)]
     pub composed: Composed,
 }
 
 impl Assets {
-    /// Who has seen `rows` and holds these shares of wealth, none unless given.
+    /// Builds the assets from the observed `rows` and the shares of wealth held, 0 by default.
     ///
     /// # Errors
-    /// Holdings that are no shares of wealth in the assets.
+    /// The holdings are not shares of wealth in these assets.
     pub(super) fn at(
         names: &[String],
         rows: Vec<Vec<f64>>,
@@ -82,32 +82,32 @@ impl Assets {
         Ok(Assets { names: names.into(), fund: Fund::at(rows, holdings), one_step: None, prices: None })
     }
 
-    /// As it was told before the coming period.
+    /// Builds the assets as an answer showed them before the coming period.
     ///
     /// # Errors
-    /// What was told is of other assets.
+    /// The answer names other assets.
     pub(super) fn told(names: &[String], rows: Vec<Vec<f64>>, told: &Composed) -> Result<Self, FieldError> {
         let mut assets = Assets::at(names, rows, Some(&told.holdings))?;
         assets.take(told)?;
         Ok(assets)
     }
 
-    /// Takes the composition that was told.
+    /// Applies the composition of an answer.
     ///
     /// # Errors
-    /// It is of other assets.
+    /// It names other assets.
     pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
         self.fund.take(by_name("composition", &told.composition, &self.names)?);
         self.one_step = told.one_step.clone();
         Ok(())
     }
 
-    /// As it is kept at the start of a session.
+    /// Returns the assets as the start of a session stores them.
     pub(super) fn planned(&self) -> PlannedAssets {
         PlannedAssets { names: self.names.to_vec(), composed: self.composed() }
     }
 
-    /// As it is told.
+    /// Returns the assets as answers show them.
     pub fn composed(&self) -> Composed {
         Composed {
             composition: named(&self.names, &self.fund.composition),
@@ -116,8 +116,8 @@ impl Assets {
         }
     }
 
-    /// Chooses the composition before the period after `step`, where the policy advises that, and gives the state of the fund. Cost:
-    /// that of [`Fund::compose`].
+    /// Chooses the composition before the period after `step`, if the policy advises that period, and returns the state
+    /// of the fund. Cost: that of [`Fund::compose`].
     pub(super) fn compose(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
         let problem = &advisor.specification().problem;
         let Some(of) = advisor.specification().fund.as_deref().filter(|_| step < problem.horizon) else {
@@ -130,27 +130,27 @@ impl Assets {
         composed
     }
 
-    /// The same from the composition that was held when the present one was chosen.
+    /// Chooses the composition again, from the one held when the present one was chosen.
     pub(super) fn compose_anew(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
         self.fund.composition.clone_from(&self.fund.before);
         self.compose(advisor, step, state)
     }
 
-    /// Whether choosing the composition before the period after `step` takes a solution of the one-step problem.
+    /// Returns whether choosing the composition before the period after `step` needs a solve of the one-step problem.
     pub(super) fn must_solve(advisor: &Advisor, step: usize) -> bool {
         let Specification { problem, fund, .. } = advisor.specification();
         step < problem.horizon && fund.as_ref().is_some_and(|fund| fund.composition == CompositionRule::OneStep)
     }
 
-    /// Shares of wealth in the assets where so much is in all of them.
+    /// Returns the shares of wealth in the assets that sum to `total`.
     pub fn shares(&self, total: f64) -> Vec<f64> {
         self.fund.composition.iter().map(|share| total * share).collect()
     }
 
-    /// The shares of wealth that were held in a period, for which `advised` was advised of all.
+    /// Returns the shares of wealth held in a period, given the `advised` total.
     ///
     /// # Errors
-    /// What is reported is no share of wealth, or not of these assets.
+    /// A reported number is not a share of wealth, or not of these assets.
     pub(super) fn executed(&self, report: &Report, advised: f64) -> Result<Vec<f64>, FieldError> {
         match &report.executed_allocations {
             Some(executed) => shares("executed_allocations", executed, &self.names),
@@ -158,15 +158,15 @@ impl Assets {
         }
     }
 
-    /// Log-returns of all assets, `None` where they are missing.
+    /// Returns the log-returns of all assets, or `None` if they are missing.
     ///
     /// # Errors
-    /// They are not given in exactly one way, or not of these assets, or one breaks a rule.
+    /// They are not given in exactly one way, are not of these assets, or one breaks a rule.
     pub(super) fn log_returns(&self, report: &Report) -> Result<Option<Vec<f64>>, FieldError> {
         report.log_returns(&self.names, self.prices.as_deref())
     }
 
-    /// Mean and standard deviation of the log-returns of an asset.
+    /// Returns the mean and standard deviation of an asset's log-returns.
     pub(super) fn moments(&self, asset: usize) -> (f64, f64) {
         let rows = &self.fund.rows;
         let average = |of: &dyn Fn(f64) -> f64| rows.iter().map(|row| of(row[asset])).sum::<f64>() / rows.len() as f64;
@@ -174,21 +174,21 @@ impl Assets {
         (mean, average(&|log_return| (log_return - mean).powi(2)).sqrt())
     }
 
-    /// The mean log-return of each date, which no composition changes.
+    /// Returns the law of the mean log-return of each date, which does not depend on the composition.
     pub(super) fn means(rows: &[Vec<f64>]) -> EmpiricalDistribution {
         EmpiricalDistribution::new(&rows.iter().map(|row| mean(row)).collect::<Vec<f64>>())
     }
 }
 
-/// Of the log-returns of a date.
+/// Returns the mean of the log-returns of a date.
 pub(super) fn mean(row: &[f64]) -> f64 {
     row.iter().sum::<f64>() / row.len().max(1) as f64
 }
 
-/// Shares of wealth in the assets.
+/// Validates and returns the shares of wealth in the assets.
 ///
 /// # Errors
-/// They are not of these assets, one is no share, or they are more than the whole.
+/// They are not of these assets, one is not a share, or they sum to more than 1.
 pub(super) fn shares(field: &str, values: &BTreeMap<String, f64>, names: &[String]) -> Result<Vec<f64>, FieldError> {
     let shares = by_name(field, values, names)?;
     for (name, share) in names.iter().zip(&shares) {

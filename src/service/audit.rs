@@ -1,4 +1,4 @@
-//! What was done, as an admin asks for it, and how long it is kept.
+//! The audit as an admin reads it, and how long its entries are kept.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ impl Audit {
         Audit { store }
     }
 
-    /// At most `limit` entries, newest first, after the one with sequence `after`.
+    /// Lists at most `limit` entries, newest first, after the one with sequence `after`.
     ///
     /// # Errors
-    /// The store does not answer, or an entry is not what was written.
+    /// The store does not answer, or an entry differs from what was written.
     pub async fn list(
         &self,
         filter: &AuditFilter,
@@ -33,11 +33,11 @@ impl Audit {
     }
 }
 
-/// Between two looks at what is past its age.
+/// Time between two deletions of entries past the retention age.
 const ROUND: Duration = Duration::from_hours(1);
 
-/// Until the shutdown begins, drops entries that are past the age, and tells the log where each chain ends: who changes
-/// the database by hand, seals and all, does not change what the log says of it.
+/// Deletes entries past the retention age and logs where each chain ends, until shutdown begins. A manual change of the
+/// database, seals included, does not change what the log recorded.
 pub(super) async fn keep_bounded(store: Store, time: Arc<Timekeeper>, age: Duration, shutdown: Shutdown) {
     let age_ms = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
     let mut logged = HashMap::new();
@@ -64,7 +64,7 @@ pub(super) async fn keep_bounded(store: Store, time: Arc<Timekeeper>, age: Durat
     }
 }
 
-/// Logs each end that is another than the one `logged` last.
+/// Logs each end that differs from the one `logged` last.
 fn log_ends(ends: Vec<AuditEnd>, logged: &mut HashMap<(Tenant, String), i64>) {
     for AuditEnd { tenant, chain, number, seal } in ends {
         if logged.insert((tenant.clone(), chain.clone()), number) != Some(number) {

@@ -1,18 +1,18 @@
-//! Ways to put the periods of a session right.
+//! The ways to correct the periods of a session.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Changes of the periods that passed.
+/// A change to observed periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Change {
-    /// The period is reported anew.
+    /// Reports the period again.
     #[default]
     Replace,
-    /// A period that was skipped is put in before the period named; that one and those after it get the next number.
+    /// Inserts a period that was skipped before the named period. That one and those after it move up by one number.
     Insert,
-    /// The period is taken out, with no report of it; those after it get the number before.
+    /// Removes the period, without a report. Those after it move down by one number.
     Remove,
 }
 

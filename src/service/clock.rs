@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use jiff::civil::Date;
 use jiff::tz::TimeZone;
 
-/// Where the service reads the time; tests put their own in.
+/// The source of the time; tests supply their own.
 #[derive(Clone)]
 pub struct Clock(Arc<dyn Fn() -> i64 + Send + Sync>);
 
@@ -20,7 +20,7 @@ impl fmt::Debug for Clock {
 }
 
 impl Clock {
-    /// A clock that answers milliseconds since 1970 from `read`.
+    /// Builds a clock from `read`, which returns milliseconds since 1970.
     pub fn new(read: impl Fn() -> i64 + Send + Sync + 'static) -> Self {
         Clock(Arc::new(read))
     }
@@ -32,24 +32,25 @@ impl Clock {
         })
     }
 
-    /// This clock, moved by `ahead_ms` backwards, which may change.
+    /// Returns this clock set back by `ahead_ms`, which may change.
     pub(super) fn behind(&self, ahead_ms: Arc<AtomicI64>) -> Self {
         let clock = self.clone();
         Clock::new(move || clock.now_milliseconds().saturating_sub(ahead_ms.load(Ordering::Relaxed)))
     }
 
-    /// Milliseconds since 1970-01-01 UTC.
+    /// Returns milliseconds since 1970-01-01 UTC.
     pub fn now_milliseconds(&self) -> i64 {
         (self.0)()
     }
 
-    /// The day in UTC. Nothing lies in the future of a clock that has left the calendar.
+    /// Returns the day in UTC. If the clock has left the calendar this is the last day, so that nothing lies in its
+    /// future.
     pub(super) fn today(&self) -> Date {
         day_of(self.now_milliseconds()).unwrap_or(Date::MAX)
     }
 }
 
-/// The day in UTC of a moment, in milliseconds since 1970.
+/// Returns the day in UTC of a time in milliseconds since 1970.
 pub(super) fn day_of(milliseconds: i64) -> Option<Date> {
     Some(Timestamp::from_millisecond(milliseconds).ok()?.to_zoned(TimeZone::UTC).date())
 }

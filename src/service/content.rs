@@ -1,8 +1,9 @@
-//! What is stored of a session as JSON.
+//! The JSON that is stored for a session.
 //!
-//! The start of a session of several assets has their names. In its entries, every map from them to numbers is replaced by
-//! the index of a list of those numbers in the order of the names, and each list is stored once: the size of an entry depends
-//! on how many assets there are, and not on what they are called.
+//! The start of a session with several assets holds their names. In its entries, each map from names to numbers is
+//! replaced by the index of a list of the numbers in the order of the names. Each list is stored once. So the size of
+//! an
+//! entry depends on the number of assets, and not on the length of their names.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use serde_json::{Map, Value, json as object};
 use super::error::ServiceError;
 use crate::store::EntryRow;
 
-/// The only key of an object that stands for a map from names; no field and no asset alone is called so.
+/// The only key of an object that stands for a map from names; no field has this name, and no lone asset.
 const LIST: &str = "$";
 const NUMBER_BYTES: usize = size_of::<f64>();
 
@@ -23,7 +24,7 @@ pub(super) fn read<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, ServiceEr
     serde_json::from_str(json).map_err(ServiceError::internal)
 }
 
-/// What an entry records, as it is stored.
+/// The stored form of an entry.
 pub(super) struct Packed {
     pub content_json: String,
     pub answer_json: String,
@@ -33,31 +34,31 @@ pub(super) struct Packed {
 }
 
 impl Packed {
-    /// Packs the entry of a session of the assets `names`, of which there are none where it is of one asset.
+    /// Packs the entry of a session with the assets `names`, which are empty for a session with one asset.
     pub(super) fn of(
         content: &impl Serialize,
         answer: &impl Serialize,
         names: &[String],
     ) -> Result<Self, ServiceError> {
         let (sent, mut lists) = (json(answer)?, Lists { names, numbers: Vec::new() });
-        // The content first: its lists are the first ones, whatever is answered.
+        // The content goes first, so that its lists come first and do not depend on the answer.
         let (content_json, answer_json) = (lists.text(content)?, lists.text(answer)?);
         Ok(Packed { content_json, answer_json, numbers: lists.numbers, sent })
     }
 }
 
-/// Whether `row` records this content.
+/// Returns whether `row` records this content.
 pub(super) fn records(row: &EntryRow, content: &impl Serialize, names: &[String]) -> Result<bool, ServiceError> {
     let mut lists = Lists { names, numbers: Vec::new() };
     Ok(row.content_json == lists.text(content)? && row.numbers.starts_with(&lists.numbers))
 }
 
-/// The content of an entry of a session of these assets.
+/// Reads the content of an entry of a session with these assets.
 pub(super) fn content<T: DeserializeOwned>(row: &EntryRow, names: &[String]) -> Result<T, ServiceError> {
     unpacked(&row.content_json, row, names)
 }
 
-/// The answer of an entry of a session of these assets.
+/// Reads the answer of an entry of a session with these assets.
 pub(super) fn answer<T: DeserializeOwned>(row: &EntryRow, names: &[String]) -> Result<T, ServiceError> {
     unpacked(&row.answer_json, row, names)
 }
@@ -70,7 +71,7 @@ fn unpacked<T: DeserializeOwned>(text: &str, row: &EntryRow, names: &[String]) -
     serde_json::from_value(value).map_err(ServiceError::internal)
 }
 
-/// Lists of a number for each of the names, one after the other.
+/// Lists of one number for each name, one list after the other.
 struct Lists<'a> {
     names: &'a [String],
     numbers: Vec<u8>,
@@ -96,7 +97,8 @@ impl Lists<'_> {
         }
     }
 
-    /// The index of a map from the names to numbers; of one to objects of numbers, that of each of their fields.
+    /// Returns the index of a map from names to numbers. For a map to objects of numbers, returns one index for each
+    /// field.
     fn packed(&mut self, map: &Map<String, Value>) -> Option<Value> {
         if map.len() != self.names.len() {
             return None;
@@ -151,7 +153,7 @@ fn unpack(value: Value, numbers: &[u8], names: &[String]) -> Result<Value, Servi
     }
 }
 
-/// The list of this index.
+/// Returns the list with this index.
 fn list(index: &Value, numbers: &[u8], names: &[String]) -> Result<Vec<f64>, ServiceError> {
     let index = index.as_u64().and_then(|index| usize::try_from(index).ok());
     let mut lists = numbers.chunks_exact(names.len() * NUMBER_BYTES);
@@ -181,7 +183,7 @@ mod tests {
         }
     }
 
-    /// `entry` as it comes back.
+    /// Packs and unpacks `entry`.
     fn through(entry: &Value, names: &[String]) -> (Packed, Value) {
         let packed = Packed::of(entry, entry, names).unwrap();
         let row = recorded(&packed);
@@ -204,7 +206,7 @@ mod tests {
         let (packed, back) = through(&entry, &names);
         assert_eq!(serde_json::to_string(&back).unwrap(), serde_json::to_string(&entry).unwrap());
         assert!(!packed.answer_json.contains("quoted"), "{}", packed.answer_json);
-        // The same list twice is stored once.
+        // A repeated list is stored once.
         assert_eq!(packed.numbers.len(), 5 * names.len() * NUMBER_BYTES);
     }
 

@@ -1,4 +1,4 @@
-//! A correction decided: the periods with its change, passed through from the start.
+//! Applies a correction: replays the changed periods from the start.
 
 use jiff::civil::Date;
 
@@ -12,23 +12,25 @@ use super::standing::Standing;
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
 
-/// What a correction makes of a session.
+/// The effect of a correction on a session.
 pub(super) struct PutRight {
-    /// Where it stood.
+    /// The state before the correction.
     pub before: Standing,
-    /// Where it stands now.
+    /// The state after it.
     pub standing: Standing,
-    /// Periods now.
+    /// Periods observed after it.
     pub observed: usize,
-    /// Of the period put right or in; `None` where it is missing, or taken out.
+    /// Log-return of the period corrected or inserted; `None` if it is missing or removed.
     pub log_return: Option<f64>,
-    /// By the last period, as it stands now.
+    /// Change of wealth over the last period, after the correction.
     pub wealth_change: f64,
 }
 
 impl Correct {
+    /// Checks the correction by itself.
+    ///
     /// # Errors
-    /// A number past the most, a reason that is empty or long.
+    /// The number is above the limit, or the reason is empty or too long.
     pub(super) fn check(&self) -> Result<(), FieldError> {
         if self.correction > MOST_CORRECTIONS {
             let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
@@ -46,10 +48,10 @@ impl Correct {
 }
 
 impl Periods {
-    /// Makes the change of the correction, the entry with this index, and passes through all periods.
+    /// Applies the change of the correction, the entry with this index, and replays all periods.
     ///
     /// # Errors
-    /// It is of no period that was observed, makes a period break a rule, or leaves a doubt that nobody confirms.
+    /// The correction names no observed period, makes a period break a rule, or raises a doubt without `confirm`.
     pub(super) fn put_right(
         &mut self,
         correction: &Correct,
@@ -82,7 +84,7 @@ impl Periods {
                     doubts.extend(gate::of_day(&before.days, report.date, periods_per_year, today));
                 }
             }
-            // Of a price that is put right, the return after it is another too.
+            // A corrected price also changes the return after it.
             if seen_before.as_ref() != Some(&seen) {
                 doubts.extend(
                     before.return_doubts(report, &seen).into_iter().map(|doubt| later(period, correction, doubt)),
@@ -99,10 +101,10 @@ impl Periods {
 }
 
 impl Stretch {
-    /// Whether the periods of the session, `observed` of them, may be changed so under this policy.
+    /// Checks that the `observed` periods of the session may be changed in this way under this policy.
     ///
     /// # Errors
-    /// The change moves periods by the policies before this one, or there is no room for a period more.
+    /// The change moves periods of earlier policies, or there is no room for one more period.
     pub(super) fn check_change(&self, correction: &Correct, observed: usize) -> Result<(), FieldError> {
         let Correct { period, change, .. } = *correction;
         if change.is_replace() {
@@ -126,7 +128,7 @@ impl Stretch {
     }
 }
 
-/// A field that breaks a rule in some period once another is put right.
+/// Names the period in which a field breaks a rule because of the correction of another one.
 fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldError {
     if period == correction.period {
         return error;
@@ -135,7 +137,7 @@ fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldErr
     FieldError { rule, ..error }
 }
 
-/// A doubt about some period once another is put right.
+/// Names the period of a doubt that comes from the correction of another one.
 fn later(period: usize, correction: &Correct, doubt: Doubt) -> Doubt {
     if period == correction.period {
         return doubt;

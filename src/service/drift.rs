@@ -1,4 +1,4 @@
-//! Whether a session's returns still come as those did on which its advice rests.
+//! Tests whether a session's returns still come from the same law as those behind its advice.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -8,27 +8,29 @@ use super::metrics::DRIFT_ALARMS;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exchangeability::{Capital, p_value};
 
-/// Capitals from which on it warns, and alarms. Where nothing changes, the chance of ever being alarmed is at most 1 %.
+/// Values of the test martingale that cause a warning and an alarm. If nothing changes, the chance of ever an alarm is
+/// at
+/// most 1 %.
 const WARNING: f64 = 20.0;
 const ALARM: f64 = 100.0;
-/// A larger capital is told as this.
+/// The largest value that is reported.
 const LARGEST: f64 = 1e12;
 
-/// A bet that the order of the returns means something. It wins where new returns lie further from the median of all than those
+/// A bet that the order of the returns matters. It wins if new returns lie further from the median of all than those
 /// before them did: their volatility or their mean has changed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Drift {
-    /// Of the last return: how much of the record lies as far from its median. Null where none was observed.
+    /// P-value of the last return: the share of the record that lies as far from its median. Null if none was observed.
     pub p_value: Option<f64>,
-    /// What a capital of 1 has become, at most 1e12.
+    /// The value of the test martingale, which starts at 1; at most 1e12.
     pub capital: f64,
-    /// The most that it ever was: of sessions where nothing changes, a share of at most 1 / c ever sees c.
+    /// Its highest value so far. If nothing changes, at most a share 1 / c of sessions ever reaches c.
     pub highest: f64,
-    /// By the highest: `warning` from 20 on, `alarm` from 100 on.
+    /// Level of the highest value: `warning` from 20 on, `alarm` from 100 on.
     pub level: DriftLevel,
 }
 
-/// What the highest capital says.
+/// The meaning of the highest value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DriftLevel {
@@ -40,7 +42,7 @@ pub enum DriftLevel {
     Alarm,
 }
 
-/// The bet of a session, and its last p-value.
+/// The drift test of a session, and its last p-value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bet {
     capital: Capital,
@@ -48,7 +50,8 @@ pub struct Bet {
 }
 
 impl Bet {
-    /// After `log_return`, the last that `record` learned, in `period` of `session`; of a missing one nothing is made.
+    /// Updates the test with `log_return`, the last one in `record`, of `period` of `session`. A missing return changes
+    /// nothing.
     #[must_use]
     pub(super) fn after(
         self,
@@ -62,13 +65,13 @@ impl Bet {
         Bet { capital: self.capital.after(p_value), p_value: Some(p_value) }
     }
 
-    /// As it is told.
+    /// Returns the test as answers show it.
     pub fn told(self) -> Drift {
         let [capital, highest] = [self.capital.log(), self.capital.log_highest()].map(|log| log.exp().min(LARGEST));
         Drift { p_value: self.p_value, capital, highest, level: self.level() }
     }
 
-    /// What the highest capital says.
+    /// Returns the level of the highest value.
     pub fn level(self) -> DriftLevel {
         match self.capital.log_highest().exp() {
             highest if highest >= ALARM => DriftLevel::Alarm,
@@ -78,8 +81,8 @@ impl Bet {
     }
 }
 
-/// A uniform number of (0, 1] that parts equal returns: the same whenever the period is passed through again, and nobody's to
-/// choose, since the name of a session is drawn at random.
+/// Returns a uniform number in (0, 1] that breaks ties between equal returns. It is the same at every replay. Clients
+/// cannot choose it because the name of a session is drawn at random.
 fn tie(session: &str, period: usize) -> f64 {
     let digest = Sha256::new().chain_update(session).chain_update((period as u64).to_le_bytes()).finalize();
     let bits = digest.iter().take(8).fold(0_u64, |bits, &byte| bits << 8 | u64::from(byte));
@@ -99,7 +102,8 @@ pub(super) fn count(before: DriftLevel, after: DriftLevel) {
 mod tests {
     use super::*;
 
-    /// Of 10,000 the largest gap of the empirical law from the uniform one is below 1.63 / sqrt(10,000) with 99 %.
+    /// For 10,000 draws, the largest gap between the empirical and the uniform law is below 1.63 / sqrt(10,000) with
+    /// probability 99 %.
     #[test]
     fn ties_are_parted_by_uniform_numbers() {
         let mut ties: Vec<f64> =

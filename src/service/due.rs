@@ -1,4 +1,4 @@
-//! When the next report of a session is due: by how many periods a year its policy has, a period after the last day it said.
+//! The day a session's next report is due: one period after its last reported day, by the periods a year of its policy.
 
 use jiff::ToSpan;
 use jiff::civil::{Date, Weekday};
@@ -7,13 +7,14 @@ use jiff::tz::TimeZone;
 use crate::store::FirstDay;
 
 const DAYS_A_YEAR: f64 = 365.25;
-/// Trading days in a year are this many or more.
+/// The least number of periods a year that counts as trading days.
 pub(super) const DAILY: f64 = 200.0;
-/// Nothing is late for longer: so many periods a year have a period of more days.
+/// The longest period in days, for policies with very few periods a year.
 const LONGEST_DAYS: f64 = 3_650.0;
 
-/// The last day of the period after the one that ended on `date`. The last day of a month stays that; markets rest on
-/// Saturdays and Sundays.
+/// Returns the last day of the period after the one that ended on `date`. The last day of a month is followed by the
+/// last
+/// day of a month. Markets are closed on Saturdays and Sundays.
 pub fn next_day(date: Date, periods_per_year: f64) -> Option<Date> {
     if periods_per_year <= 0.0 {
         return None;
@@ -42,7 +43,8 @@ pub fn next_day(date: Date, periods_per_year: f64) -> Option<Date> {
     }
 }
 
-/// The first day whose next one is not before `today`: a report is late where the last day said lies before it.
+/// Returns the first day whose next one is not before `today`: a report is late if its last reported day lies before
+/// it.
 pub fn first_day(today: Date, periods_per_year: f64) -> Option<FirstDay> {
     let is_late = |date: Date| next_day(date, periods_per_year).is_some_and(|next| next < today);
     let before = |date: Date| date.yesterday().ok();
@@ -59,7 +61,7 @@ pub fn first_day(today: Date, periods_per_year: f64) -> Option<FirstDay> {
 mod tests {
     use super::*;
 
-    /// Days of two years, one by one.
+    /// Every day of two years.
     #[test]
     fn a_report_is_late_where_its_next_day_is_past() {
         let today: Date = "2024-03-30".parse().unwrap();

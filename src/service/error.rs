@@ -1,4 +1,4 @@
-//! Why a use case could not be done.
+//! The errors of the use cases.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -63,7 +63,7 @@ impl ServiceError {
         ServiceError::Unknown { what, id: id.to_owned() }
     }
 
-    /// A period that was recorded and keeps a rule no more.
+    /// Wraps an error in a recorded period that no longer keeps a rule.
     pub(super) fn of_recorded((period, error): (usize, FieldError)) -> Self {
         ServiceError::Internal(format!("period {period}: {error}"))
     }

@@ -1,23 +1,23 @@
-//! Worst-case laws shown with an answer, and how much of them.
+//! Worst-case laws shown with an answer, and their limit.
 
 use serde::Deserialize;
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
 
-/// Points of a sweep times returns of the law up to which their worst-case laws are shown: some 10 MB.
+/// The most points of a sweep times returns of the law for which worst-case laws are shown: about 10 MB.
 const MOST_EXPLAINED: usize = 100_000;
-/// An atom of a worst-case law takes as much, written.
+/// Bytes of one atom of a worst-case law in an answer.
 pub(super) const ATOM_BYTES: usize = 100;
 
-/// What is shown beside an allocation.
+/// The explanation shown beside an allocation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Explain {
     WorstCase,
 }
 
-/// Returns of all the worst-case laws that an answer of so many points shows. Checked by:
+/// Returns the total number of returns in the worst-case laws that an answer of so many points shows. Checked by:
 /// `tests/operation/memory.rs::sweeps_that_explain_are_bounded_and_take_no_more_than_their_part`.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Keys as the store has them, looked at again and again.
+//! Refreshes the keys from the store at intervals.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use super::metrics;
 use super::shutdown::Shutdown;
 use crate::store::StoreError;
 
-/// Refreshes until the shutdown begins. Keys that are damaged are counted for as long as they are, so that their alert does
-/// not end before.
+/// Refreshes until shutdown begins. Damaged keys are counted at every refresh, so that their alert lasts as long as
+/// they do.
 pub(super) async fn keep_fresh(keys: Arc<Keys>, shutdown: Shutdown) {
     loop {
         tokio::select! {

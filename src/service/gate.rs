@@ -1,8 +1,8 @@
-//! What is doubted in a report before it is recorded: a day that is not about one period after the last one, a day in the
-//! future, a return far from the record, one that differs from its peers'.
+//! Doubts about a report before it is recorded: a day that is not about one period after the last one, a day in the
+//! future, a return far from the record, or one that differs from that of its peers.
 //!
-//! A doubt is no refusal: the report is recorded once it comes with `confirm`. One answer names every doubt, so nothing is
-//! confirmed that was not shown.
+//! A doubt is not a refusal: the report is recorded once it comes with `confirm`. One answer names every doubt, so that
+//! clients confirm only doubts that they were shown.
 
 use std::fmt;
 
@@ -16,27 +16,27 @@ use super::due::{DAILY, next_day};
 
 /// A return further from the record than so many of its standard deviations is doubted.
 const UNUSUAL_DEVIATIONS: f64 = 4.0;
-/// Log-returns this near to each other are the same one, told with two digits of a percent.
+/// Log-returns this close count as equal: they may be rounded to two digits of a percent.
 pub(super) const ROUNDING: f64 = 1e-4;
-/// Days from one trading day to the next, over a weekend and a holiday.
+/// The most days from one trading day to the next, over a weekend and a holiday.
 const LONGEST_WEEKEND: i32 = 4;
-/// Days of missing periods that are listed, ten years of months.
+/// The most days of missing periods that are listed: ten years of months.
 const LISTED: usize = 120;
-/// Missing periods that are counted.
+/// The most missing periods that are counted.
 const COUNTED: usize = 10_000;
 
-/// Something in a report that is most likely a slip.
+/// Something in a report that is probably a mistake.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Doubt {
     pub reason: DoubtReason,
     /// Dotted path of the field.
     #[schema(example = "date")]
     pub field: String,
-    /// Content of the field.
+    /// Value of the field.
     pub value: Value,
     /// The doubt, in one sentence.
     pub sentence: String,
-    /// Last days of the periods missing before the one reported, unless they are more than 120.
+    /// Last days of the periods missing before the reported one, unless they are more than 120.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(value_type = Vec<String>, example = json!(["2026-06-30", "2026-07-31"]))]
     pub missing: Vec<Date>,
@@ -54,7 +54,7 @@ pub enum DoubtReason {
     FutureDay,
     /// Its return lies more than 4 standard deviations from the record.
     UnusualReturn,
-    /// Most reports of the list for the same policy and day have another return.
+    /// Most reports in the list for the same policy and day have another return.
     DiffersFromPeers,
 }
 
@@ -68,13 +68,13 @@ impl Doubt {
         Doubt { reason, field: field.into(), value: value.into(), sentence, missing: Vec::new() }
     }
 
-    /// The rule that the field breaks.
+    /// Returns the rule that the field breaks.
     pub fn rule(&self) -> String {
         format!("must come with \"confirm\": true if it is meant: {}", self.sentence)
     }
 }
 
-/// Every doubt of a report.
+/// All doubts about a report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Doubts(pub Vec<Doubt>);
@@ -97,7 +97,7 @@ fn upper(sentence: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Doubts about the day of a report, `None` where it says none, after `days`.
+/// Returns the doubts about the day of a report after `days`; `date` is `None` if the report gives none.
 pub(super) fn of_day(days: &Days, date: Option<Date>, policy: Option<f64>, today: Date) -> Vec<Doubt> {
     let next = days.next(policy);
     let Some(day) = date.or(next) else { return Vec::new() };
@@ -115,7 +115,7 @@ fn in_the_future(day: Date, is_next: bool, today: Date) -> Option<Doubt> {
     Some(Doubt::new(DoubtReason::FutureDay, "date", day.to_string(), sentence))
 }
 
-/// Whether `day` is off the next one due, in a session that is reported to `last`.
+/// Returns a doubt if `day` is far from the next one due, in a session whose last reported day is `last`.
 fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt> {
     let (apart, half) = (days_between(last, day), days_between(last, next) / 2);
     let late = days_between(next, day);
@@ -129,13 +129,13 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
     }
     let mut missing = vec![next];
     while let Some(later) = next_day(missing[missing.len() - 1], periods).filter(|_| missing.len() < COUNTED) {
-        // The day is nearest to the end of the period that it ends.
+        // The day belongs to the period whose end is nearest.
         if days_between(day, later) > days_between(missing[missing.len() - 1], day) {
             break;
         }
         missing.push(later);
     }
-    // The last of them is the one reported.
+    // The last of them is the reported period.
     missing.pop();
     let sentence = match missing[..] {
         [] => format!("{day} comes {apart} days after {last}, the last day reported, and {next} was the next one due"),
@@ -151,7 +151,7 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
     Some(Doubt { missing, ..Doubt::new(DoubtReason::MissingPeriods, "date", day.to_string(), sentence) })
 }
 
-/// Doubts a log-return z that lies far from a record of mean m and standard deviation s: |z - m| > 4 s, at any size.
+/// Doubts a log-return z that lies far from a record with mean m and standard deviation s: |z - m| > 4 s, at any size.
 /// Checked by: `tests/service/gate.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
 pub(super) fn of_return(field: &str, value: f64, (mean, deviation): (f64, f64), log_return: f64) -> Option<Doubt> {
     let distance = (log_return - mean).abs();

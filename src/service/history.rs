@@ -1,4 +1,4 @@
-//! What a session was told, and what it would be told now.
+//! The answers that a session was given, and what they would be after its corrections.
 
 use std::collections::BTreeMap;
 
@@ -24,23 +24,23 @@ use crate::control::policy::advisor::AdviceMode;
 use crate::control::request::terms::Terms;
 use crate::store::{EntryKind, SessionFacts, SessionRow, Tenant};
 
-/// Where a session started, and everything recorded of it.
+/// The start of a session, and everything recorded since.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct History {
     pub session: String,
     /// The first policy.
     pub policy: String,
-    /// Rate, cost and flows of its periods, where none other are reported.
+    /// Rate, cost and flows of its periods, unless a report gives others.
     pub terms: Terms,
     pub initial_wealth: f64,
-    /// Share of it in the risky asset.
+    /// Share of wealth in the risky asset.
     pub initial_holding: f64,
-    /// Radius of the uncertainty set before the first period, in the unit of an advice's.
+    /// Radius of the uncertainty set before the first period, in the unit of an advice's radius.
     pub initial_radius: f64,
-    /// Names of the assets, where there are several.
+    /// Names of the assets, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<Vec<String>>,
-    /// What was told of them at the start.
+    /// Figures of the assets at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub composed: Option<Composed>,
     /// Log-returns known at the start.
@@ -51,52 +51,52 @@ pub struct History {
     pub renewals: Vec<Renewal>,
 }
 
-/// One period, observed or put in later.
+/// One period, observed or inserted later.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Observation {
-    /// What was answered when it was reported, with the number that it has now.
+    /// The answer when it was reported, with its present number.
     #[serde(flatten)]
     pub told: Observed,
-    /// What was reported first.
+    /// The first report of it.
     pub reported: Report,
     pub observed_ms: i64,
-    /// Numbers of the corrections that put it in or reported it anew.
+    /// Numbers of the corrections that inserted it or reported it again.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub corrections: Vec<usize>,
-    /// What would be told now; from the first period on that a correction changed.
+    /// The answer after all corrections; present from the first period that a correction changed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub now: Option<Now>,
 }
 
-/// A period with all corrections made.
+/// A period after all corrections.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Now {
-    /// What is reported of it now, where it was put right.
+    /// Its present report, if it was corrected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reported: Option<Report>,
-    /// Null where it is missing.
+    /// Null if it is missing.
     pub log_return: Option<f64>,
-    /// Of several assets, by their names.
+    /// Figures of several assets by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<AssetsNow>,
-    /// What would have been advised for it.
+    /// The allocation that would have been advised for it.
     pub advised_allocation: f64,
     pub executed_allocation: f64,
     /// Wealth at its end.
     pub wealth: f64,
-    /// Share of it in the risky asset.
+    /// Share of wealth in the risky asset.
     pub holding: f64,
-    /// Its last day, where it is known.
+    /// Its last day, if it is known.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
-    /// Radius of the uncertainty set after it, in the unit of an advice's.
+    /// Radius of the uncertainty set after it, in the unit of an advice's radius.
     pub radius: f64,
 }
 
-/// What stands of a period of several assets with all corrections made.
+/// A period of several assets after all corrections.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct AssetsNow {
-    /// By the names of the assets; null where they are missing.
+    /// Log-returns by asset name; null if they are missing.
     pub log_returns: Option<BTreeMap<String, f64>>,
 }
 
@@ -105,7 +105,7 @@ pub struct AssetsNow {
 pub struct Correction {
     #[serde(flatten)]
     pub correction: Correct,
-    /// What was answered to it.
+    /// The answer to it.
     pub told: Corrected,
     pub corrected_ms: i64,
 }
@@ -113,20 +113,21 @@ pub struct Correction {
 /// One renewal, as it was made.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Renewal {
-    /// What was answered to it.
+    /// The answer to it.
     #[serde(flatten)]
     pub told: Renewed,
-    /// Returns that the law was made of, the last ones; null where those were all.
+    /// Number of last returns that the law was made of; null if it used all.
     pub window: Option<usize>,
     pub renewed_ms: i64,
 }
 
 impl Sessions {
-    /// The session's start and every entry. Where a period was put right, those from it on are passed through and advised
-    /// again, each in a turn of those that solve.
+    /// Reads the session's start and every entry. From the first corrected period on, periods are replayed and advised
+    /// again.
+    /// Each needs a permit to solve.
     ///
     /// # Errors
-    /// There is no such session; too much is solved already.
+    /// There is no such session, or too much is being solved already.
     pub async fn history(
         &self,
         tenant: &Tenant,
@@ -174,8 +175,9 @@ impl Sessions {
         Ok(Large { value, room })
     }
 
-    /// Of each period from `first` on, the first that is not as it was acknowledged. Each waits its turn to be advised by itself, so
-    /// that a long session starves nobody, and a caller who goes away stops it.
+    /// Returns each period from `first` on, the first that differs from its acknowledgement. Each waits for its own
+    /// permit to
+    /// be advised. So a long session starves nobody, and a disconnected caller stops the work.
     async fn changed(
         &self,
         tenant: &Tenant,
@@ -193,7 +195,7 @@ impl Sessions {
             let (law, after) = (advising.clone(), passage.stands().state);
             let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
             let advice = self.resolving.run(tenant, advise).await?;
-            // The radius after a period is the one that the next advice is within.
+            // The radius after a period is the one of the next advice.
             changed.last_mut().into_iter().for_each(|(before, _)| before.radius = advice.radius);
             let inserted = match period.is_inserted() {
                 true => {
@@ -213,7 +215,7 @@ impl Sessions {
     }
 }
 
-/// What was put right, and the policies that followed the first, in their order.
+/// Returns the corrections and the renewals, each in order.
 fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction>, Vec<Renewal>), ServiceError> {
     let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
     for entry in &facts.entries {
@@ -234,10 +236,10 @@ fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction
     Ok((corrections, renewals))
 }
 
-/// A period as it stands now, and of one that was put in later what stands in the place of an answer to its observation.
+/// A period after all corrections. For an inserted period also the substitute for the answer to its observation.
 type Changed = (Now, Option<Observed>);
 
-/// Every period; `changed` holds those from `first` on.
+/// Returns every period; `changed` holds those from `first` on.
 fn observations(
     facts: &SessionFacts,
     periods: &Periods,
@@ -258,7 +260,7 @@ fn observations(
     periods.all.iter().enumerate().map(row).collect()
 }
 
-/// A period after which the session stands so.
+/// Builds the period that leaves the session in the state `after`.
 fn now(period: &Period, passed: Step, after: &Standing, advice: &Advice) -> Now {
     let Step { before, seen, log_return, executed_allocation, .. } = passed;
     let names = before.assets.as_ref().map(|assets| &assets.names);
@@ -275,7 +277,9 @@ fn now(period: &Period, passed: Step, after: &Standing, advice: &Advice) -> Now 
     }
 }
 
-/// A period that was put in later, as if it had been observed so; what was held counts as advised, since nothing was.
+/// Builds the answer for an inserted period as if it had been observed. The executed allocation counts as the advised
+/// one,
+/// because none was advised.
 fn inserted(
     (session, period): (&str, usize),
     passed: &Step,

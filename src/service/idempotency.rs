@@ -3,9 +3,11 @@
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
 
-/// Letters of an idempotency key.
+/// The most characters of an idempotency key.
 const KEY_LENGTH: usize = 255;
 
+/// Checks an idempotency key.
+///
 /// # Errors
 /// The key is empty, too long or has a control character.
 pub(super) fn check(key: &str) -> Result<(), FieldError> {

@@ -5,7 +5,7 @@ use rand::rngs::SysRng;
 
 use super::error::ServiceError;
 
-/// `prefix_` and 128 random bits of the operating system, in hexadecimal.
+/// Returns `prefix_` and 128 random bits from the operating system, in hexadecimal.
 ///
 /// # Errors
 /// The operating system gives no random bits.

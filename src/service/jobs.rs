@@ -1,4 +1,4 @@
-//! Jobs as their users see them: each tenant its own.
+//! Jobs as their users see them; each tenant sees only its own.
 
 use std::sync::Arc;
 
@@ -25,14 +25,14 @@ use crate::store::{
     Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Relabel, SessionTraining, Store, Tenant, TrainingRequest,
 };
 
-/// A job as stored, and how far it is where it runs in this process.
+/// A stored job, and its progress if it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
     pub row: JobRow,
     pub progress: Option<Progress>,
 }
 
-/// A job that was accepted, and what in its request may be a mistake.
+/// An accepted job, and what in its request may be a mistake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accepted {
     pub job: Job,
@@ -43,14 +43,14 @@ pub struct Accepted {
 struct Request<'a, C> {
     kind: JobKind,
     sent: &'a [u8],
-    /// The same with every default filled in.
+    /// The request with every default filled in.
     completed: &'a C,
     steps_total: usize,
     labels: Relabel,
 }
 
 impl<'a, C> Request<'a, C> {
-    /// Of a job that makes no policy.
+    /// Builds the request of a job that makes no policy.
     fn of(kind: JobKind, sent: &'a [u8], completed: &'a C, steps_total: usize) -> Self {
         Request { kind, sent, completed, steps_total, labels: Relabel::default() }
     }
@@ -76,11 +76,12 @@ impl Jobs {
         self.board.clone()
     }
 
-    /// Queues a training, whose policy is called as `labels` say. The same key and specification again give the same job,
-    /// whatever its policy is to be called.
+    /// Queues a training whose policy gets `labels`. The same key and specification again return the same job, whatever
+    /// the
+    /// labels are.
     ///
     /// # Errors
-    /// A field that breaks its rule, or asks for more memory than there is; a key used with another request.
+    /// A field breaks its rule or needs more memory than there is, or the key was used with another request.
     pub async fn train(
         &self,
         caller: &Caller,
@@ -95,8 +96,9 @@ impl Jobs {
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
-    /// Finds or queues the training that a session requests: all sessions of a tenant that need one policy share its job. The
-    /// same request again gives the same job, whatever it is to train.
+    /// Finds or queues the training that a session requests. All sessions of a tenant that need one policy share its
+    /// job. The
+    /// same request again returns the same job, whatever it trains.
     ///
     /// # Errors
     /// As [`Self::train`].
@@ -118,7 +120,7 @@ impl Jobs {
         Ok(training)
     }
 
-    /// Cancels the trainings made for sessions that none requests any more.
+    /// Cancels the trainings made for sessions if no session requests them any more.
     ///
     /// # Errors
     /// The store does not answer.
@@ -146,7 +148,7 @@ impl Jobs {
         Ok((self.queue(of, request, key).await?, completed))
     }
 
-    /// Completes a specification that there is memory to train by, and to advise by its policy.
+    /// Completes a specification, if there is memory to train its policy and to advise by it.
     fn admitted(&self, specification: Specification) -> Result<Specification, ServiceError> {
         let completed = specification.completed()?;
         self.memory.admits(&estimate::training(&completed, self.threads))?;
@@ -154,7 +156,8 @@ impl Jobs {
         Ok(completed)
     }
 
-    /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
+    /// Queues an evaluation of policies that the caller has checked. The same key and request again return the same
+    /// job.
     ///
     /// # Errors
     /// As [`Self::train`].
@@ -173,7 +176,7 @@ impl Jobs {
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
-    /// Queues a walk-forward. The same key and request again give the same job.
+    /// Queues a walk-forward. The same key and request again return the same job.
     ///
     /// # Errors
     /// As [`Self::train`].
@@ -204,7 +207,7 @@ impl Jobs {
         Ok(Accepted { job, warnings })
     }
 
-    /// Queues a frontier. The same key and request again give the same job.
+    /// Queues a frontier. The same key and request again return the same job.
     ///
     /// # Errors
     /// As [`Self::train`].
@@ -242,7 +245,7 @@ impl Jobs {
         })
     }
 
-    /// Queues what was `sent`, as it was completed.
+    /// Queues the completed form of the request that was `sent`.
     async fn queue(
         &self,
         (tenant, by): (&Tenant, Actor),
@@ -261,10 +264,10 @@ impl Jobs {
         }
     }
 
-    /// The report of a succeeded job that makes one, as JSON.
+    /// Returns the report of a succeeded job that makes one, as JSON.
     ///
     /// # Errors
-    /// There is no such job, or it has no report (yet); other large answers leave no room for it.
+    /// There is no such job, it has no report (yet), or other large answers leave no room for it.
     pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Large<Vec<u8>>, ServiceError> {
         let unknown = || ServiceError::unknown("report", job);
         let bytes = self.store.report_bytes(tenant, job).await?.ok_or_else(unknown)?;
@@ -273,13 +276,15 @@ impl Jobs {
         Ok(Large { value: report.into_bytes(), room })
     }
 
+    /// Returns one job of the tenant.
+    ///
     /// # Errors
     /// There is no such job.
     pub async fn get(&self, tenant: &Tenant, job: &str) -> Result<Job, ServiceError> {
         Ok(self.with_progress(self.of(tenant, job).await?))
     }
 
-    /// At most `limit` jobs, newest first, after the job with sequence `after`.
+    /// Lists at most `limit` jobs, newest first, after the job with sequence `after`.
     ///
     /// # Errors
     /// The store does not answer.
@@ -288,7 +293,7 @@ impl Jobs {
         Ok(rows.into_iter().map(|row| self.with_progress(row)).collect())
     }
 
-    /// Asks a job to stop: durably first, then the worker. Always accepted; a terminal job stays as it is.
+    /// Requests that a job stop: first durably, then at its worker. Always accepted; an ended job stays as it is.
     ///
     /// # Errors
     /// There is no such job.
@@ -306,7 +311,7 @@ impl Jobs {
     /// Deletes an ended job, its report and its idempotency key. A policy that it made stays.
     ///
     /// # Errors
-    /// There is no such job, or it is queued or runs.
+    /// There is no such job, or it is queued or running.
     pub async fn delete(&self, caller: &Caller, job: &str) -> Result<(), ServiceError> {
         match self.store.by(caller.actor()).delete_job(&caller.tenant, job).await? {
             DeleteJob::Deleted => Ok(()),
@@ -315,12 +320,12 @@ impl Jobs {
         }
     }
 
-    /// Changes whenever a job's state or progress may have changed.
+    /// Returns a receiver that changes whenever a job's state or progress may have changed.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.board.subscribe()
     }
 
-    /// The row, where it is the tenant's.
+    /// Returns the row if it belongs to the tenant.
     async fn of(&self, tenant: &Tenant, job: &str) -> Result<JobRow, ServiceError> {
         let row = self.store.job(job).await?.filter(|row| row.tenant == *tenant);
         row.ok_or_else(|| ServiceError::unknown("job", job))

@@ -1,13 +1,15 @@
-//! Who is calling: keys as their holders show them, and what each may do.
+//! Authenticates callers by their keys, and knows what each may do.
 //!
-//! A store without a key answers everybody as the default tenant. From its first key on it answers holders of keys alone,
-//! for good: revoking the last one closes the door, it does not take it off its hinges.
+//! A store without a key answers everybody as the default tenant. Once a store has a key, every call needs one, and
+//! this
+//! stays so after the last key is revoked.
 //!
-//! A request costs one hash and one look into memory. The store is asked every [`REFRESH`] instead, so a key made or
-//! revoked beside this process, or on another replica, counts within that time. While the store does not answer, what was
-//! known last holds; nothing else that needs the store answers then either. A key that expires is turned away at that
-//! moment whatever the store does: when is known beforehand, by the clock of the store. A key is rotated without a gap: its
-//! successor is in force before it expires itself.
+//! A request costs one hash and one lookup in memory. The store is read every [`REFRESH`] instead, so a key made or
+//! revoked by another process or replica counts within that time. While the store does not answer, the last known keys
+//! hold; nothing else that needs the store answers then either. An expired key is rejected from its expiry on, whatever
+//! the
+//! store does, because its expiry is known beforehand by the clock of the store. A key is rotated without a gap: its
+//! successor is in force before it expires.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
@@ -32,11 +34,11 @@ fn hash(text: &str) -> [u8; 32] {
     Sha256::digest(text).into()
 }
 
-/// Makes a key for a tenant, in force until `expires_ms` where that is given; its name, and its text, which is nowhere
-/// else.
+/// Makes a key for a tenant, in force until `expires_ms` if that is given. Returns its name and its text, which is kept
+/// nowhere else.
 ///
 /// # Errors
-/// The store does not take it, or there are no random bits.
+/// The store rejects it, or there are no random bits.
 pub async fn issue(
     ring: &KeyRing,
     tenant: Tenant,
@@ -52,18 +54,18 @@ pub async fn issue(
 
 /// A key and its successor.
 pub struct Rotated {
-    /// As it is now.
+    /// The old key with its new expiry.
     pub old: KeyRow,
     pub new: KeyRow,
-    /// Of the new one.
+    /// The secret of the new key.
     pub secret: Secret,
 }
 
-/// Makes a key in the place of `old`, with its tenant and roles, and has `old` expire after `overlap`. The new one is in
-/// force until `expires_ms`; unless that is given, for as long as the old one was made for.
+/// Makes a key that replaces `old`, with its tenant and roles, and lets `old` expire after `overlap`. The new one is in
+/// force until `expires_ms`; by default for as long as the old one was made for.
 ///
 /// # Errors
-/// There is no such key, or it is no longer in force; the store does not take it, or there are no random bits.
+/// There is no such key, it is no longer in force, the store rejects the new one, or there are no random bits.
 pub async fn rotate(
     ring: &KeyRing,
     old: &str,
@@ -82,21 +84,21 @@ pub async fn rotate(
     }
 }
 
-/// Who a request is answered to.
+/// The caller of a request.
 #[derive(Debug)]
 pub struct Caller {
     pub tenant: Tenant,
-    /// `None` where no key is asked for: everything is allowed.
+    /// `None` if no key is needed: everything is allowed.
     key: Option<KeyRow>,
-    /// As the audit names it, but for the time.
+    /// The caller as the audit names it, without the time.
     actor: Actor,
-    /// Shared by everybody of the tenant.
+    /// Shared by all callers of the tenant.
     pub allowance: Arc<Allowance>,
     clock: Clock,
     revoked: AtomicBool,
-    /// Of the key; a rotation brings it forward while the caller is let in already.
+    /// Expiry of the key; a rotation may bring it forward while the caller is connected.
     expires_ms: AtomicI64,
-    /// When it last called; 0 before.
+    /// Time of the last call; 0 before the first.
     used_ms: AtomicI64,
 }
 
@@ -109,12 +111,12 @@ impl Caller {
         Arc::new(Caller { tenant, key, actor, allowance, clock, revoked, expires_ms, used_ms })
     }
 
-    /// Who changes something now.
+    /// Returns the actor of a change made now.
     pub fn actor(&self) -> Actor {
         Actor { at_ms: self.clock.now_milliseconds(), ..self.actor.clone() }
     }
 
-    /// The name of the key, which is no secret; empty where none is asked for.
+    /// Returns the name of the key, which is not secret; empty if no key is needed.
     pub fn key(&self) -> &Arc<str> {
         &self.actor.key
     }
@@ -123,23 +125,23 @@ impl Caller {
         self.key.as_ref().is_none_or(|key| key.roles.include(role))
     }
 
-    /// The roles of the key, as text.
+    /// Returns the roles of the key as text.
     pub fn roles(&self) -> String {
         self.key.as_ref().map_or(String::new(), |key| key.roles.to_string())
     }
 
-    /// Whether it would be turned away by now: what goes on for long asks again.
+    /// Returns whether the key has ended by now. Long-running work checks this again.
     pub fn has_ended(&self) -> bool {
         let now_ms = || self.clock.now_milliseconds();
         self.revoked.load(Ordering::Relaxed) || self.expires_ms().is_some_and(|expires_ms| expires_ms <= now_ms())
     }
 
-    /// When the key ends, in milliseconds since 1970; `None` where that is not set.
+    /// Returns when the key ends, in milliseconds since 1970; `None` if it never does.
     pub fn expires_ms(&self) -> Option<i64> {
         Some(self.expires_ms.load(Ordering::Relaxed)).filter(|expires_ms| *expires_ms != NEVER)
     }
 
-    /// The key as it is now, where nothing of it changed but when it expires.
+    /// Takes over the expiry of `row` and returns true, if nothing else of the key changed.
     fn follow(&self, row: &KeyRow) -> bool {
         let expires_ms = row.expires_ms;
         let is_same = self.key.as_ref().is_some_and(|key| KeyRow { expires_ms, ..key.clone() } == *row);
@@ -151,44 +153,44 @@ impl Caller {
 
     fn note_use(&self) {
         let (now_ms, used_ms) = (self.clock.now_milliseconds(), self.used_ms.load(Ordering::Relaxed));
-        // Threads that share a key would fight for the line of memory at every call.
+        // Threads that share a key would contend for the cache line at every call.
         if now_ms - used_ms >= USE_PRECISION_MS {
             self.used_ms.store(now_ms, Ordering::Relaxed);
         }
     }
 }
 
-/// A time that does not come.
+/// A time that never comes.
 const NEVER: i64 = i64::MAX;
-/// When a key was last used is known to a second.
+/// The last use of a key is known to a second.
 const USE_PRECISION_MS: i64 = 1000;
 
-/// A key in force, as an operator watches it.
+/// A key in force, as an operator monitors it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyFigures {
     pub tenant: Tenant,
     pub key: String,
     pub expires_ms: Option<i64>,
-    /// When it last called this process; `None` where it never did.
+    /// Time of the last call to this process; `None` if there was none.
     pub used_ms: Option<i64>,
 }
 
-/// Why nobody is admitted. What was shown is not repeated.
+/// Why a caller is rejected. The text of the key is not repeated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Turned {
-    /// No key was shown.
+    /// No key was given.
     NoKey,
-    /// None that is in force.
+    /// The key is not in force.
     WrongKey {
-        /// Whose it was until it was revoked; that is for the operator's eyes.
+        /// Tenant of the key until it was revoked; for operators only.
         of: Option<Tenant>,
     },
-    /// One that was in force until then. Only who holds its text is told.
+    /// The key expired at that time. Only callers with its text learn this.
     Expired { of: Tenant, expires_ms: i64 },
 }
 
 impl Turned {
-    /// Of a key of the tenant that ended.
+    /// Builds the rejection of an ended key of the tenant.
     fn of(tenant: &Tenant, expires_ms: Option<i64>, is_revoked: bool) -> Self {
         match expires_ms.filter(|_| !is_revoked) {
             Some(expires_ms) => Turned::Expired { of: tenant.clone(), expires_ms },
@@ -197,7 +199,7 @@ impl Turned {
     }
 }
 
-/// The keys in force, as of the last look into the store.
+/// The keys in force, as of the last read of the store.
 pub struct Keys {
     store: Store,
     limits: Limits,
@@ -206,13 +208,13 @@ pub struct Keys {
 }
 
 struct Known {
-    /// Answers everybody; `None` from the first key on.
+    /// The caller for everybody; `None` once the store has a key.
     anybody: Option<Arc<Caller>>,
-    /// By the first eight bytes of the hash, which need not be compared in constant time to tell keys apart.
+    /// Keys by the first eight bytes of the hash. Finding a key by these need not take constant time.
     by_hash: HashMap<[u8; 8], Arc<Caller>>,
-    /// Keys that expired or were revoked, likewise.
+    /// Keys that expired or were revoked, in the same way.
     ended: HashMap<[u8; 8], KeyRow>,
-    /// Keys that are not what was written.
+    /// Keys that differ from what was written.
     damaged: Vec<String>,
     allowances: HashMap<Tenant, Arc<Allowance>>,
 }
@@ -228,15 +230,15 @@ impl Keys {
         Ok(keys)
     }
 
-    /// Whether requests are answered without a key.
+    /// Returns whether requests are answered without a key.
     pub fn are_absent(&self) -> bool {
         self.read().anybody.is_some()
     }
 
-    /// Who shows `text`, the part of an `Authorization: Bearer` after the scheme.
+    /// Returns the caller for `text`, the part of an `Authorization: Bearer` header after the scheme.
     ///
     /// # Errors
-    /// A key is asked for, and this is none.
+    /// A key is needed, and this is none.
     pub fn admit(&self, text: Option<&str>) -> Result<Arc<Caller>, Turned> {
         let known = self.read();
         if let Some(anybody) = &known.anybody {
@@ -258,7 +260,7 @@ impl Keys {
         }
     }
 
-    /// Every key in force, as far as this process knows.
+    /// Returns every key in force that this process knows.
     pub fn figures(&self) -> Vec<KeyFigures> {
         let known = self.read();
         let figures = known.by_hash.values().filter_map(|caller| {
@@ -276,7 +278,7 @@ impl Keys {
         figures
     }
 
-    /// Looks into the store.
+    /// Reads the keys from the store again.
     pub(super) async fn refresh(&self) -> Result<(), StoreError> {
         let keys = self.store.keys().await?;
         let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
@@ -291,7 +293,7 @@ impl Keys {
         Ok(())
     }
 
-    /// Keys that are not what was written.
+    /// Returns the keys that differ from what was written.
     pub(super) fn damaged(&self) -> Vec<String> {
         self.read().damaged.clone()
     }
@@ -303,7 +305,7 @@ impl Keys {
 }
 
 impl Known {
-    /// A key that is damaged closes as the first one does, and is none itself.
+    /// Replaces the known keys. A damaged key ends anonymous access as the first key does, but admits nobody itself.
     fn become_those(&mut self, keys: StoredKeys, limits: &Limits, clock: &Clock) {
         if !keys.is_empty()
             && let Some(anybody) = self.anybody.take()
@@ -318,7 +320,7 @@ impl Known {
                 self.ended.insert(start, row);
                 continue;
             }
-            // One that does not follow is left among those that are gone.
+            // A caller that cannot follow stays among those that are gone.
             let kept = before.get(&start).filter(|caller| caller.follow(&row)).cloned();
             if kept.is_some() {
                 before.remove(&start);
@@ -340,7 +342,7 @@ fn start(hash: &[u8; 32]) -> [u8; 8] {
     std::array::from_fn(|index| hash[index])
 }
 
-/// Takes the same time wherever the two differ.
+/// Compares in a time that does not depend on where the two differ.
 fn is_equal(one: &[u8; 32], other: &[u8; 32]) -> bool {
     std::hint::black_box(one.iter().zip(other).fold(0, |difference, (a, b)| difference | (a ^ b))) == 0
 }
@@ -455,7 +457,7 @@ mod tests {
         known(&keys, vec![expiring(Some(10_000)), row("b", "north", None)]);
         assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);
         assert!(keys.admit(Some("b")).is_ok() && keys.figures().len() == 1);
-        // Who is let in already ends with the key, should a rotation bring that forward.
+        // A connected caller ends with the key if a rotation brings its expiry forward.
         let follower = keys.admit(Some("b")).unwrap();
         known(&keys, vec![KeyRow { expires_ms: Some(20_000), ..row("b", "north", None) }]);
         assert!(!follower.has_ended() && Arc::ptr_eq(&follower, &keys.admit(Some("b")).unwrap()));

@@ -10,14 +10,14 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum KnownReturns {
-    /// Of one asset.
+    /// Returns of one asset.
     One(Vec<f64>),
-    /// Of several, date by date; each date has one for each asset.
+    /// Rows of several assets, one row a date; each row has one number for each asset.
     Several(Vec<Vec<f64>>),
 }
 
 impl KnownReturns {
-    /// Of one asset, or of so many, date after date.
+    /// Builds the history of one asset, or of so many from values date after date.
     pub(super) fn of(values: Vec<f64>, assets: Option<usize>) -> Self {
         match assets {
             None => KnownReturns::One(values),
@@ -25,7 +25,7 @@ impl KnownReturns {
         }
     }
 
-    /// Of one asset, or of several date after date.
+    /// Returns the values of one asset, or of several date after date.
     pub(super) fn values(self) -> Vec<f64> {
         match self {
             KnownReturns::One(values) => values,
@@ -34,7 +34,7 @@ impl KnownReturns {
     }
 }
 
-/// Read number by number or row by row, so that a fault is named by its place.
+/// Reads number by number or row by row, so that an error names its position.
 impl<'de> Deserialize<'de> for KnownReturns {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let dates = Vec::<Date>::deserialize(deserializer)?;

@@ -1,4 +1,4 @@
-//! What policies and sessions are called, and how that is changed.
+//! The labels of policies and sessions, and how to change them.
 
 use super::error::ServiceError;
 use super::keys::Caller;
@@ -14,7 +14,7 @@ impl Names {
         Names { store }
     }
 
-    /// What a policy or a session is called.
+    /// Returns the labels of a policy or a session.
     ///
     /// # Errors
     /// The store does not answer.
@@ -22,10 +22,10 @@ impl Names {
         Ok(self.store.labels(tenant, object).await?)
     }
 
-    /// Changes what a policy or a session is called; as it is called now.
+    /// Changes the labels of a policy or a session, and returns the new ones.
     ///
     /// # Errors
-    /// A field breaks a rule; there is no such thing; the tenant keeps as many bytes as it may.
+    /// A field breaks a rule, there is no such object, or the tenant's quota of bytes is used up.
     pub async fn change(
         &self,
         caller: &Caller,

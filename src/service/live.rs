@@ -20,17 +20,18 @@ use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
 use crate::store::{Seen, SessionFacts, SessionRow, Tenant};
 
-/// By what a call is answered, where its work is done, and what it must take before it solves.
+/// The resources that a call needs: its policy, the queues for its work, and the permits it must acquire before it
+/// solves.
 pub(super) struct Means<'a> {
     pub advisor: Arc<Advisor>,
     pub advising: &'a Bounded,
     pub resolving: &'a Bounded,
-    /// `None` of what the service does by itself.
+    /// `None` for the service's own work.
     pub turn: Option<&'a HeavyTurn>,
 }
 
 impl Means<'_> {
-    /// Says that heavy work comes next.
+    /// Acquires the permits for heavy work that comes next.
     async fn begin(&self) -> Result<(), ServiceError> {
         match self.turn {
             Some(turn) => Ok(turn.begin().await?),
@@ -39,20 +40,20 @@ impl Means<'_> {
     }
 }
 
-/// A session replayed from its entries. It holds no policy: what it is advised by is kept under its name, and may be dropped.
+/// A session replayed from its entries. It holds no policy: its advisor is cached under its name and may be dropped.
 #[derive(Clone)]
 pub struct Live {
     pub row: Arc<SessionRow>,
     pub standing: Standing,
     /// Periods observed.
     pub observed: usize,
-    /// Corrections of them.
+    /// Corrections of these periods.
     pub corrections: usize,
     /// Policies that followed the first.
     pub renewals: usize,
-    /// The one that advises the coming period.
+    /// The policy that advises the coming period.
     pub current: Arc<Stretch>,
-    /// How it is renewed by itself.
+    /// How the session renews itself.
     pub renew: Option<Renewing>,
     /// The rows it was replayed from.
     pub(super) seen: Seen,
@@ -65,11 +66,11 @@ pub struct Live {
 /// Bytes of a session in memory, and of each of its returns: in the law with its weight, and in the history.
 pub(super) const SESSION_BYTES: usize = 3000;
 const RETURN_BYTES: usize = 24;
-/// Of several assets: in the order of the columns, in the plan, and in what was told.
+/// Copies of the asset names: in the order of the columns, in the plan, and in the answers.
 const COPIES_OF_NAMES: usize = 8;
 
 impl Live {
-    /// The session that its entries tell of.
+    /// Replays a session from its entries.
     pub(super) fn replayed(facts: SessionFacts) -> Result<Live, ServiceError> {
         let periods = Periods::of(&facts)?;
         let standing = periods.replay()?.standing;
@@ -94,6 +95,8 @@ impl Live {
         SESSION_BYTES + RETURN_BYTES * self.standing.returns() + COPIES_OF_NAMES * names
     }
 
+    /// Checks that the session may report another period.
+    ///
     /// # Errors
     /// Every period of the horizon is observed.
     pub(super) fn goes_on(&self) -> Result<(), ServiceError> {
@@ -104,12 +107,12 @@ impl Live {
         Err(ServiceError::Completed { session: self.row.session.clone(), horizon })
     }
 
-    /// The last period that its policy advises.
+    /// Returns the last period that its policy advises.
     pub fn horizon(&self) -> usize {
         self.current.horizon()
     }
 
-    /// Whether the next policy is to be trained. Until it is there the session goes on by the one it has.
+    /// Returns whether the next policy is to be trained. Until it is there, the session goes on with the present one.
     pub fn is_due(&self) -> bool {
         self.is_due_after(self.observed)
     }
@@ -118,34 +121,37 @@ impl Live {
         self.current.is_due(observed, self.renew, self.renewals)
     }
 
-    /// Whether it is advised of a period after `observed` ones.
+    /// Returns whether the session is advised for a period after `observed` ones.
     fn goes_on_after(&self, observed: usize) -> bool {
         observed < self.horizon() || self.is_due_after(observed)
     }
 
-    /// The last period that it may report: of one that waits for its next policy, as many past the horizon as that has.
+    /// Returns the last period that may be reported. A session that waits for its next policy may report one more
+    /// horizon.
     fn last_period(&self) -> usize {
         self.horizon() + if self.is_due() { self.current.terms.horizon } else { 0 }
     }
 
-    /// The step of its policy that advises the coming period.
+    /// Returns the step of its policy that advises the coming period.
     pub(super) fn step(&self) -> usize {
         self.current.step(self.observed)
     }
 
-    /// The step that advises the period after the coming one, if one does.
+    /// Returns the step that advises the period after the coming one, if there is one.
     pub(super) fn following(&self) -> Option<usize> {
         let observed = self.observed + 1;
         self.goes_on_after(observed).then(|| self.current.step(observed))
     }
 
-    /// The last day of the coming period, where it is known.
+    /// Returns the last day of the coming period, if it is known.
     pub fn next_day(&self) -> Option<Date> {
         self.standing.days.next(self.current.terms.periods_per_year).filter(|_| self.goes_on_after(self.observed))
     }
 
+    /// Checks the report and its doubts.
+    ///
     /// # Errors
-    /// The report breaks a rule, or it is doubted and nobody confirms it.
+    /// The report breaks a rule, or it is doubted and comes without `confirm`.
     fn check_meant(&self, observe: &Observe, report: &Report, today: Date) -> Result<(), ServiceError> {
         let seen = self.standing.read(report)?;
         if observe.confirm {
@@ -167,8 +173,9 @@ impl Live {
         if period == expected { Ok(()) } else { Err(ServiceError::Gap { what: "period", given: period, expected }) }
     }
 
-    /// The surrogate's advice for the coming period, computed once: here where that takes less than a thread would, else
-    /// on a thread that may block. A state outside the design is solved, which is heavy from there on.
+    /// Returns the surrogate's advice for the coming period, computed once. A short computation runs here, a longer one
+    /// on a
+    /// thread that may block. A state outside the design is solved, which is heavy work.
     pub(super) async fn surrogate_advice(&mut self, means: &Means<'_>) -> Result<&Advice, ServiceError> {
         let step = self.step();
         let advice = match self.advice.take() {
@@ -186,7 +193,7 @@ impl Live {
         Ok(self.advice.insert(advice))
     }
 
-    /// What the surrogate says of the state, unless that lies outside the design.
+    /// Returns the surrogate's prediction for the state, unless the state lies outside the design.
     async fn predicted(&self, step: usize, means: &Means<'_>) -> Result<Result<Advice, OutsideDesign>, ServiceError> {
         let predict = move |advisor: &Advisor, state: &State, radius: Option<f64>| {
             let radius = radius.unwrap_or_else(|| advisor.radius(state));
@@ -199,7 +206,7 @@ impl Live {
         means.advising.run(&self.row.tenant, move || predict(&advisor, &state, radius)).await
     }
 
-    /// Where the report leads, and the answer to it; nothing is changed yet but the memoised advice.
+    /// Returns the state after the report and the answer to it. Nothing changes yet but the memoised advice.
     pub(super) async fn after(
         &mut self,
         observe: &Observe,
@@ -241,8 +248,9 @@ impl Live {
     }
 }
 
-/// The uncertainty set before `step` of the policy; of several assets, once their composition is chosen, which is heavy where
-/// it must be solved for.
+/// Returns the uncertainty set before `step` of the policy. For several assets the composition is chosen first, which
+/// is
+/// heavy work if it needs a solve.
 pub(super) async fn measured(
     means: &Means<'_>,
     tenant: &Tenant,
@@ -265,7 +273,7 @@ pub(super) async fn measured(
     let measure = move || {
         standing.compose(&advisor, step);
         let (uncertainty, reached) = (advisor.uncertainty(&standing.state), standing.state.clone());
-        // The first session to get this far: the next advice finds its common random numbers simulated.
+        // If this is the first session to get this far, the next advice finds its common random numbers simulated.
         ((standing, uncertainty), move || advisor.prepare(step, &reached))
     };
     turns.run_and_prepare(tenant, measure).await

@@ -1,8 +1,10 @@
-//! One budget in bytes for the process, and who may use which part of it.
+//! One memory budget for the process in bytes, and the part that each use may take.
 //!
-//! The limit is divided once, at the start: jobs, what is kept ready, what is being made ready, live sessions, and the
-//! process itself with its connections. No part takes another's, so that a training never drives out what sessions
-//! live by, and sessions never end a training.
+//! The limit is divided once, at the start: jobs, what is cached, what is being prepared for the cache, live sessions,
+//! and
+//! the process itself with its connections. No part takes from another. So a training never evicts what sessions need,
+//! and
+//! sessions never end a training.
 
 use std::fmt;
 use std::fs;
@@ -20,32 +22,32 @@ use crate::control::error::FieldError;
 use crate::control::estimate::Footprint;
 use crate::control::kept::{Kept, Part};
 
-/// Parts of the limit, in eighths. What is being made ready has half of what is kept, as [`Kept`] has it.
+/// Parts of the limit, in eighths. Preparation for the cache has half as much as the cache, as in [`Kept`].
 const EIGHTHS_FOR_JOBS: usize = 3;
 const EIGHTHS_KEPT: usize = 2;
 const EIGHTHS_FOR_SESSIONS: usize = 1;
-/// Share of what the system gives that is taken where nobody chose: the rest is for the kernel's own and for others.
+/// Share of the system's memory to take by default: the rest is for the kernel and for others.
 const PERCENT_TAKEN: u64 = 80;
-/// Part of the limit that large answers may take together: half of what the process has for itself, as bodies have the other.
+/// Divisor of the limit for large answers together: half of the process's own part, because bodies have the other half.
 const PART_FOR_ANSWERS: usize = 16;
-/// An answer is held twice while it is read: by the store's engine and by us.
+/// An answer is held twice while it is read: by the store's engine and by the service.
 const COPIES_OF_AN_ANSWER: usize = 2;
-/// How long one waits for the others before its caller is told to come again.
+/// How long a large answer waits for others before its caller is told to retry later.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
-/// Bytes that a permit of a semaphore stands for: its permits are counted in 32 bits. An answer of no more is not counted; the
-/// connections bound those.
+/// Bytes of one permit of a semaphore, because permits are counted in 32 bits. Answers up to this size are not counted;
+/// the connection limit bounds them.
 pub const UNIT: usize = 1 << 16;
 
-/// Where a limit comes from.
+/// The origin of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     Chosen,
-    /// The limit of the control group the process is in.
+    /// The limit of the process's control group.
     Container,
     /// The limit of its address space.
     AddressSpace,
     Machine,
-    /// The system does not tell.
+    /// The system gives no limit.
     Unknown,
 }
 
@@ -56,7 +58,7 @@ pub struct MemoryLimit {
     pub origin: Origin,
 }
 
-/// Taken where the system does not tell how much there is.
+/// Assumed if the system does not say how much memory there is.
 const UNKNOWN_BYTES: u64 = 2 << 30;
 
 impl MemoryLimit {
@@ -64,7 +66,7 @@ impl MemoryLimit {
         MemoryLimit { bytes, origin: Origin::Chosen }
     }
 
-    /// 80 % of the least that the container, the address space or the machine gives.
+    /// Returns 80 % of the least that the container, the address space or the machine gives.
     pub fn of_the_system() -> Self {
         let found = [
             (Origin::Container, container_limit()),
@@ -132,18 +134,18 @@ pub struct Memory {
     limit: MemoryLimit,
     kept: Kept,
     jobs: Arc<Semaphore>,
-    /// Of that semaphore, when no job runs.
+    /// Permits of that semaphore when no job runs.
     permits: usize,
     answers: Arc<Semaphore>,
-    /// Of that one, when nothing large is sent.
+    /// Permits of that semaphore when no large answer is sent.
     answer_permits: usize,
 }
 
-/// Bytes reserved by a job or an answer until this is dropped.
+/// Bytes reserved by a job or an answer, released on drop.
 pub struct Reserved(OwnedSemaphorePermit);
 
 impl Reserved {
-    /// What of it `bytes` take, once they are known; `None` where they are so few that they are not counted.
+    /// Keeps only what `bytes` take, once they are known; `None` if they are too few to be counted.
     pub fn only(self, bytes: usize) -> Option<Self> {
         let Reserved(mut permits) = self;
         let needed = if bytes <= UNIT { 0 } else { bytes.div_ceil(UNIT) };
@@ -163,33 +165,33 @@ impl Memory {
         Memory { limit, kept, jobs, permits, answers, answer_permits }
     }
 
-    /// What is kept ready for requests.
+    /// Returns the cache of what is kept ready for requests.
     pub fn kept(&self) -> Kept {
         self.kept.clone()
     }
 
-    /// Bytes for the jobs under way.
+    /// Returns the bytes for running jobs.
     pub fn for_jobs(&self) -> usize {
         eighths(self.limit, EIGHTHS_FOR_JOBS)
     }
 
-    /// Bytes for the sessions in memory.
+    /// Returns the bytes for sessions in memory.
     pub fn for_sessions(&self) -> usize {
         eighths(self.limit, EIGHTHS_FOR_SESSIONS)
     }
 
-    /// Whether a job of this estimate can ever run here.
+    /// Checks that a job of this estimate can ever run here.
     ///
     /// # Errors
-    /// The field that asks for most, with the estimate and the limit.
+    /// The field that needs most memory, with the estimate and the limit.
     pub fn admits(&self, estimate: &Footprint) -> Result<(), FieldError> {
         refuse_above(self.for_jobs(), "the job", estimate)
     }
 
-    /// Whether each of these can be kept ready for requests.
+    /// Checks that each of these can be kept ready for requests.
     ///
     /// # Errors
-    /// The field that asks for most, with the estimate and the limit.
+    /// The field that needs most memory, with the estimate and the limit.
     pub fn keeps(&self, things: &[Footprint]) -> Result<(), FieldError> {
         things.iter().try_for_each(|thing| refuse_above(self.kept.heaviest(), "one of its parts", thing))
     }
@@ -202,10 +204,11 @@ impl Memory {
         Ok(Reserved(permits))
     }
 
-    /// Waits until the other large answers leave room for one of so many bytes; what is larger than all the room has it alone.
+    /// Waits until the other large answers leave room for so many bytes. An answer larger than all the room gets it
+    /// alone.
     ///
     /// # Errors
-    /// They do not within [`LONGEST_WAIT`].
+    /// There is no room within [`LONGEST_WAIT`].
     pub(super) async fn answers(&self, bytes: usize) -> Result<Option<Reserved>, ServiceError> {
         if bytes <= UNIT {
             return Ok(None);
@@ -215,7 +218,7 @@ impl Memory {
         room.map_err(|_| ServiceError::Busy)?.map(Reserved).map(Some).map_err(ServiceError::internal)
     }
 
-    /// Tells the recorder how much each part takes now, `live_sessions` of them the sessions.
+    /// Records how much memory each part takes now; `live_sessions` are the bytes of the sessions.
     pub(super) fn record(&self, live_sessions: usize) {
         gauge!(names::MEMORY, "part" => "live_sessions").set(live_sessions as f64);
         gauge!(names::MEMORY_LIMIT).set(self.limit.bytes as f64);
@@ -235,14 +238,14 @@ impl Memory {
     }
 }
 
-/// What takes much memory, with the room reserved for it until it is dropped or sent.
+/// A value that takes much memory, with the room reserved until it is dropped or sent.
 pub struct Large<T> {
     pub value: T,
     pub room: Option<Reserved>,
 }
 
 impl<T> From<T> for Large<T> {
-    /// Of what is small.
+    /// Wraps a small value without a reservation.
     fn from(value: T) -> Self {
         Large { value, room: None }
     }
