@@ -252,7 +252,7 @@ impl<T> From<T> for Large<T> {
 }
 
 impl<T> Large<T> {
-    /// The value made into another that takes as much.
+    /// Converts the value to another one that takes as much memory.
     pub fn map<U>(self, make: impl FnOnce(T) -> U) -> Large<U> {
         Large { value: make(self.value), room: self.room }
     }
@@ -279,7 +279,7 @@ fn refuse_above(limit: usize, what: &str, estimate: &Footprint) -> Result<(), Fi
     Err(FieldError::new(estimate.field(), estimate.value(), rule))
 }
 
-/// The least limit of the control groups above the process, of the second version or the first.
+/// Returns the least limit of the control groups above the process, of version 2 or 1.
 fn container_limit() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let limits = groups.lines().filter_map(|line| {
@@ -292,19 +292,19 @@ fn container_limit() -> Option<u64> {
             }
             _ => return None,
         };
-        // Within a container the path may be the host's, which is not there, and the root is the container's own.
+        // Within a container the path may be the host's and absent here; the root is then the container's own.
         let group = Path::new(root).join(path.trim_start_matches('/'));
         group.ancestors().take_while(|above| above.starts_with(root)).filter_map(|at| number(&at.join(file))).min()
     });
     limits.min()
 }
 
-/// `max` where there is no limit, which is no number.
+/// Returns `None` if there is no limit: the file then reads `max`, which is not a number.
 fn number(file: &Path) -> Option<u64> {
     fs::read_to_string(file).ok()?.trim().parse().ok()
 }
 
-/// The soft limit of `ulimit -v`.
+/// Returns the soft limit of `ulimit -v`.
 fn address_space_limit() -> Option<u64> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
@@ -350,7 +350,7 @@ mod tests {
         let memory = Memory::new(limit);
         let gigabyte = 1 << 30;
         assert_eq!((memory.for_jobs(), memory.for_sessions()), (3 * gigabyte, gigabyte));
-        // What is kept has two eighths, no part of it more than half of them, and what is being made one eighth.
+        // The cache has two eighths, no part of it more than half of them, and preparation has one eighth.
         assert_eq!(memory.kept.heaviest(), gigabyte);
         assert_eq!(EIGHTHS_FOR_JOBS + EIGHTHS_KEPT + EIGHTHS_KEPT / 2 + EIGHTHS_FOR_SESSIONS, 7);
     }

@@ -1,4 +1,4 @@
-//! Names and meanings of the metrics; base units, `_total` for counters.
+//! Names and descriptions of the metrics; base units, `_total` for counters.
 
 use std::fmt::Write;
 
@@ -15,17 +15,17 @@ pub const ACTION_SECONDS: &str = "ballast_action_duration_seconds";
 pub const HTTP_REQUEST_SECONDS: &str = "ballast_http_request_duration_seconds";
 pub const HTTP_REQUESTS: &str = "ballast_http_requests_total";
 pub const JOBS: &str = "ballast_jobs";
-/// Connections held, by what they do.
+/// Open connections, by phase.
 pub const CONNECTIONS: &str = "ballast_connections";
 pub const CONNECTIONS_REFUSED: &str = "ballast_connections_refused_total";
 pub const CERTIFICATE_LOADS: &str = "ballast_certificate_loads_total";
-/// When the certificate in force, or one of its chain, expires.
+/// Time at which the certificate in force, or one of its chain, expires.
 pub const CERTIFICATE_EXPIRES: &str = "ballast_certificate_expiry_timestamp_seconds";
 pub const SESSIONS: &str = "ballast_sessions";
 pub const TURNS_WAITING: &str = "ballast_turns_waiting";
 pub const MEMORY: &str = "ballast_memory_bytes";
 pub const MEMORY_LIMIT: &str = "ballast_memory_limit_bytes";
-/// By tenant and status. Tenants are those that have or had a key; whoever shows none is of none.
+/// By tenant and status. Tenants are those that have or had a key; a call without a key has no tenant.
 pub const REFUSALS: &str = "ballast_refusals_total";
 pub const PROBLEMS: &str = "ballast_problems_total";
 pub const STORE_FAILURES: &str = "ballast_store_failures_total";
@@ -46,7 +46,8 @@ pub const STEP_BUCKETS: [f64; 10] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0
 /// Upper bounds of the buckets of requests, in seconds: the target of `/action` is a millisecond.
 pub const REQUEST_BUCKETS: [f64; 11] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.25, 1.0, 10.0];
 
-/// The figures of keys in the text exposition format. Not by the recorder, which would show a key for ever after it ended.
+/// Returns the figures of keys in the text exposition format. They bypass the recorder, which would show a key for ever
+/// after it ended.
 pub fn of_keys(keys: &[KeyFigures]) -> String {
     let mut text = String::new();
     let mut family = |name: &str, help: &str, figure: fn(&KeyFigures) -> Option<i64>| {
@@ -62,8 +63,8 @@ pub fn of_keys(keys: &[KeyFigures]) -> String {
     text
 }
 
-/// Causes of [`STORE_FAILURES`]: rows that are not what was written, no room, not reached, and the rest, which are defects or
-/// end the process.
+/// Causes of [`STORE_FAILURES`]: damaged rows, no room, no connection, and the rest, which are defects or end the
+/// process.
 const CAUSES: [&str; 4] = ["corrupt", "full", "unavailable", "other"];
 
 /// Counts a failure of the store by its cause.
@@ -77,9 +78,9 @@ pub fn count_failure(error: &StoreError) {
     counter!(STORE_FAILURES, "cause" => cause).increment(1);
 }
 
-/// Tells the recorder what each metric means.
+/// Describes each metric to the recorder.
 pub fn describe() {
-    // Shown as never met, so that the first one is seen as an increase.
+    // Each cause starts at 0, so that the first failure shows as an increase.
     for cause in CAUSES {
         counter!(STORE_FAILURES, "cause" => cause).increment(0);
     }
@@ -148,12 +149,12 @@ pub fn describe() {
     metrics::counter!(JOBS_EXPIRED).absolute(0);
 }
 
-/// Records how far the clock is ahead of the one it should be.
+/// Records how far the clock is ahead of its reference.
 pub fn record_skew(seconds: i64) {
     gauge!(CLOCK_SKEW_SECONDS).set(seconds as f64);
 }
 
-/// Records how old the oldest jobs are at `now_ms` and what room the store takes.
+/// Records the age of the oldest jobs at `now_ms` and the space that the store takes.
 pub fn record_store(oldest: OldestJobs, room: Room, now_ms: i64) {
     for (state, since) in [("queued", oldest.queued_ms), ("running", oldest.running_ms)] {
         let age_ms = since.map_or(0, |since| now_ms.saturating_sub(since).max(0));

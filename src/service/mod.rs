@@ -1,7 +1,7 @@
 //! Floor 3: use cases: train, open a session, observe, act. No HTTP types.
 //!
-//! [`Service`] is what a transport needs: the store, the jobs and their trainer, the policies made ready to answer,
-//! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
+//! [`Service`] is all that a transport needs: the store, the jobs and their trainer, the prepared policies and the live
+//! sessions. Everything acknowledged is in the store first; memory only saves recomputing.
 
 mod acknowledged;
 pub mod action;
@@ -89,7 +89,7 @@ use crate::store::{JobCounts, Store, StoreError};
 /// The use cases over one store.
 pub struct Service {
     pub audit: Audit,
-    /// Where large bodies are decoded.
+    /// The queue for decoding large bodies.
     pub decoding: Bounded,
     pub jobs: Jobs,
     pub keys: Arc<Keys>,
@@ -105,10 +105,12 @@ pub struct Service {
 }
 
 impl Service {
-    /// Opens the store, starts the trainer where the role has one.
+    /// Opens the store, and starts the trainer if the role has one.
     ///
     /// # Errors
-    /// The role does not fit the store, others reach the address and nobody would be asked for a key, the store cannot be opened, or the training thread cannot be started.
+    /// The role does not fit the store, the store or the training thread cannot be started, or a store that has lost
+    /// its keys
+    /// or must have one holds none. Also if others reach the address and no key would be needed.
     pub async fn start(config: &Config, clock: Clock, shutdown: Shutdown) -> Result<Arc<Self>, ServiceError> {
         let store = match &config.store {
             StoreLocation::Folder(_) if config.role != Role::All => {
@@ -122,7 +124,7 @@ impl Service {
         };
         let store = store.with_quotas(config.quotas);
         let time = Arc::new(Timekeeper::new(store.clone(), clock));
-        // The first look, before anything is dated.
+        // The first comparison of the clocks comes before anything is dated.
         time.time_to_delete_by().await?;
         let clock = time.clock();
         let keys = Arc::new(Keys::load(store.clone(), config.limits.clone(), clock.clone()).await?);
@@ -171,11 +173,11 @@ impl Service {
         }))
     }
 
-    /// Queues an evaluation. The same key and request again give the same job.
+    /// Queues an evaluation. The same key and request again return the same job.
     ///
     /// # Errors
-    /// A field that breaks its rule, a policy that is absent or was trained for another problem among them; a key used
-    /// with another request.
+    /// A field breaks its rule (for example a policy that is absent or was trained for another problem), or the key was
+    /// used with another request.
     pub async fn evaluate(
         &self,
         caller: &Caller,
@@ -195,16 +197,17 @@ impl Service {
         self.jobs.evaluate(caller, request, key).await
     }
 
-    /// Resolves should the store fail past recovery. After a failed fsync or an I/O error memory and disk may disagree, so the process
-    /// must end: only a restart finds the truth.
+    /// Resolves if the store fails past recovery. After a failed fsync or an I/O error memory and disk may disagree. So
+    /// the
+    /// process must end: only a restart can find the true state.
     pub async fn store_failed(&self) -> StoreError {
         self.store.until_fatal().await
     }
 
-    /// Whether the store answers and the service is not draining.
+    /// Succeeds if the store answers and the service is not draining.
     ///
     /// # Errors
-    /// Which of the two is not so.
+    /// Says which of the two does not hold.
     pub async fn ready(&self) -> Result<(), ServiceError> {
         if self.shutdown.is_announced() {
             return Err(ServiceError::Draining);
@@ -212,12 +215,12 @@ impl Service {
         Ok(self.store.ping().await?)
     }
 
-    /// How many seconds this machine's clock is ahead of the one it should be; 0 if it is right enough to delete by.
+    /// Returns how many seconds this machine's clock is ahead of its reference; 0 if it is right enough to delete by.
     pub fn clock_skew_seconds(&self) -> i64 {
         self.time.skew_seconds()
     }
 
-    /// Jobs in each state, and the number of sessions.
+    /// Returns the number of jobs in each state, and the number of sessions.
     ///
     /// # Errors
     /// The store does not answer.
@@ -225,26 +228,26 @@ impl Service {
         Ok((self.store.count_jobs_by_state().await?, self.store.count_sessions().await?))
     }
 
-    /// Requests that wait for their turn to be advised, to have a step solved, and to have their body decoded.
+    /// Returns how many requests wait to be advised, to have a step solved, and to have their body decoded.
     pub fn waiting(&self) -> [(&'static str, usize); 3] {
         let Sessions { advising, resolving, .. } = &self.sessions;
         [advising, resolving, &self.decoding].map(|turns| (turns.name, turns.waiting()))
     }
 
-    /// Waits until the other large answers leave room for one of so many bytes; `None` where it is small.
+    /// Waits until the other large answers leave room for so many bytes; `None` if the answer is small.
     ///
     /// # Errors
-    /// They do not in time.
+    /// There is no room in time.
     pub async fn room_for(&self, bytes: usize) -> Result<Option<Reserved>, ServiceError> {
         self.memory.answers(bytes).await
     }
 
-    /// Tells the recorder what takes memory now.
+    /// Records what takes memory now.
     pub fn record_memory(&self) {
         self.memory.record(self.sessions.bytes());
     }
 
-    /// Records how old the oldest jobs are and what room the store takes.
+    /// Records the age of the oldest jobs and the space that the store takes.
     ///
     /// # Errors
     /// The store does not answer.
@@ -263,8 +266,10 @@ impl Service {
     }
 }
 
+/// Rejects a store without a key that must have one.
+///
 /// # Errors
-/// The store is to have a key, or had one, and has none.
+/// The store must have a key, or had one, and has none.
 fn refuse_lost_keys(store: &Store, config: &Config) -> Result<(), ServiceError> {
     match store.key_mark() {
         Some(mark) => Err(ServiceError::KeysLost { mark }),

@@ -15,15 +15,15 @@ use crate::store::{
     Care, CareCounts, Counted, SessionList, SessionPlace, SessionQuery, SessionSummary, StoreError, Today,
 };
 
-/// A session of a list, and where it stands by its last entry.
+/// A session in a list, and its state after its last entry.
 #[derive(Debug)]
 pub struct Listed {
     pub row: SessionSummary,
     /// `None` before the first report.
     pub stands: Option<Stands>,
-    /// The last day that its next report is not late, by the calendar of its policy.
+    /// The last day on which its next report is not late, by the calendar of its policy.
     pub next: Option<Date>,
-    /// Why it needs care.
+    /// Why it needs attention.
     pub care: Vec<Care>,
 }
 
@@ -31,21 +31,21 @@ pub struct Listed {
 #[derive(Debug)]
 pub struct Overview {
     pub sessions: Vec<Listed>,
-    /// Sessions of the page that are not what was written: nothing of them is shown.
+    /// Damaged sessions of the page; nothing of them is shown.
     pub damaged: Vec<String>,
-    /// The place of the last row, sound or not, if the page is full.
+    /// Position of the last row, sound or not, if the page is full.
     pub last: Option<SessionPlace>,
-    /// Where it was asked for.
+    /// Present if requested.
     pub total: Option<usize>,
-    /// Of those that match in whatever state, where it was asked for.
+    /// Counts over the matching sessions in every state, if requested.
     pub care: Option<CareCounts>,
 }
 
 impl Sessions {
-    /// Sessions of the caller's tenant as they are asked for, one statement after the other in its turn.
+    /// Lists sessions of the caller's tenant that match the query, one statement after the other under one permit.
     ///
     /// # Errors
-    /// The store does not answer; no turn came in time.
+    /// The store does not answer, or no permit came in time.
     pub async fn list(&self, caller: &Caller, asked: SessionQuery) -> Result<Overview, ServiceError> {
         let (_turn, tenant) = (self.listing.of(&caller.allowance).await?, &caller.tenant);
         let now_ms = self.clock.now_milliseconds();

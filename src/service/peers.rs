@@ -1,7 +1,8 @@
-//! Reports of a list beside each other: sessions by one policy live the same returns, so of one day most say the same.
+//! Compares the reports of a list: sessions with one policy see the same returns, so most reports of one day agree.
 //!
-//! A report that says something else than most of its peers is doubted, whatever the record makes of it. Sessions of one policy
-//! may follow different returns; where no return is that of most, nothing is doubted.
+//! A report that differs from most of its peers is doubted, even if its return fits the record. Sessions with one
+//! policy
+//! may follow different returns; if no return has a majority, nothing is doubted.
 
 use std::collections::HashMap;
 
@@ -14,12 +15,12 @@ use super::record::Seen;
 use super::report::{Observe, Report};
 use super::sessions::Sessions;
 
-/// So many say the same before another is doubted.
+/// The fewest reports that must agree before another is doubted.
 const FEWEST: usize = 2;
-/// Sessions looked at at a time.
+/// Sessions read concurrently.
 const AT_A_TIME: usize = 128;
 
-/// A return of a report, by the field that it was given in.
+/// The return of a report, with the field that gave it.
 struct Return {
     report: usize,
     field: String,
@@ -27,11 +28,11 @@ struct Return {
     log_return: f64,
 }
 
-/// Reports of one policy and day, and one asset of it.
+/// Key of a group of reports: policy, day and index of the asset.
 type Group = (String, Option<Date>, usize);
 
 impl Sessions {
-    /// Doubts about each report that its peers in the list raise.
+    /// Returns the doubts about each report that its peers in the list raise.
     pub(super) async fn peer_doubts(&self, caller: &Caller, reports: &[Observe]) -> Vec<Vec<Doubt>> {
         let mut doubts: Vec<Vec<Doubt>> = reports.iter().map(|_| Vec::new()).collect();
         if reports.windows(2).all(|pair| said_of(&pair[0]) == said_of(&pair[1])) {
@@ -52,7 +53,8 @@ impl Sessions {
         doubts
     }
 
-    /// The returns of a report, each with its group and how it was given; `None` where there is nothing to compare.
+    /// Returns the returns of a report, each with its group and how it was given; `None` if there is nothing to
+    /// compare.
     async fn returns(&self, caller: &Caller, observe: &Observe) -> Option<Vec<(Group, (String, f64), f64)>> {
         let (tenant, report) = (&caller.tenant, observe.report());
         let mut held = self.hold(tenant, &observe.session).await;
@@ -60,7 +62,7 @@ impl Sessions {
         let is_coming = observe.period == live.observed + 1;
         let day = report.date.or_else(|| live.next_day().filter(|_| is_coming));
         let group = |asset| (live.current.policy.clone(), day, asset);
-        // A period that is recorded already is read as it is said, whatever was reported since.
+        // A period that is already recorded is read as given, whatever was reported since.
         match &live.standing.assets {
             None => {
                 let log_return = report.log_return(live.standing.price.filter(|_| is_coming)).ok()??;
@@ -79,13 +81,13 @@ impl Sessions {
     }
 }
 
-/// What a report says of its return and day.
+/// Returns the parts of a report that concern its return and day.
 fn said_of(observe: &Observe) -> Report {
     let all = observe.report();
     Report { rate: None, flow: None, executed_allocation: None, executed_allocations: None, wealth: None, ..all }
 }
 
-/// The reports of a group that say something else than most, each with the doubt about it.
+/// Returns the reports of a group that differ from most, each with the doubt about it.
 fn different(mut returns: Vec<Return>) -> Vec<(usize, Doubt)> {
     returns.sort_unstable_by(|one, other| one.log_return.total_cmp(&other.log_return));
     let alike = |from: usize| {
@@ -132,9 +134,9 @@ mod tests {
     fn what_most_do_not_say_is_doubted() {
         assert_eq!(different_of(&[0.0213, 0.213, 0.0213, 0.0213]), [1]);
         assert_eq!(different_of(&[0.0167, 0.0167, 0.167]), [2]);
-        // Told with another number of digits.
+        // Rounded to different numbers of digits.
         assert_eq!(different_of(&[0.0167, 0.01672, 0.01668]), [] as [usize; 0]);
-        // Nobody knows which of two is right, nor that sessions follow one return where they all differ.
+        // Nobody knows which of two is right. If all differ, the sessions may not follow one return.
         assert_eq!(different_of(&[0.0213, 0.213]), [] as [usize; 0]);
         assert_eq!(different_of(&[0.01, 0.02, 0.03, 0.04]), [] as [usize; 0]);
         assert_eq!(different_of(&[0.01, 0.01, 0.03, 0.03]), [] as [usize; 0]);

@@ -1,8 +1,10 @@
-//! What the entries of a session make of it: each period as it was reported last, one after the other.
+//! Rebuilds a session from its entries: each period as last reported, in order.
 //!
-//! The state is a function of the entries alone. A correction is one of them: the periods are passed through again with the
-//! corrected report in its place. What was advised for a period stays what it was, and with it what was held where nothing
-//! else was reported. A renewal is another: from its place on the terms and the law are those of the next policy.
+//! The state is a function of the entries alone. After a correction, which is an entry, the periods are replayed with
+//! the
+//! corrected report. The advice given for a period does not change, so the holdings do not either unless a report
+//! changes
+//! them. A renewal is an entry also: from there on the terms and the law are those of the next policy.
 
 use std::collections::BTreeMap;
 
@@ -21,68 +23,71 @@ use crate::control::problem::state::State;
 use crate::control::request::learning::Learning;
 use crate::store::{EntryKind, SessionFacts};
 
-/// A period as its entries tell of it.
+/// A period according to its entries.
 #[derive(Debug, Clone)]
 pub struct Period {
-    /// As reported last.
+    /// The last report of it.
     pub report: Report,
-    /// As understood when it came; what was advised stays so whatever is put right. `None` of a period that was put in later.
+    /// The first answer to it. Its advice holds whatever is corrected later. `None` if the period was inserted.
     acknowledged: Option<Acknowledged>,
-    /// Whether what was acknowledged of it stands: no correction of it, or of a period before it, came after it.
+    /// True if the acknowledged numbers still hold: no later correction of it or of an earlier period.
     stands: bool,
     /// Index of the entry that first reported it.
     pub entry: usize,
-    /// Numbers of the corrections that put it in or reported it anew.
+    /// Numbers of the corrections that inserted it or reported it again.
     pub corrections: Vec<usize>,
 }
 
-/// All periods of a session, and the policies that it lives them by.
+/// All periods of a session, and its policies.
 #[derive(Debug, Clone)]
 pub struct Periods {
     pub all: Vec<Period>,
     /// Number of corrections.
     pub corrections: usize,
-    /// The first policy, and those that followed it.
+    /// The first policy and its successors.
     pub stretches: Vec<Stretch>,
     start: Standing,
     history: Record,
-    /// What corrections and renewals told of several assets, one after the other, after so many periods.
+    /// Compositions of several assets that corrections and renewals reported, in order, by the number of periods before
+    /// them.
     composed: BTreeMap<usize, Vec<Composed>>,
 }
 
-/// What the session starts from, up to some period.
+/// A replay of a session up to some period.
 pub struct Passage<'a> {
     periods: &'a Periods,
-    /// Where it stands, under the policy that comes next.
+    /// The state under the policy that comes next.
     pub standing: Standing,
-    /// All returns seen, in their order.
+    /// All observed returns, in order.
     pub record: Record,
-    /// Periods passed.
+    /// Periods replayed.
     step: usize,
-    /// Of the policy that comes next.
+    /// Index of the policy that comes next.
     stretch: usize,
 }
 
-/// A period that was passed.
+/// A replayed period.
 pub struct Step {
-    /// Where the session stood.
+    /// The state before it.
     pub before: Standing,
     pub seen: Seen,
-    /// `None` where it is missing; of several assets that of what was held.
+    /// `None` if it is missing; for several assets, the return of the holdings.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
-    /// Shares of wealth held in several assets; none of one.
+    /// Shares of wealth held in several assets; empty for one asset.
     pub executed: Vec<f64>,
 }
 
 impl Period {
-    /// Whether a correction put it in.
+    /// Returns whether a correction inserted it.
     pub(super) fn is_inserted(&self) -> bool {
         self.acknowledged.is_none()
     }
 }
 
 impl Periods {
+    /// Reads the periods from the entries.
+    ///
     /// # Errors
     /// The entries are not those of the session.
     pub(super) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
@@ -96,7 +101,7 @@ impl Periods {
         let assets = assets.transpose()?;
         let (wealth, learning) = (row.initial_wealth, plan.terms.learning);
         let state = match &assets {
-            // A fund may vary less than a history must.
+            // The returns of a fund may vary less than those of a history must.
             Some(assets) => State { wealth, holding: 0.0, law: learning.law(&assets.fund.returns()) },
             None => State::new(history.all(), wealth, learning)?,
         };
@@ -136,31 +141,31 @@ impl Periods {
         Ok(periods)
     }
 
-    /// Names of the assets where there are several; none of one.
+    /// Returns the names of the assets if there are several; empty for one asset.
     pub(super) fn names(&self) -> &[String] {
         self.start.names()
     }
 
-    /// What an entry told of several assets that is no period.
+    /// Records the composition of several assets that a correction or a renewal reported.
     fn tell(&mut self, told: Option<Composed>) {
         self.composed.entry(self.all.len()).or_default().extend(told);
     }
 
-    /// The policy that advises the coming period.
+    /// Returns the policy that advises the coming period.
     pub(super) fn current(&self) -> &Stretch {
-        // The first is there from the start.
+        // There is always a first one.
         &self.stretches[self.stretches.len() - 1]
     }
 
-    /// Policies that followed the first.
+    /// Returns the number of policies after the first.
     pub(super) fn renewals(&self) -> usize {
         self.stretches.len() - 1
     }
 
-    /// Makes the change of a correction, which is the entry with this index.
+    /// Applies a correction, which is the entry with this index.
     ///
     /// # Errors
-    /// It is of no period that was observed.
+    /// It names no observed period.
     pub(super) fn correct(&mut self, correction: &Correct, entry: usize) -> Result<(), FieldError> {
         let observed = self.all.len();
         let index = correction.period.wrapping_sub(1);
@@ -187,7 +192,7 @@ impl Periods {
             }
             Change::Remove => {
                 self.all.remove(index);
-                // What was told since rests on the period, so it falls with it.
+                // Later compositions depend on the period, so they are removed with it.
                 self.composed.split_off(&(index + 1));
             }
         }
@@ -195,20 +200,20 @@ impl Periods {
         Ok(())
     }
 
-    /// The first period that is not as it was acknowledged, from 0; the number of periods where all are.
+    /// Returns the index of the first period that differs from its acknowledgement; the number of periods if none does.
     pub(super) fn first_changed(&self) -> usize {
         self.all.iter().position(|period| !period.stands).unwrap_or(self.all.len())
     }
 
-    /// What the first advice rests on.
+    /// Returns the state behind the first advice.
     pub(super) fn at_start(&self, learning: Learning) -> State {
         self.start.clone().with_law(learning).state
     }
 
-    /// From the start, to be passed through period by period. Cost of each: a copy of the law.
+    /// Starts a replay, to be advanced period by period. Cost of each period: a copy of the law.
     ///
     /// # Errors
-    /// The first policy was renewed before the first period, by returns that are no history.
+    /// The first policy was renewed before the first period, from returns that are not a valid history.
     pub(super) fn passage(&self) -> Result<Passage<'_>, FieldError> {
         let (standing, record) = (self.start.clone(), self.history.clone());
         let mut passage = Passage { periods: self, standing, record, step: 0, stretch: 0 };
@@ -216,10 +221,10 @@ impl Periods {
         Ok(passage)
     }
 
-    /// Where the session stands after all of them.
+    /// Replays all periods and returns the final state.
     ///
     /// # Errors
-    /// A report that was recorded does not keep the rules any more.
+    /// A recorded report no longer keeps the rules.
     pub(super) fn replay(&self) -> Result<Passage<'_>, ServiceError> {
         let mut passage = self.passage()?;
         while passage.next().map_err(ServiceError::of_recorded)?.is_some() {}
@@ -229,10 +234,10 @@ impl Periods {
 }
 
 impl<'a> Passage<'a> {
-    /// Passes the next period: what was acknowledged of it, where that stands, else what follows. `None` after the last.
+    /// Replays the next period: as acknowledged if that still holds, otherwise recomputed. `None` after the last.
     ///
     /// # Errors
-    /// A report that breaks a rule where it now stands, with the number of its period.
+    /// A report breaks a rule in its present position; comes with the number of its period.
     pub(super) fn next(&mut self) -> Result<Option<Step>, (usize, FieldError)> {
         let Some(Period { report, acknowledged, stands, .. }) = self.periods.all.get(self.step) else {
             return Ok(None);
@@ -257,22 +262,23 @@ impl<'a> Passage<'a> {
         Ok(Some(Step { before, seen, log_return, executed_allocation, executed }))
     }
 
-    /// Where it stands, with the law of several assets' fund, which is not kept up on the way.
+    /// Returns the state with the law of the fund of several assets, which a replay does not keep up to date.
     pub(super) fn stands(&self) -> Standing {
         self.standing.clone().with_law(self.stretch().terms.learning)
     }
 
-    /// The policy that advises the period after those passed.
+    /// Returns the policy that advises the period after those replayed.
     pub(super) fn stretch(&self) -> &'a Stretch {
         &self.periods.stretches[self.stretch]
     }
 
-    /// Goes on under the policies that begin here, with the composition of several assets that was told last: `told` with the
-    /// period, unless a correction or a renewal came after it.
+    /// Switches to the policies that begin here, with the last reported composition of several assets. This is `told`
+    /// with
+    /// the period, unless a correction or a renewal came later.
     fn renew(&mut self, told: Option<&Composed>) -> Result<(), FieldError> {
         told.map_or(Ok(()), |told| self.standing.take(told))?;
         let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
-        // The last one makes its law of the same returns, whatever those before it did.
+        // The last one builds its law from the same returns, whatever its predecessors did.
         self.stretch += begin.count();
         let Stretch { after, window, terms, .. } = self.stretch();
         if self.stretch > 0 && *after == self.step {

@@ -1,4 +1,4 @@
-//! The policies that a session lives by, one after the other, and how it is to be renewed by itself.
+//! The sequence of policies of a session, and its automatic renewal.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -17,49 +17,49 @@ use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::terms::Terms;
 use crate::store::SessionRow;
 
-/// Renewals of a session, and the periods that it may pass by them: a replay passes through all of them.
+/// The most renewals of a session and periods that it may observe: a replay goes through all of them.
 pub const MOST_RENEWALS: usize = 1_000;
 pub const MOST_PERIODS: usize = 5_200;
 
-/// How a session is renewed by itself.
+/// How a session renews itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Renewing {
-    /// Periods by one policy, until the next is trained; fewer than its horizon.
+    /// Periods with one policy until the next is trained; fewer than its horizon.
     #[schema(minimum = 1, example = 12)]
     pub every: usize,
-    /// Returns that the next policy is trained on, the last ones. Default: all that were seen.
+    /// Number of last returns that the next policy is trained on. Default: all observed returns.
     #[serde(default)]
     #[schema(example = 240)]
     pub window: Option<usize>,
 }
 
-/// What is fixed of a session when it is opened, beside what it starts from.
+/// The settings that are fixed when a session is opened, besides its initial state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     pub(super) terms: Terms,
     pub(super) renew: Option<Renewing>,
-    /// Whether every period is advised by the first step of the policy.
+    /// True if every period is advised by the first step of the policy.
     pub(super) rolling: bool,
-    /// Several assets, in the order of the record, as they were told at the start.
+    /// Several assets, in the order of the record, with their figures at the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) assets: Option<PlannedAssets>,
 }
 
-/// The policy that a session lives by, from some period on.
+/// The policy of a session from some period on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
     pub policy: String,
     /// Periods observed before it.
     pub after: usize,
     pub(super) terms: Terms,
-    /// Of the last returns, which its law was made of.
+    /// Number of last returns that its law was made of.
     pub(super) window: Option<usize>,
-    /// Whether its first step advises every period.
+    /// True if its first step advises every period.
     rolling: bool,
 }
 
-/// The policy that a session goes on by.
+/// A request to continue a session with another policy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Renew {
@@ -68,7 +68,7 @@ pub struct Renew {
     pub renewal: usize,
     /// The next policy.
     pub policy: String,
-    /// Returns that the law is made of, the last ones. Default: all that were seen.
+    /// Number of last returns that the law is made of. Default: all observed returns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 240)]
     pub window: Option<usize>,
@@ -82,11 +82,11 @@ pub struct Renewed {
     pub policy: String,
     /// The coming period, the first that the policy advises.
     pub period: usize,
-    /// The last period that it advises.
+    /// The last period that the policy advises.
     pub horizon: usize,
-    /// Rate, cost and flows of its periods, where none other are reported.
+    /// Rate, cost and flows of its periods, unless a report gives others.
     pub terms: Terms,
-    /// Of several assets, before the coming period.
+    /// Figures of several assets before the coming period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assets: Option<Composed>,
     #[serde(flatten)]
@@ -94,14 +94,17 @@ pub struct Renewed {
 }
 
 impl Renewing {
-    /// Periods after which a session is due that was renewed so many times; `None` where it may not go on any longer.
+    /// Returns the number of periods after which the session is due for renewal; `None` if it may not continue any
+    /// longer.
     pub(super) fn due(self, renewals: usize, current: &Stretch) -> Option<usize> {
         let due = current.after + self.every;
         (renewals < MOST_RENEWALS && due + current.terms.horizon <= MOST_PERIODS).then_some(due)
     }
 
+    /// Checks the setting against the policy's problem.
+    ///
     /// # Errors
-    /// A field breaks a rule, or sessions by the policy of this problem are not renewed by themselves.
+    /// A field breaks a rule, or sessions with the policy of this problem cannot renew themselves.
     pub(super) fn check(self, problem: &ProblemSpecification) -> Result<(), FieldError> {
         let Renewing { every, window } = self;
         if !(1..problem.horizon).contains(&every) {
@@ -124,15 +127,15 @@ pub(super) fn check_window(field: &str, window: Option<usize>) -> Result<(), Fie
 }
 
 impl Plan {
-    /// Of a session that lives through the horizon of a policy and ends.
+    /// Returns the plan of a session that runs through the horizon of a policy and ends.
     pub fn once(problem: &ProblemSpecification) -> Self {
         Plan { terms: Terms::of(problem), renew: None, rolling: false, assets: None }
     }
 
-    /// Of a session that lives by a policy from `returns` on.
+    /// Returns the plan of a session that starts a policy from `returns` returns.
     ///
     /// # Errors
-    /// Sessions by this policy are not renewed by themselves as `renew` says, or do not roll.
+    /// Sessions with this policy cannot renew themselves as `renew` says, or cannot roll.
     pub fn new(advisor: &Advisor, returns: usize, renew: Option<Renewing>, rolling: bool) -> Result<Self, FieldError> {
         let problem = &advisor.specification().problem;
         renew.map_or(Ok(()), |renew| renew.check(problem))?;
@@ -145,8 +148,9 @@ impl Plan {
         Ok(Plan { terms, ..plan })
     }
 
-    /// Of the periods after `observed` ones, by a policy that starts from `returns`: those of its horizon, or where the session
-    /// rolls as many as are left to it.
+    /// Returns the terms of the periods after `observed` ones, with a policy that starts from `returns` returns. They
+    /// cover
+    /// its horizon, or all remaining periods if the session rolls.
     ///
     /// # Errors
     /// The rule that such a policy breaks.
@@ -164,45 +168,45 @@ impl Plan {
         Ok(Terms { horizon, ..terms })
     }
 
-    /// By the policy, after `observed` periods.
+    /// Returns the entry for the policy after `observed` periods.
     pub(super) fn stretch(&self, policy: String, after: usize, terms: Terms, window: Option<usize>) -> Stretch {
         Stretch { policy, after, terms, window, rolling: self.rolling }
     }
 
-    /// As it is stored.
+    /// Returns the plan as it is stored.
     ///
     /// # Errors
-    /// It is no JSON, which it always is.
+    /// It cannot be written as JSON, which never happens.
     pub fn json(&self) -> Result<String, ServiceError> {
         json(self)
     }
 
-    /// Names of the assets where there are several; none of one.
+    /// Returns the names of the assets if there are several; empty for one asset.
     pub(super) fn names(&self) -> &[String] {
         self.assets.as_ref().map_or(&[][..], |assets| &assets.names)
     }
 
-    /// Of a session as it was opened.
+    /// Reads the plan of a session from its row.
     pub(super) fn of(row: &SessionRow) -> Result<Self, ServiceError> {
         read(&row.plan_json)
     }
 }
 
 impl Stretch {
-    /// Whether the first step of its policy advises every period.
+    /// Returns whether the first step of its policy advises every period.
     pub fn is_rolling(&self) -> bool {
         self.rolling
     }
 
-    /// The last period that its policy advises.
+    /// Returns the last period that its policy advises.
     pub fn horizon(&self) -> usize {
         self.after + self.terms.horizon
     }
 
-    /// Whether its policy, of this framework, follows a correction of `period`.
+    /// Checks that its policy, of this framework, can follow a correction of `period`.
     ///
     /// # Errors
-    /// The set of the policy is frozen at the returns up to that period.
+    /// The uncertainty set of the policy is frozen at the returns up to that period.
     pub(super) fn follows(&self, period: usize, framework: Framework) -> Result<(), FieldError> {
         if period > self.after || !framework.is_frozen() {
             return Ok(());
@@ -214,18 +218,18 @@ impl Stretch {
         Err(FieldError::new("period", period, rule))
     }
 
-    /// The step of its policy that advises the period after `observed` periods of the session. The last step, which looks one
-    /// period ahead, also advises those past the horizon, until the next policy is there.
+    /// Returns the step of its policy for the period after `observed` periods of the session. The last step looks one
+    /// period ahead. It also advises periods past the horizon until the next policy is there.
     pub(super) fn step(&self, observed: usize) -> usize {
         if self.rolling { 0 } else { (observed - self.after).min(self.terms.horizon.saturating_sub(1)) }
     }
 
-    /// Whether a session by its policy that was renewed so many times is due to be renewed by itself.
+    /// Returns whether a session with its policy, after so many renewals, is due to renew itself.
     pub(super) fn is_due(&self, observed: usize, renew: Option<Renewing>, renewals: usize) -> bool {
         renew.and_then(|renew| renew.due(renewals, self)).is_some_and(|due| observed >= due)
     }
 
-    /// The step that advises after `observed` periods; past every step of the policy if the session ends there.
+    /// Returns the step that advises after `observed` periods; past every step of the policy if the session ends there.
     pub(super) fn step_from(&self, observed: usize, renew: Option<Renewing>, renewals: usize) -> usize {
         match observed < self.horizon() || self.rolling || self.is_due(observed, renew, renewals) {
             true => self.step(observed),
@@ -233,7 +237,7 @@ impl Stretch {
         }
     }
 
-    /// What becomes of money in that period.
+    /// Returns how wealth evolves in that period.
     pub(super) fn dynamics(&self, observed: usize) -> Dynamics {
         self.terms.period(self.step(observed))
     }

@@ -1,4 +1,4 @@
-//! Policies: listed, imported, and made ready to answer.
+//! Lists, imports and prepares policies.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::control::policy::{Policy, content_hash};
 use crate::control::request::specification::Specification;
 use crate::store::{DeletePolicy, PolicyRow, PolicySummary, Store, Stored, Tenant};
 
-/// Policies read and prepared at a time: a document takes several times its bytes while it is read.
+/// Policies read and prepared concurrently: a document takes several times its bytes while it is read.
 const PREPARED_AT_A_TIME: usize = 2;
 
 /// The policies of the store.
@@ -26,7 +26,7 @@ pub struct Policies {
     memory: Memory,
     kept: Kept,
     preparing: Semaphore,
-    /// Where imported documents are checked.
+    /// The queue for checking imported documents.
     decoding: Bounded,
 }
 
@@ -40,7 +40,7 @@ impl Policies {
         self.store.policy(tenant, policy).await?.ok_or_else(|| ServiceError::unknown("policy", policy))
     }
 
-    /// When the tenant came by it.
+    /// Returns when the tenant got the policy.
     ///
     /// # Errors
     /// There is no such policy.
@@ -48,10 +48,10 @@ impl Policies {
         Ok(self.stored(tenant, policy).await?.created_ms)
     }
 
-    /// The portable document.
+    /// Returns the portable document.
     ///
     /// # Errors
-    /// There is no such policy; other large answers leave no room for it.
+    /// There is no such policy, or other large answers leave no room for it.
     pub async fn document(&self, tenant: &Tenant, policy: &str) -> Result<Large<Vec<u8>>, ServiceError> {
         let room = self.memory.answers(self.stored(tenant, policy).await?.bytes).await?;
         let row = self.store.policy_to_send(tenant, policy).await?;
@@ -63,8 +63,7 @@ impl Policies {
         self.store.policy_stored(tenant, policy).await?.ok_or_else(|| ServiceError::unknown("policy", policy))
     }
 
-    /// The policy with what its evaluation needs prepared. Callers let go of it once they are answered: what is kept is
-    /// for the cache to say.
+    /// Returns the policy, prepared for evaluation. Callers drop it after their answer: the cache decides what is kept.
     ///
     /// # Errors
     /// There is no such policy, or it cannot be prepared.
@@ -78,22 +77,22 @@ impl Policies {
         let kept = self.kept.clone();
         let prepared =
             tokio::task::spawn_blocking(move || Policy::from_json(&row.json).map(|policy| Advisor::with(policy, kept)));
-        // What was stored was checked: a fault in it is not the caller's.
+        // The stored document was checked before, so a fault in it is not the caller's.
         prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)
     }
 
-    /// Whether sessions of so many periods by a policy can start from so many returns.
+    /// Checks that sessions of so many periods with a policy can start from so many returns.
     ///
     /// # Errors
-    /// The bridges that they would ask for are too large to be kept ready.
+    /// The bridges that they need are too large to be kept ready.
     pub(super) fn starts_from(&self, advisor: &Advisor, returns: usize, periods: usize) -> Result<(), FieldError> {
         self.memory.keeps(&[Footprint::of("history", returns, advisor.heaviest_bridges(returns, periods))])
     }
 
-    /// The investor of one period of a completed specification.
+    /// Returns the one-period problem of a completed specification.
     ///
     /// # Errors
-    /// The bridges that his radius asks for are too large to be kept ready.
+    /// The bridges for its radius are too large to be kept ready.
     pub(super) fn one_period(&self, specification: &Specification) -> Result<OnePeriod, FieldError> {
         let investor = OnePeriod::new(specification, self.kept.clone());
         let returns = specification.problem.history.len();
@@ -101,7 +100,7 @@ impl Policies {
         Ok(investor)
     }
 
-    /// At most `limit` policies, newest first, after the policy with sequence `after`.
+    /// Lists at most `limit` policies, newest first, after the policy with sequence `after`.
     ///
     /// # Errors
     /// The store does not answer.
@@ -117,7 +116,7 @@ impl Policies {
     /// Checks a document as hostile input and stores it in canonical form; returns its name.
     ///
     /// # Errors
-    /// The document is not a usable policy, or one that takes more memory than can be kept ready.
+    /// The document is not a usable policy, or needs more memory than can be kept ready.
     pub async fn import(&self, caller: &Caller, document: Policy) -> Result<String, ServiceError> {
         let memory = self.memory.clone();
         let check = move || {
@@ -133,8 +132,10 @@ impl Policies {
         Ok(policy)
     }
 
+    /// Deletes a policy.
+    ///
     /// # Errors
-    /// There is no such policy, or sessions live by it.
+    /// There is no such policy, or sessions use it.
     pub async fn delete(&self, caller: &Caller, policy: &str) -> Result<(), ServiceError> {
         let tenant = &caller.tenant;
         match self.store.by(caller.actor()).delete_policy(tenant, policy).await? {
@@ -148,7 +149,7 @@ impl Policies {
     }
 }
 
-/// What is here was looked up in the store for that tenant.
+/// Returns the cache key. Policies in the cache were read from the store for that tenant.
 fn key(tenant: &Tenant, policy: &str) -> Key {
     Key::Policy(format!("{tenant}/{policy}").into())
 }

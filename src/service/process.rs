@@ -1,5 +1,6 @@
-//! What the system says of this process, under the names that Prometheus' own clients use (Linux; elsewhere nothing is
-//! said but when it started).
+//! Figures of the system about this process, under the names that Prometheus' own clients use. On systems other than
+//! Linux
+//! only the start time is reported.
 
 use std::fs;
 use std::sync::OnceLock;
@@ -14,10 +15,10 @@ const THREADS: &str = "process_threads";
 const OPEN: &str = "process_open_fds";
 const MOST: &str = "process_max_fds";
 
-/// Clock ticks a second in `/proc`, whatever the kernel's own: part of its interface to programs.
+/// Clock ticks a second in `/proc`, independent of the kernel's own: part of its interface to programs.
 const TICKS: u64 = 100;
 
-/// Tells the recorder what the figures mean. The process counts as started at the first call.
+/// Describes the figures to the recorder. The process counts as started at the first call.
 pub fn describe() {
     describe_gauge!(START, Unit::Seconds, "When the process started, in seconds since 1970.");
     describe_gauge!(RESIDENT, Unit::Bytes, "Memory of the process that is in the machine's.");
@@ -30,7 +31,7 @@ pub fn describe() {
     gauge!(START).set(*STARTED.get_or_init(now));
 }
 
-/// Sets the figures to what they are now.
+/// Records the present figures.
 pub fn record() {
     if let Some(kilobytes) = status("VmRSS:") {
         gauge!(RESIDENT).set(kilobytes as f64 * 1024.0);
@@ -42,7 +43,7 @@ pub fn record() {
         counter!(PROCESSOR).absolute(ticks / TICKS);
     }
     if let Ok(open) = fs::read_dir("/proc/self/fd") {
-        // The folder itself is open while it is read.
+        // The directory itself is open while it is read.
         gauge!(OPEN).set(open.count().saturating_sub(1) as f64);
     }
     if let Some(most) = descriptors() {
@@ -50,7 +51,7 @@ pub fn record() {
     }
 }
 
-/// Files and sockets this process may open.
+/// Returns how many files and sockets this process may open.
 pub fn descriptors() -> Option<usize> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;
@@ -62,7 +63,7 @@ fn status(name: &str) -> Option<u64> {
     status.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
 }
 
-/// The sum of fields 14 and 15, user and system; the second field, in brackets, may hold anything.
+/// Returns the sum of fields 14 and 15, user and system time; the second field, in brackets, may hold anything.
 fn processor_ticks() -> Option<u64> {
     let stat = fs::read_to_string("/proc/self/stat").ok()?;
     let after_name = stat.rsplit_once(')')?.1;

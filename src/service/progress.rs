@@ -1,4 +1,4 @@
-//! How far running jobs are: kept in memory, because losing it loses nothing.
+//! Progress of running jobs: kept in memory only, because losing it does no harm.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,10 +9,11 @@ use tokio::sync::watch;
 
 use crate::control::progress::{Phase, StepProgress};
 
-/// Watchers are woken at most this often for progress inside a step.
+/// Shortest time between two notifications of watchers about progress inside a step.
 const SHORTEST_PAUSE: Duration = Duration::from_millis(50);
 
-/// Steps behind before anything is said of the time left, or this share of all: the first ones prepare what all of them use.
+/// Finished steps needed before time left is estimated, or this share of all steps. The first steps prepare what all
+/// use.
 const FEWEST_STEPS: f64 = 2.0;
 const LEAST_SHARE: f64 = 0.25;
 
@@ -22,7 +23,7 @@ pub struct Progress {
     pub steps_done: usize,
     pub steps_total: usize,
     pub current: Option<StepProgress>,
-    /// Estimate from the steps finished so far; absent before there is anything to go by.
+    /// Estimate from the steps finished so far; absent until enough of them are.
     pub seconds_left: Option<f64>,
 }
 
@@ -34,7 +35,7 @@ struct Running {
     progress: Progress,
 }
 
-/// The running jobs of this process, and a bell that rings when anything about any job changes.
+/// The running jobs of this process, and a channel that notifies watchers when anything about any job changes.
 pub struct ProgressBoard {
     running: Mutex<HashMap<String, Running>>,
     bell: watch::Sender<u64>,
@@ -45,17 +46,17 @@ impl ProgressBoard {
         ProgressBoard { running: Mutex::new(HashMap::new()), bell: watch::Sender::new(0) }
     }
 
-    /// A receiver that sees a change whenever a job's state or progress changed.
+    /// Returns a receiver that sees a change whenever a job's state or progress changed.
     pub fn subscribe(&self) -> watch::Receiver<u64> {
         self.bell.subscribe()
     }
 
-    /// Wakes every watcher.
+    /// Notifies every watcher.
     pub fn ring(&self) {
         self.bell.send_modify(|count| *count += 1);
     }
 
-    /// Enters a job that starts with `steps_done` of `steps_total` behind it; returns its stop signal.
+    /// Enters a job that starts with `steps_done` of `steps_total` finished; returns its stop signal.
     pub fn enter(&self, job: &str, steps_done: usize, steps_total: usize) -> Arc<AtomicBool> {
         let stop = Arc::new(AtomicBool::new(false));
         let (now, progress) = (Instant::now(), Progress { steps_done, steps_total, current: None, seconds_left: None });
@@ -66,7 +67,7 @@ impl ProgressBoard {
         stop
     }
 
-    /// Records how many steps need not be solved again, where that differs from what was stored.
+    /// Records how many steps need not be solved again, if that differs from what was stored.
     pub fn resume(&self, job: &str, steps_done: usize) {
         if let Some(running) = self.lock().get_mut(job) {
             running.steps_at_start = steps_done;
@@ -110,7 +111,7 @@ impl ProgressBoard {
         self.lock().get(job).map(|running| running.progress)
     }
 
-    /// Asks a job to stop; harmless where it does not run here.
+    /// Requests that a job stop; does nothing if it does not run here.
     pub fn stop(&self, job: &str) {
         if let Some(running) = self.lock().get(job) {
             running.stop.store(true, Ordering::Relaxed);
@@ -130,8 +131,9 @@ impl Default for ProgressBoard {
 }
 
 impl Running {
-    /// Time per step so far times the steps left; a solving step counts by its share of design points done. What is simulated takes
-    /// another time than what was solved before it, and nothing is said of it.
+    /// Returns the time per step so far times the steps left. A step being solved counts by its share of finished
+    /// design
+    /// points. Simulation takes another time per step than solving, so there is no estimate for it.
     fn seconds_left(&self) -> Option<f64> {
         let share = match self.progress.current {
             Some(current) if current.phase == Phase::Simulating => return None,

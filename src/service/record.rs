@@ -1,19 +1,19 @@
-//! All returns that a session has seen, date by date.
+//! All observed returns of a session, date by date.
 
 use crate::control::request::assets::DATES;
 use crate::control::request::rules;
 
-/// What was seen in a period; `None` where it is missing.
+/// The returns of a period; `None` if they are missing.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Seen {
     /// The log-return of one asset.
     One(Option<f64>),
-    /// Those of several.
+    /// The log-returns of several assets.
     Several(Option<Vec<f64>>),
 }
 
 impl Seen {
-    /// Of several assets, where it is not missing.
+    /// Returns the row of several assets if it is not missing.
     pub(super) fn row(&self) -> Option<&[f64]> {
         match self {
             Seen::Several(row) => row.as_deref(),
@@ -22,7 +22,7 @@ impl Seen {
     }
 }
 
-/// Log-returns in the order they came, of all assets date after date.
+/// Log-returns in the order observed; several assets date after date.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     assets: usize,
@@ -30,12 +30,12 @@ pub struct Record {
 }
 
 impl Record {
-    /// Of so many assets, at least one.
+    /// Builds the record of so many assets, at least one.
     pub(super) fn new(assets: usize, values: Vec<f64>) -> Self {
         Record { assets, values }
     }
 
-    /// What a period adds.
+    /// Appends the returns of a period.
     pub(super) fn learn(&mut self, seen: &Seen) {
         match seen {
             Seen::One(log_return) => self.values.extend(log_return),
@@ -43,24 +43,24 @@ impl Record {
         }
     }
 
-    /// Number of assets.
+    /// Returns the number of assets.
     pub(super) fn assets(&self) -> usize {
         self.assets
     }
 
-    /// Every log-return.
+    /// Returns every log-return.
     pub fn all(&self) -> &[f64] {
         &self.values
     }
 
-    /// Those of the last `window` dates, or of as many as a history may hold.
+    /// Returns those of the last `window` dates, at most as many as a history may hold.
     pub(super) fn last(&self, window: Option<usize>) -> &[f64] {
         let longest = if self.assets > 1 { DATES } else { rules::HISTORY_LENGTH };
         let most = window.unwrap_or(usize::MAX).min(*longest.end()) * self.assets;
         &self.values[self.values.len().saturating_sub(most)..]
     }
 
-    /// Date by date.
+    /// Splits the values into one row for each date.
     pub(super) fn rows_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
         values.chunks_exact(self.assets).map(<[f64]>::to_vec).collect()
     }

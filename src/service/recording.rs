@@ -1,7 +1,8 @@
-//! What is recorded of a session: periods as they pass, and corrections of those that passed.
+//! Records the entries of a session: observations of periods, and corrections of them.
 //!
-//! An entry is decided on all entries before it, and appended as the one after them. Where another process wrote meanwhile it
-//! is not, and is decided anew on what is there now: observations and corrections of all processes have one order.
+//! An entry is computed from all entries before it, and appended after them. If another process wrote meanwhile, the
+//! append
+//! fails and the entry is computed again. So observations and corrections of all processes have one order.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -26,12 +27,12 @@ use crate::control::error::FieldError;
 use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
 
 impl Sessions {
-    /// Records the return of a period, durably before it is answered, exactly once, and answers with an
-    /// [`Observed`] in JSON as it was recorded. Where the caller goes away meanwhile
-    /// the store may or may not record it, and nothing of it stays in memory.
+    /// Records the return of a period exactly once, durably before the answer. Returns an [`Observed`] in JSON as it
+    /// was
+    /// recorded. If the caller disconnects, the write may or may not commit; either way nothing of it stays in memory.
     ///
     /// # Errors
-    /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
+    /// A field breaks a rule, or the period was observed with other content, is not the next, or lies past the horizon.
     pub async fn observe(&self, tenant: &Tenant, observe: &Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
         let (session, period) = (&observe.session, numbered("period", observe.period)?);
         let report = observe.report();
@@ -77,11 +78,13 @@ impl Sessions {
         }
     }
 
-    /// Records another report of a period that passed, as durably and as often as [`Self::observe`] does, and answers with
-    /// a [`Corrected`] in JSON. Every advice from then on rests on the corrected returns.
+    /// Records another report of an observed period, with the guarantees of [`Self::observe`]. Returns a [`Corrected`]
+    /// in
+    /// JSON. Every later advice uses the corrected returns.
     ///
     /// # Errors
-    /// A field breaks a rule, or makes a later period break one; the correction was made with other content, or is not the
+    /// A field breaks a rule or makes a later period break one, or the correction was made with other content or is not
+    /// the
     /// next.
     pub async fn correct(
         &self,
@@ -154,7 +157,7 @@ impl Sessions {
         }
     }
 
-    /// The first answer to what was recorded already of a session of the assets `names`.
+    /// Returns the first answer to an entry that is already recorded, for a session with the assets `names`.
     pub(super) async fn repeat(
         &self,
         session: &str,
@@ -174,8 +177,9 @@ impl Sessions {
         }
     }
 
-    /// Appends the entry that leads to `next` from one level of drift to another; false where another process wrote meanwhile.
-    /// Memory is empty while it is under way, so that it never runs ahead of the disk.
+    /// Appends the entry that leads to `next`; returns false if another process wrote meanwhile. Counts a rise of the
+    /// drift
+    /// level between the two `levels`. The slot is empty during the write, so that memory never runs ahead of the disk.
     async fn append(
         &self,
         store: &Store,
@@ -190,13 +194,13 @@ impl Sessions {
         let is_appended = self.settled(held, appended, next)?;
         if is_appended {
             drift::count(levels.0, levels.1);
-            // Where too many are to be renewed already, a round finds it.
+            // If the renewer's queue is full, its next round finds the session.
             due.map(|name| self.due.try_send(name));
         }
         Ok(is_appended)
     }
 
-    /// As [`Self::append`], of an entry that the store has decided on.
+    /// Handles the store's answer to an append as [`Self::append`] does.
     pub(super) fn settled(
         &self,
         held: &mut Held<Name, Live>,
@@ -216,7 +220,7 @@ impl Sessions {
     }
 }
 
-/// The answer of an entry as it was sent.
+/// Returns the answer of an entry as it was sent.
 fn sent(row: EntryRow, names: &[String]) -> Result<String, ServiceError> {
     match row.kind {
         _ if names.is_empty() => Ok(row.answer_json),
@@ -226,10 +230,10 @@ fn sent(row: EntryRow, names: &[String]) -> Result<String, ServiceError> {
     }
 }
 
-/// Whether the entry of a kind that is numbered so is among the `made`.
+/// Returns whether the entry with this number is among those `made`.
 ///
 /// # Errors
-/// It is neither that nor the next.
+/// It is neither among them nor the next.
 pub(super) fn is_repeat(kind: EntryKind, number: usize, made: usize) -> Result<bool, ServiceError> {
     let expected = made + 1;
     if number > expected {

@@ -1,8 +1,9 @@
-//! The policies that a session lives by, one after the other.
+//! Renews a session: records the switch to its next policy.
 //!
-//! A renewal is an entry of its session: it names the next policy, which advises from the coming period on, and tells the terms
-//! by which that period and those after it are counted, so that a replay needs no policy that advises no more. The law is made
-//! anew of the returns seen, as they stand: of all of them, or of a window of the last.
+//! A renewal is an entry of its session. It names the next policy, which advises from the coming period on. It also
+//! holds
+//! the terms of the periods from there on, so that a replay does not need policies that no longer advise. The law is
+//! rebuilt from the corrected returns: all of them, or a window of the last ones.
 
 use std::sync::Arc;
 
@@ -24,11 +25,12 @@ use crate::control::policy::advisor::Advisor;
 use crate::store::{Actor, EntryKind, EntryRow, Onto, SessionFacts, Tenant};
 
 impl Sessions {
-    /// Goes on by another policy from the coming period, durably before it is answered, exactly once, and answers with a
+    /// Switches to another policy from the coming period on, exactly once and durably before the answer. Returns a
     /// [`Renewed`] in JSON.
     ///
     /// # Errors
-    /// A field breaks a rule, there is no such session or policy; the renewal was made with other content, or is not the next.
+    /// A field breaks a rule, there is no such session or policy, or the renewal was made with other content or is not
+    /// the next.
     pub async fn renew(
         &self,
         tenant: &Tenant,
@@ -56,7 +58,7 @@ impl Sessions {
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
             if self.settled(&mut held, appended, next)? {
                 if turn.is_some() {
-                    // By a caller: what the session requested is requested no more.
+                    // A caller renewed it, so the training that the session requested is no longer needed.
                     let _ = self.due.try_send((tenant.clone(), session.to_owned()));
                 }
                 return Ok(sent);
@@ -64,7 +66,7 @@ impl Sessions {
         }
     }
 
-    /// The next renewal of a session, as it stands by `facts`.
+    /// Computes the next renewal of a session from `facts`.
     async fn decided(
         &self,
         (tenant, turn): (&Tenant, Option<&HeavyTurn>),
@@ -132,7 +134,7 @@ impl Sessions {
     }
 }
 
-/// A renewal to append, and where it leads.
+/// A renewal to append, and the state it leads to.
 struct Decided {
     new: EntryRow,
     /// The answer as it is sent.
@@ -141,7 +143,7 @@ struct Decided {
     next: Live,
 }
 
-/// Whether a session that has seen `record` and stands there can live by the policy.
+/// Checks that a session with this record and state can use the policy.
 fn accepts(advisor: &Advisor, record: &[f64], standing: &Standing) -> Result<(), FieldError> {
     let (own, fund) = (standing.assets.as_deref(), advisor.specification().fund.as_deref());
     let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));

@@ -1,11 +1,11 @@
-//! Sessions that are renewed by themselves: the next policy is trained on the returns seen, and the session goes on by it.
+//! Renews sessions automatically: trains the next policy on the observed returns, and continues the session with it.
 //!
-//! What is to be done is found in the store each time anew, so that it goes on after a kill between any two steps, and on
-//! every replica alike. A session is due by its entries; the job that trains its next policy is found by the session's request
-//! ([`crate::store::TrainingRequest`]), which names session, renewal and attempt; and the renewal has a number. Whoever does a step that
-//! another did already finds that it was done. Sessions of a tenant that need one policy wait for one job.
+//! Each round finds its work in the store again, so it continues after a kill between any two steps, on every replica
+//! alike. The entries of a session show that it is due. Its request ([`crate::store::TrainingRequest`]), with session,
+//! renewal and attempt, identifies the job that trains its next policy. The renewal has a number. So a step that was
+//! already done elsewhere is detected. Sessions of a tenant that need one policy wait for one job.
 //!
-//! An attempt that fails leaves the session as it is, and is followed by the next after a while that doubles each time.
+//! A failed attempt leaves the session as it is. The delay before the next attempt doubles each time.
 
 use std::time::Duration;
 
@@ -34,19 +34,19 @@ use crate::control::request::specification::Specification;
 use crate::control::request::support::Interval;
 use crate::store::{Actor, JobRow, JobState, SessionTraining, Store};
 
-/// Between two looks at jobs that train next policies.
+/// Time between two polls of the jobs that train next policies.
 const PAUSE: Duration = Duration::from_millis(500);
-/// Between two looks for sessions that are due and that nobody told of: after a kill, or a failure.
+/// Time between two searches for due sessions that were not reported: after a kill, or a failure.
 const ROUND: Duration = Duration::from_secs(60);
-/// Before the second attempt; doubled before each one after it, up to the longest.
+/// Delay before the second attempt; doubled before each later one, up to the longest.
 const FIRST_DELAY: Duration = Duration::from_secs(60);
 const LONGEST_DELAY: Duration = Duration::from_hours(24);
-/// A step that takes longer is left to a later round: no session is in the way of its tenant's others for longer. The joint
-/// factor of thirty assets over two thousand dates takes some seconds of it.
+/// Longest time for one step. A step that takes longer is left to a later round, so that it does not delay the tenant's
+/// other sessions. The joint factor of thirty assets over two thousand dates takes some seconds of it.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Sessions read in one step of a round.
+/// Sessions read at a time in a round.
 const PAGE: usize = 256;
-/// Sessions told of that are not looked at yet; of more a round finds out.
+/// Reported sessions that wait to be handled; a round finds any others.
 pub(super) const TOLD: usize = 1024;
 
 mod attempts;
@@ -65,7 +65,7 @@ pub(super) struct Renewer {
 }
 
 impl Renewer {
-    /// Renews sessions until the shutdown begins.
+    /// Renews sessions until shutdown begins.
     pub(super) async fn run(self, mut told: Receiver<Name>, shutdown: Shutdown) {
         let (mut under_way, mut steps) = (UnderWay::default(), FuturesUnordered::new());
         let (mut round, mut look) = (tokio::time::interval(ROUND), tokio::time::interval(PAUSE));
@@ -93,7 +93,8 @@ impl Renewer {
         }
     }
 
-    /// Begins with a session that became due, or was renewed or deleted: what it requested may be requested no more.
+    /// Handles a session that became due, or was renewed or deleted, in which case its training may no longer be
+    /// needed.
     async fn hear(&self, name: Name, under_way: &mut UnderWay) {
         if under_way.waiting.contains(&name) {
             self.sweep().await;
@@ -107,7 +108,7 @@ impl Renewer {
         }
     }
 
-    /// Begins with all sessions that are due, from where the last round left some out.
+    /// Begins with all sessions that are due, from the first that the last round left out.
     async fn find(&self, under_way: &mut UnderWay) {
         let mut after = under_way.left_after.take().unwrap_or_default();
         loop {
@@ -130,7 +131,7 @@ impl Renewer {
         }
     }
 
-    /// Looks at the jobs under way.
+    /// Polls the jobs that sessions wait for.
     async fn follow(&self, under_way: &mut UnderWay) {
         for job in under_way.waiting.jobs() {
             match self.store.job(&job).await {
@@ -152,7 +153,7 @@ impl Renewer {
         }
     }
 
-    /// Does the next step for a session; one that fails is done again in a later round.
+    /// Does the next step for a session; a step that fails is repeated in a later round.
     async fn go_on(&self, name: Name) -> (Name, Left) {
         let step = tokio::time::timeout(PATIENCE, self.step(&name)).await;
         let left = step.unwrap_or(Err(ServiceError::Busy)).unwrap_or_else(|error| {
@@ -183,7 +184,8 @@ impl Renewer {
             (JobState::Succeeded, Some(policy)) => {
                 match self.onto(&live, policy, renew, attempts.number).await {
                     Ok(()) => return Ok(Left::Nothing),
-                    // The policy was deleted, or does not fit where the session stands by now: another is trained, in a while.
+                    // The policy was deleted, or does not fit the present state of the session: another is trained
+                    // later.
                     Err(error @ (ServiceError::Unknown { what: "policy", .. } | ServiceError::Field(_))) => {
                         if self.is_early(last, attempts.count) {
                             return Err(error);
@@ -198,13 +200,13 @@ impl Renewer {
         self.train(&live, renew, &attempts).await
     }
 
-    /// Whether it is too early for the attempt after `count` of them, of which `last` was the last.
+    /// Returns whether it is too early for the attempt after `count` attempts, the last of which is `last`.
     fn is_early(&self, last: &JobRow, count: usize) -> bool {
         let ended_ms = last.finished_ms.unwrap_or_default();
         self.clock.now_milliseconds() < ended_ms.saturating_add(delay_ms(count))
     }
 
-    /// Goes on by the policy that was trained.
+    /// Switches the session to the trained policy.
     async fn onto(&self, live: &Live, policy: &str, renew: Renewing, number: usize) -> Result<(), ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
         let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window };
@@ -215,7 +217,7 @@ impl Renewer {
                 tracing::info!(session, policy, renewal = number, "session renewed");
                 Ok(())
             }
-            // Somebody else renewed it meanwhile, or deleted it.
+            // The session was renewed or deleted elsewhere meanwhile.
             Err(ServiceError::RenewedAlready { .. } | ServiceError::Conflict { .. } | ServiceError::Gap { .. }) => {
                 Ok(())
             }
@@ -252,8 +254,8 @@ impl Renewer {
     }
 }
 
-/// What the next policy is trained for: the same, from the returns seen and the rate observed last. Where wealth matters, the
-/// one reached takes the place of the one at first, and design points move with it.
+/// Returns the specification of the next policy: the same, with the observed returns and the last observed rate. If the
+/// problem depends on wealth, present wealth replaces initial wealth and the design interval is scaled with it.
 fn next(
     specification: &Specification,
     record: &Record,
@@ -280,7 +282,7 @@ fn next(
     }
 }
 
-/// Before the attempt after `count` of them.
+/// Returns the delay before the attempt after `count` attempts.
 fn delay_ms(count: usize) -> i64 {
     let doublings = u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX).min(20);
     let delay = FIRST_DELAY.saturating_mul(1 << doublings).min(LONGEST_DELAY);

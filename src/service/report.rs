@@ -1,4 +1,4 @@
-//! What an investor reports of a period, and how it is read.
+//! The report of a period, and how it is read.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,20 +12,20 @@ use super::gate::Doubt;
 use crate::control::error::FieldError;
 use crate::control::request::rules;
 
-/// Prices taken: any currency, any quantity.
+/// The range of prices: any currency, any quantity.
 pub const PRICE: (f64, f64) = (1e-12, 1e15);
-/// Corrections of a session: a replay passes through all of them.
+/// The most corrections of a session: a replay goes through all of them.
 pub const MOST_CORRECTIONS: usize = 1_000;
-/// Letters of a reason.
+/// The most characters of a reason.
 pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
 const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
 pub(super) const OF_SEVERAL: &str = "must be absent: the session is of one asset, and the field of several";
 pub(super) const OF_ONE: &str = "must be absent: the session is of several assets, and the field of one";
 
-/// A struct with fields of its own and those of a report.
+/// Defines a struct with its own fields and those of a report.
 ///
-/// One struct each, since `serde` refuses unknown and repeated fields of a flat struct alone.
+/// They form one struct because `serde` can reject unknown and repeated fields only if nothing is flattened.
 macro_rules! reporting {
     ($(#[$meta:meta])* $name:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty,)* }) => {
         $(#[$meta])*
@@ -45,39 +45,39 @@ macro_rules! reporting {
             /// Price at the start of the period. Default: the price reported for the period before.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub previous_price: Option<f64>,
-            /// Of several assets, by their names; each has one.
+            /// Log-returns of several assets by name; each has one.
             #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub log_returns: Option<BTreeMap<String, f64>>,
-            /// Of several assets, `price / previous price - 1` each.
+            /// `price / previous price - 1` of several assets by name.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub simple_returns: Option<BTreeMap<String, f64>>,
             /// Prices of several assets at the end of the period.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub prices: Option<BTreeMap<String, f64>>,
-            /// Their prices at the start of the period. Default: those reported for the period before.
+            /// Prices of several assets at the start of the period. Default: those reported for the period before.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub previous_prices: Option<BTreeMap<String, f64>>,
-            /// In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved.
+            /// Given instead of a return if none is known: the law does not change, and the holdings count as unmoved.
             #[serde(default, skip_serializing_if = "std::ops::Not::not")]
             pub missing: bool,
             /// The last day of the period, later than that of the period before.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schema(value_type = Option<String>, format = Date, example = "2008-09-30")]
             pub date: Option<Date>,
-            /// What the bank paid in the period. Default: the policy's rate.
+            /// Rate that the bank paid in the period. Default: the policy's rate.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub rate: Option<f64>,
-            /// Money added at the end of the period, negative where it was taken. Default: the policy's contribution.
+            /// Money added at the end of the period; negative if withdrawn. Default: the policy's contribution.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub flow: Option<f64>,
-            /// Share of wealth held in the risky asset through the period. Default: the allocation advised for it.
+            /// Share of wealth held in the risky asset through the period. Default: the advised allocation.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub executed_allocation: Option<f64>,
-            /// Share of wealth held in each of several assets through the period. Default: what was advised for it.
+            /// Share of wealth held in each of several assets through the period. Default: the advised allocations.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub executed_allocations: Option<BTreeMap<String, f64>>,
-            /// Wealth reached, with what was added, where it differs from what all of the above gives.
+            /// Wealth reached, with what was added, if it differs from what the fields above give.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub wealth: Option<f64>,
         }
@@ -85,22 +85,22 @@ macro_rules! reporting {
 }
 
 reporting! {
-    /// What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it.
+    /// The record of a period: its return, given in exactly one of three ways or as missing, and the trades in it.
     Report {}
 }
 
 reporting! {
-    /// The return of one period, given in exactly one of three ways or as missing, and what was done in it.
+    /// The return of one period, given in exactly one of three ways or as missing, and the trades in it.
     Observe {
         #[schema(example = "session_0123456789abcdef0123456789abcdef")]
         session: String,
         /// Number of the period, from 1.
         #[schema(example = 1)]
         period: usize,
-        /// The report is meant, whatever is doubted in it.
+        /// Confirms the report despite any doubts.
         #[serde(default, skip_serializing_if = "never_recorded")]
         confirm: bool,
-        /// The name of the key that reports it, which no body says; empty where none was asked for.
+        /// Name of the key that reports it, never part of a body; empty if no key is needed.
         #[serde(skip)]
         reported_by: Arc<str>,
         /// Doubts that the other reports of its list raise.
@@ -110,35 +110,35 @@ reporting! {
 }
 
 reporting! {
-    /// A change of the periods that passed: a period is reported anew, all of it, is put in between others, or is taken out.
+    /// A change of observed periods: a period is reported again in full, inserted between others, or removed.
     Correct {
         /// Number of the correction, from 1.
         #[schema(example = 1)]
         correction: usize,
-        /// The period that is put right or taken out, or that the new one is put in before.
+        /// The period to correct or remove, or the one to insert before.
         #[schema(example = 3)]
         period: usize,
         #[serde(default, skip_serializing_if = "Change::is_replace")]
         change: Change,
-        /// Why, in at most 200 letters.
+        /// The reason, in at most 200 characters.
         #[schema(example = "the index was revised", max_length = 200)]
         reason: String,
-        /// The correction is meant, whatever is doubted in it.
+        /// Confirms the correction despite any doubts.
         #[serde(default, skip_serializing_if = "never_recorded")]
         confirm: bool,
     }
 }
 
-/// Of what is said beside a report: it is no part of the content.
+/// Returns true: such fields come with a report and are never part of its stored content.
 fn never_recorded(_: &bool) -> bool {
     true
 }
 
-/// What both structs have in common, by itself.
+/// Implements what both structs have in common.
 macro_rules! report_of {
     ($name:ident) => {
         impl $name {
-            /// The report alone, as it is recorded.
+            /// Returns the report alone, as it is recorded.
             pub(super) fn report(&self) -> Report {
                 let $name { log_return, simple_return, price, previous_price, missing, date, .. } = *self;
                 let $name { rate, flow, executed_allocation, wealth, .. } = *self;
@@ -161,14 +161,14 @@ macro_rules! report_of {
 report_of!(Observe);
 report_of!(Correct);
 
-/// The log-return of a simple return, named `field` in messages.
+/// Converts a simple return, named `field` in messages, to a log-return.
 pub(super) fn log_return_of(field: &str, simple_return: f64) -> Result<f64, FieldError> {
     rules::within(field, simple_return, (-rules::LOG_RETURN).exp_m1(), rules::LOG_RETURN.exp_m1())?;
     Ok(simple_return.ln_1p().clamp(-rules::LOG_RETURN, rules::LOG_RETURN))
 }
 
 impl Report {
-    /// Checks everything that can be checked without the session, but the return.
+    /// Checks every field that can be checked without the session, except the return.
     ///
     /// # Errors
     /// The first field that breaks its rule.
@@ -193,10 +193,10 @@ impl Report {
         }
     }
 
-    /// The log-return, `None` where it is missing; `known_price` is the price reported for the period before.
+    /// Returns the log-return, `None` if it is missing; `known_price` is the price reported for the period before.
     ///
     /// # Errors
-    /// None is given, or more than one, or one out of bounds.
+    /// No return is given, more than one is, or one is out of bounds.
     pub(super) fn log_return(&self, known_price: Option<f64>) -> Result<Option<f64>, FieldError> {
         none_of(&self.of_several(), OF_SEVERAL)?;
         match (self.log_return, self.simple_return, self.price, self.missing) {
@@ -214,7 +214,8 @@ impl Report {
         }
     }
 
-    /// The same of several assets with these names; `known` are the prices reported for the period before.
+    /// Returns the log-returns of several assets with these names; `known` are the prices reported for the period
+    /// before.
     ///
     /// # Errors
     /// They are not given in exactly one way, one is out of bounds, or an asset has none.
@@ -259,7 +260,7 @@ impl Report {
         }
     }
 
-    /// What is said of several assets.
+    /// Lists the fields of several assets, and whether each is given.
     fn of_several(&self) -> [(&'static str, bool); 5] {
         [
             ("log_returns", self.log_returns.is_some()),
@@ -270,7 +271,7 @@ impl Report {
         ]
     }
 
-    /// What the return of one of several assets was given by, and its value.
+    /// Returns the field that gave the return of one of several assets, and its value.
     pub(super) fn given_of(&self, asset: &str) -> (String, Option<f64>) {
         let ways = [("simple_returns", &self.simple_returns), ("prices", &self.prices)];
         let given = ways.into_iter().find_map(|(field, values)| values.as_ref().map(|values| (field, values)));
@@ -279,7 +280,7 @@ impl Report {
         (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied()))
     }
 
-    /// What the return was given by, and its value.
+    /// Returns the field that gave the return, and its value.
     pub(super) fn given(&self) -> (&'static str, f64) {
         match (self.log_return, self.simple_return, self.price) {
             (_, Some(value), _) => ("simple_return", value),
@@ -300,6 +301,8 @@ impl Report {
     }
 }
 
+/// Checks that none of the fields is given.
+///
 /// # Errors
 /// The first of the fields that is given.
 pub(super) fn none_of(fields: &[(&'static str, bool)], rule: &str) -> Result<(), FieldError> {
@@ -307,7 +310,7 @@ pub(super) fn none_of(fields: &[(&'static str, bool)], rule: &str) -> Result<(),
     given.map_or(Ok(()), |(field, _)| Err(FieldError::new(*field, "given", rule)))
 }
 
-/// The values in the order of the assets, each of which has one.
+/// Returns the values in the order of the assets, each of which must have one.
 pub(super) fn by_name(field: &str, values: &BTreeMap<String, f64>, names: &[String]) -> Result<Vec<f64>, FieldError> {
     if let Some((other, value)) = values.iter().find(|(name, _)| !names.contains(name)) {
         let rule = format!("must name one of the assets: {}", names.join(", "));
@@ -320,7 +323,7 @@ pub(super) fn by_name(field: &str, values: &BTreeMap<String, f64>, names: &[Stri
     names.iter().map(of).collect()
 }
 
-/// The log-return between two prices, by the names of their fields.
+/// Returns the log-return between two prices; messages use the names of their fields.
 fn between(field: &str, price: f64, (named, before): (&str, f64)) -> Result<f64, FieldError> {
     rules::within(field, price, PRICE.0, PRICE.1)?;
     rules::within(named, before, PRICE.0, PRICE.1)?;

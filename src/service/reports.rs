@@ -1,9 +1,11 @@
-//! Reports of many sessions at once: each element of a list is what a call of its own would be, but for the doubts that its
+//! Reports of many sessions at once: each element of a list is handled like a call of its own, except for doubts that
+//! its
 //! peers raise.
 //!
-//! There is no transaction over a list, and none is needed: each element is recorded exactly once, so the same list sent
-//! again is answered as it was, and goes on where an earlier one was cut off. What a list saves is the call around each
-//! report, and it brings its reports to the store together, which writes them together.
+//! A list is not a transaction and needs none, because each element is recorded exactly once. The same list sent again
+//! gets the same answers, and resumes if the first call was cut off. A list saves the overhead of a call for each
+//! report.
+//! Its reports also reach the store together, which writes them together.
 
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
@@ -21,13 +23,13 @@ use super::report::Observe;
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
 
-/// Reports of one list.
+/// Number of reports in one list.
 pub const REPORTS: RangeInclusive<usize> = 1..=1000;
-/// Elements of one list under way at a time: two commits of the store, so that one is made ready while the other is
+/// Elements of one list in progress at a time: two commits of the store, so that one is prepared while the other is
 /// written.
 const AT_A_TIME: usize = 128;
 
-/// What became of one element of a list.
+/// The outcome of one element of a list.
 #[derive(Debug)]
 pub struct Reported {
     pub session: String,
@@ -40,7 +42,7 @@ impl Sessions {
     /// Records one report as [`Sessions::observe`] does.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Sessions::observe`].
     pub async fn report(&self, caller: &Caller, report: Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
         let started = Instant::now();
         let report = Observe { reported_by: caller.key().clone(), ..report };
@@ -49,14 +51,15 @@ impl Sessions {
         Ok(answer)
     }
 
-    /// Records a list of reports, each as a call of its own would be: what became of each, in their order. The call itself
-    /// was taken off the allowance for the first element; every other one is taken off it here.
+    /// Records a list of reports, each like a call of its own, and returns their outcomes in order. The call itself
+    /// took the
+    /// first element from the rate limit; every other element is taken here.
     ///
     /// # Errors
-    /// The list is empty or too long, or names a session twice; nothing is recorded then.
+    /// The list is empty or too long, or names a session twice. Nothing is recorded in that case.
     pub async fn report_all(&self, caller: &Caller, reports: Vec<Observe>) -> Result<Vec<Reported>, ServiceError> {
         check(&reports)?;
-        // As many at a time as can begin, and no more than the tenant's heavy calls may be.
+        // As many at a time as can begin, and at most the tenant's limit of heavy calls.
         let lane = Arc::new(Semaphore::new(self.resolving.of_one.min(caller.allowance.heavy_of_one())));
         let doubts = self.peer_doubts(caller, &reports).await;
         let elements = reports.into_iter().zip(doubts).enumerate().map(|(index, (report, peer_doubts))| {
@@ -78,7 +81,7 @@ impl Sessions {
     }
 }
 
-/// Two periods of one session would race, and which of them is refused would be chance.
+/// Checks the list. Two periods of one session would race, and chance would decide which is rejected.
 fn check(reports: &[Observe]) -> Result<(), FieldError> {
     if !REPORTS.contains(&reports.len()) {
         return Err(FieldError::new("body", format!("{} reports", reports.len()), too_many()));
@@ -93,7 +96,7 @@ fn check(reports: &[Observe]) -> Result<(), FieldError> {
     }
 }
 
-/// The rule of a list's length.
+/// Returns the rule for the length of a list.
 pub fn too_many() -> String {
     format!("must hold {} to {} reports", REPORTS.start(), REPORTS.end())
 }

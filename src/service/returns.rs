@@ -1,4 +1,4 @@
-//! Text of returns, read for whoever asks. Nothing is stored.
+//! Reads returns from text on request. Nothing is stored.
 
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -8,20 +8,22 @@ use super::sessions::Sessions;
 use crate::returns::{Choices, Reading, read};
 use crate::store::Tenant;
 
-/// A text, and what is said of it.
+/// A text with returns, and the choices for reading it.
 #[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReadReturns {
-    /// As it was pasted, or stands in a file: at most 8 MB.
+    /// The text as pasted or read from a file: at most 8 MB.
     pub text: String,
-    /// Nothing at first, then the answers to what is asked.
+    /// Empty at first, then the answers to the questions about the text.
     #[serde(default)]
     pub choices: Choices,
 }
 
 impl Sessions {
+    /// Reads the returns.
+    ///
     /// # Errors
-    /// No turn to compute.
+    /// No permit to compute came in time.
     pub async fn read_returns(&self, tenant: &Tenant, question: ReadReturns) -> Result<Reading, ServiceError> {
         self.advising.run(tenant, move || read(&question.text, &question.choices)).await
     }

@@ -1,4 +1,4 @@
-//! The text of keys, which is shown once and kept nowhere.
+//! The text of keys, which is shown once and stored nowhere.
 
 use std::fmt;
 
@@ -7,13 +7,15 @@ use rand::rngs::SysRng;
 
 use super::error::ServiceError;
 
-/// What a key starts with, so that people and scanners of repositories know one when they see it.
+/// Prefix of a key, so that people and repository scanners recognise one.
 pub const PREFIX: &str = "ballast_";
 
-/// The text of a key, 256 random bits; shown once, printed by nothing else.
+/// The text of a key, 256 random bits; shown once and never printed otherwise.
 pub struct Secret(String);
 
 impl Secret {
+    /// Draws a new secret.
+    ///
     /// # Errors
     /// The operating system gives no random bits.
     pub fn new() -> Result<Self, ServiceError> {
@@ -23,7 +25,7 @@ impl Secret {
         Ok(Secret(format!("{PREFIX}{digits}")))
     }
 
-    /// The text, to be shown to its new holder.
+    /// Returns the text, to show it to its new owner.
     pub fn reveal(&self) -> &str {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! What is read of a session: its rows, in the room that other large answers leave, and the session replayed from them.
+//! Reads the rows of a session, within the memory that other large answers leave, and replays the session from them.
 
 use super::error::ServiceError;
 use super::live::Live;
@@ -7,11 +7,11 @@ use super::sessions::Sessions;
 use super::slots::Source;
 use crate::store::{SessionFacts, Tenant};
 
-/// Entries replayed in a few milliseconds.
+/// Entries that can be replayed in a few milliseconds.
 const PROMPT_ENTRIES: usize = 520;
-/// Log-returns of a start that make each of them as long again.
+/// Initial log-returns that double the replay time of each entry.
 const RETURNS_AN_ENTRY: usize = 2000;
-/// Entries are held as rows and as what is read from them.
+/// Entries are held both as rows and as what is read from them.
 const FORMS_OF_ENTRIES: usize = 2;
 
 impl Sessions {
@@ -19,10 +19,10 @@ impl Sessions {
         Rows { sessions: self, tenant, session }
     }
 
-    /// The work done at once where it is short, and in a turn of the tenant's apart from the runtime's threads where it is long.
+    /// Runs short work at once. Runs long work in the tenant's queue, apart from the runtime's threads.
     ///
     /// # Errors
-    /// No turn came in time.
+    /// No permit came in time.
     pub(super) async fn apart<T: Send + 'static>(
         &self,
         tenant: &Tenant,
@@ -35,10 +35,11 @@ impl Sessions {
         }
     }
 
-    /// A session and its entries, once other large answers leave room for them; the room is held as long as they are.
+    /// Reads a session and its entries once other large answers leave room for them. The room is held as long as they
+    /// are.
     ///
     /// # Errors
-    /// There is no such session; there is no room in time.
+    /// There is no such session, or there is no room in time.
     pub(super) async fn facts(&self, tenant: &Tenant, session: &str) -> Result<Large<SessionFacts>, ServiceError> {
         let room = self.memory.answers(FORMS_OF_ENTRIES * self.store.entry_bytes(session).await?).await?;
         let facts = self.store.session_facts(tenant, session).await?;

@@ -1,12 +1,14 @@
-//! Live sessions: an investor's wealth and the law learned so far.
+//! Live sessions: wealth and the law learned so far.
 //!
-//! A session is its rows: the state in memory is a replay of them, or the start from which a replay would begin, and out of
-//! memory while a write is under way, so memory never runs ahead of the disk. Before every use it is held against the store,
-//! and a state of other rows is dropped: no process advises from a law that has been taken further, or that a restored
-//! database never had. One lock per session orders its observations in this process (see `super::slots`).
+//! A session is its rows. The state in memory is a replay of them, or the start of one, and the slot is empty during a
+//! write. So memory never runs ahead of the disk. Before every use the state is compared with the store, and a state of
+//! other rows is dropped. So no process advises from an outdated law, or from one that a restored database never had.
+//! One
+//! lock per session orders its observations in this process (see `super::slots`).
 //!
-//! A session is its tenant's: to everybody else it does not exist. Slots are named by tenant and session, so nobody's
-//! call waits for, fills or empties the slot of another tenant.
+//! A session belongs to its tenant and does not exist for others. Slots are named by tenant and session, so no call
+//! waits
+//! for, fills or empties the slot of another tenant.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -41,14 +43,15 @@ use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
 use crate::store::{CreateSession, Relabel, RequestKey, SessionRow, Store, Tenant};
 
-/// Lists of sessions that read at a time: fewer than the store has connections for lists, so that those of jobs, policies and
-/// labels, which read what they show, always find one.
+/// Lists of sessions read concurrently. These are fewer than the store's connections for lists, so that the lists of
+/// jobs,
+/// policies and labels always find one.
 const LISTS: usize = 2;
 
-/// Whose session it is, and its name.
+/// The tenant of a session, and its name.
 pub(super) type Name = (Tenant, String);
 
-/// What a session starts from; history and wealth default to the policy's, and it holds nothing unless it says so.
+/// The start of a session. History and wealth default to the policy's, and holdings default to 0.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
     pub policy: String,
@@ -61,24 +64,25 @@ pub struct Start {
     pub labels: Relabel,
 }
 
-/// Where a session begins.
+/// The initial state of a session.
 struct Beginning {
     state: State,
-    /// Where there are several.
+    /// Present if there are several assets.
     assets: Option<Box<Assets>>,
-    /// Log-returns known, date after date.
+    /// Known log-returns, date after date.
     history: Vec<f64>,
 }
 
 impl Start {
-    /// The request for it under a key. Its hash is that of no job's request, which has other fields.
+    /// Returns the request for this start under a key. Its hash differs from that of any job's request, which has other
+    /// fields.
     fn under(&self, key: String) -> Result<RequestKey, ServiceError> {
         idempotency::check(&key)?;
         let sent = serde_json::to_vec(self).map_err(ServiceError::internal)?;
         Ok(RequestKey { key, request_hash: content_hash(&sent) })
     }
 
-    /// Where it begins by the policy of `advisor`.
+    /// Returns the initial state for the policy of `advisor`.
     fn begins(self, advisor: &Advisor) -> Result<Beginning, FieldError> {
         let Start { history, wealth, holding, holdings, .. } = self;
         let Specification { problem, fund, .. } = advisor.specification();
@@ -124,7 +128,7 @@ pub struct Sessions {
     pub(super) policies: Arc<Policies>,
     pub(super) memory: Memory,
     slots: Arc<Slots<Name, Live>>,
-    /// Told of sessions that became due to be renewed.
+    /// Receives sessions that became due for renewal.
     pub(super) due: Sender<Name>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,
@@ -144,16 +148,16 @@ impl Sessions {
         let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
         let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
         let listing = Turns::new(LISTS, config.turn_wait);
-        // Two generations are kept.
+        // There are two generations.
         let weight = memory.for_sessions() / 2;
         let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
         Sessions { store, clock, policies, memory: memory.clone(), slots, due, advising, resolving, listing }
     }
 
-    /// Opens a session. The same key and start again give the same session as it was opened.
+    /// Opens a session. The same key and start again return the same session as it was opened.
     ///
     /// # Errors
-    /// There is no such policy, or history, wealth or holding breaks a rule; a key used with another request.
+    /// There is no such policy, history, wealth or holding breaks a rule, or the key was used with another request.
     pub async fn open(
         &self,
         caller: &Caller,
@@ -167,7 +171,7 @@ impl Sessions {
         let Start { policy, renew, rolling, labels, .. } = start.clone();
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let beginning = start.begins(&advisor)?;
-        // The policy's own wealth pays, whatever is held.
+        // Withdrawals are checked against wealth, whatever is held.
         advisor.check_withdrawals(&beginning.state)?;
         let plan = Plan::new(&advisor, beginning.state.law.sample_size(), renew, rolling)?;
         if beginning.assets.is_some() && Assets::must_solve(&advisor, 0) {
@@ -194,7 +198,7 @@ impl Sessions {
         let opening = opening.create_session(row.clone(), labels, key.clone());
         let (row, seen, is_new) = match opening.instrument(spans::of_write("open a session")).await? {
             CreateSession::Created => (row, new, true),
-            // Of the same start: the state is the one above.
+            // A repeated request has the same start, so its state is the one above.
             CreateSession::Repeated(earlier) => {
                 let seen = earlier.as_opened();
                 (earlier, seen, false)
@@ -225,7 +229,7 @@ impl Sessions {
         Ok(live)
     }
 
-    /// With the composition of several assets before the first period, and the state of their fund.
+    /// Chooses the composition of several assets before the first period, and the state of their fund.
     async fn composed(
         &self,
         tenant: &Tenant,
@@ -238,16 +242,18 @@ impl Sessions {
         self.resolving.run(tenant, compose).await
     }
 
-    /// Bytes of the sessions in memory.
+    /// Returns the bytes of the sessions in memory.
     pub(super) fn bytes(&self) -> usize {
         self.slots.bytes()
     }
 
-    /// Number of sessions in memory.
+    /// Returns the number of sessions in memory.
     pub fn in_memory(&self) -> usize {
         self.slots.count()
     }
 
+    /// Returns a session.
+    ///
     /// # Errors
     /// There is no such session.
     pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
@@ -255,10 +261,12 @@ impl Sessions {
         held.current(&self.rows(tenant, session)).await.cloned()
     }
 
+    /// Deletes a session.
+    ///
     /// # Errors
     /// There is no such session.
     pub async fn delete(&self, caller: &Caller, session: &str) -> Result<(), ServiceError> {
-        // Once nobody uses it any more.
+        // Waits until nobody uses it any more.
         let mut held = self.hold(&caller.tenant, session).await;
         held.clear();
         let deleting = self.store.by(caller.actor());
@@ -267,12 +275,12 @@ impl Sessions {
         if !deleted {
             return Err(ServiceError::unknown("session", session));
         }
-        // What it requested is requested no more.
+        // The training that it requested is no longer needed.
         let _ = self.due.try_send((caller.tenant.clone(), session.to_owned()));
         Ok(())
     }
 
-    /// The policy of a session, made ready.
+    /// Returns the prepared policy of a session.
     pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
         self.policies.advisor(tenant, &live.current.policy).await
     }
@@ -290,7 +298,7 @@ impl Sessions {
         Means { advisor, advising: &self.advising, resolving: &self.resolving, turn }
     }
 
-    /// Counts a session in memory by what it takes now.
+    /// Updates the memory counted for a session.
     pub(super) fn weigh(&self, live: &Live) {
         self.slots.weigh(&(live.row.tenant.clone(), live.row.session.clone()), live.bytes());
     }

@@ -1,12 +1,12 @@
-//! The one signal that ends the service: announced, then begun, never taken back.
+//! The signal that ends the service: announced, then begun, never withdrawn.
 
 use tokio::sync::watch;
 
-/// How far the end has come.
+/// The phases of a shutdown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Phase {
     Serving,
-    /// Everything is answered still; whoever balances callers is told to look elsewhere.
+    /// Requests are still answered; load balancers are told to send clients elsewhere.
     Leaving,
     Ending,
 }
@@ -28,12 +28,12 @@ impl Shutdown {
         });
     }
 
-    /// Says that the service will end soon: it is ready no more, and connections close with their next answers.
+    /// Announces that the service will end soon: it reports not ready, and connections close after their next answers.
     pub fn announce(&self) {
         self.reach(Phase::Leaving);
     }
 
-    /// Raises the signal.
+    /// Begins the shutdown.
     pub fn begin(&self) {
         self.reach(Phase::Ending);
     }
@@ -46,7 +46,7 @@ impl Shutdown {
         *self.0.borrow() == Phase::Ending
     }
 
-    /// Resolves once the signal is raised.
+    /// Resolves once the shutdown has begun.
     pub async fn begun(&self) {
         // The sender lives in `self`, so waiting cannot fail.
         let _ = self.0.subscribe().wait_for(|phase| *phase == Phase::Ending).await;

@@ -1,23 +1,25 @@
-//! Which states stay in memory, and who may touch one.
+//! A cache of states, with one lock for each name.
 //!
 //! A state is a copy of what the store holds, and each name has one slot for it. A slot is
 //!
-//! - absent, until somebody holds the name;
-//! - held, by whoever has its lock and by all who wait for it; it has a state or it is empty;
-//! - kept, once nobody holds it, where it has a state; an empty one is absent at once.
+//! - absent, until a caller holds the name;
+//! - held, by the caller with its lock and by all that wait for it; it has a state or is empty;
+//! - kept, if it has a state and no caller holds it; an empty slot becomes absent at once.
 //!
-//! What keeps a stale state from being used, in this order:
+//! A stale state is never used, for these reasons in order:
 //!
-//! 1. No slot that is held leaves the map, so those who come later wait for the same lock as those who wait already.
-//! 2. [`Held::current`] is the only way to a state, and asks its [`Source`] before every use whether it is out of date.
-//!    Where the source does not answer there is an error and no state.
-//! 3. A state is out of its slot while the source decides on what follows it; it is followed or read anew, never kept.
+//! 1. No slot that is held leaves the map, so later callers wait for the same lock as those that wait already.
+//! 2. [`Held::current`] is the only way to a state. Before every use it checks with the [`Source`] that the state is current.
+//!    If the source does not answer, there is an error and no state.
+//! 3. A state is out of its slot while the source decides on its successor. It is replaced or read again, never kept.
 //!
-//! Either of the first two would do alone. `tests/slots.rs` has a checker of concurrency show that, and that it finds the
-//! fault where neither holds.
+//! Either of the first two would be enough. `tests/slots.rs` shows this with a concurrency checker, and also that the
+//! checker
+//! finds the fault if neither holds.
 //!
-//! What is kept is bounded by two generations: a slot that is held joins the young one; when that is full it becomes the
-//! old one, and what was old and has not been held since is dropped, to be read anew should it be asked for.
+//! Memory is bounded by two generations. A slot that is held joins the young one. When that is full it becomes the old
+//! one,
+//! and old slots that nobody has held since are dropped. Their states are read again when needed.
 
 use std::collections::HashMap;
 use std::future::Future;
@@ -26,21 +28,21 @@ use std::mem;
 
 use super::sync::{Arc, AsyncMutex, Mutex, MutexGuard, OwnedMutexGuard, PoisonError};
 
-/// Where states are read from.
+/// The source of states.
 pub(super) trait Source<S> {
     type Error;
 
-    /// Whether `state` is what [`Source::read`] would give now.
+    /// Returns whether `state` is what [`Source::read`] would return now.
     fn is_current(&self, state: &mut S) -> impl Future<Output = Result<bool, Self::Error>> + Send;
 
     fn read(&self) -> impl Future<Output = Result<S, Self::Error>> + Send;
 }
 
-/// What one generation holds.
+/// The limits of one generation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Generation {
     pub slots: usize,
-    /// Sum of what [`Slots::weigh`] was told of its slots, in bytes.
+    /// Sum of the weights given to [`Slots::weigh`], in bytes.
     pub weight: usize,
 }
 
@@ -50,12 +52,12 @@ pub(super) struct Slots<N: Eq + Hash + Clone, S> {
     map: Mutex<Map<N, S>>,
 }
 
-/// What the users of one slot share.
+/// The part of a slot that its users share.
 type Shared<S> = Arc<AsyncMutex<Option<S>>>;
 
 struct Slot<S> {
     state: Shared<S>,
-    /// Those who have its lock or wait for it. Changed under the lock of the map alone.
+    /// Callers that have its lock or wait for it. Changed only under the lock of the map.
     holders: usize,
     /// Bytes, once its state was read.
     weight: usize,
@@ -64,7 +66,7 @@ struct Slot<S> {
 struct Map<N, S> {
     young: HashMap<N, Slot<S>>,
     old: HashMap<N, Slot<S>>,
-    /// Of the young.
+    /// Bytes of the young generation.
     weight: usize,
 }
 
@@ -73,17 +75,17 @@ impl<N: Eq + Hash + Clone, S> Slots<N, S> {
         Slots { largest, map: Mutex::new(Map { young: HashMap::new(), old: HashMap::new(), weight: 0 }) }
     }
 
-    /// Waits until nobody before holds the slot of `name`.
+    /// Waits until no earlier caller holds the slot of `name`.
     pub(super) async fn hold(self: &Arc<Self>, name: N) -> Held<N, S> {
         let (state, dropped) = self.lock().enter(&name, self.largest);
-        // After the lock of the map: a generation takes a while.
+        // After the lock of the map is released, because dropping a generation takes a while.
         drop(dropped);
-        // Counted from here on, even where the caller stops waiting.
+        // Counted from here on, even if the caller stops waiting.
         let place = Place { slots: self.clone(), name };
         Held { state: state.lock_owned().await, _place: place }
     }
 
-    /// The state of a slot that is held takes so many bytes.
+    /// Sets the bytes that the state of a held slot takes.
     pub(super) fn weigh(&self, name: &N, weight: usize) {
         let mut map = self.lock();
         let Map { young, old, weight: of_the_young } = &mut *map;
@@ -95,13 +97,13 @@ impl<N: Eq + Hash + Clone, S> Slots<N, S> {
         }
     }
 
-    /// Bytes of all of them.
+    /// Returns the bytes of all slots.
     pub(super) fn bytes(&self) -> usize {
         let map = self.lock();
         map.weight + weight_of(&map.old)
     }
 
-    /// Number of slots, held or kept.
+    /// Returns the number of slots, held or kept.
     pub(super) fn count(&self) -> usize {
         let map = self.lock();
         map.young.len() + map.old.len()
@@ -114,7 +116,7 @@ impl<N: Eq + Hash + Clone, S> Slots<N, S> {
 }
 
 impl<N: Eq + Hash + Clone, S> Map<N, S> {
-    /// The slot of `name`, with one holder more, and what had to go for it.
+    /// Returns the slot of `name`, with one more holder, and the slots dropped to make room.
     fn enter(&mut self, name: &N, largest: Generation) -> (Shared<S>, HashMap<N, Slot<S>>) {
         let mut dropped = HashMap::new();
         if !self.young.contains_key(name) {
@@ -130,7 +132,7 @@ impl<N: Eq + Hash + Clone, S> Map<N, S> {
         (slot.state.clone(), dropped)
     }
 
-    /// The young become the old; those of the old whom nobody holds are returned, to be dropped.
+    /// Makes the young generation the old one, and returns the old slots that nobody holds, to be dropped.
     fn age(&mut self) -> HashMap<N, Slot<S>> {
         let old = mem::replace(&mut self.old, mem::take(&mut self.young));
         let (held, dropped) = old.into_iter().partition(|(_, slot)| slot.holders > 0);
@@ -139,7 +141,7 @@ impl<N: Eq + Hash + Clone, S> Map<N, S> {
         dropped
     }
 
-    /// One holder less; an empty slot whose last holder leaves is gone.
+    /// Removes one holder; an empty slot is removed with its last holder.
     fn leave(&mut self, name: &N) {
         let is_young = self.young.contains_key(name);
         let generation = if is_young { &mut self.young } else { &mut self.old };
@@ -164,15 +166,15 @@ impl<S> Slot<S> {
     }
 }
 
-/// A slot whose lock is held until this is dropped.
+/// A slot whose lock is held until drop.
 pub(super) struct Held<N: Eq + Hash + Clone, S> {
-    // Dropped first: when the last holder leaves, nobody has the lock.
+    // Dropped first: when the last holder leaves, no caller has the lock.
     state: OwnedMutexGuard<Option<S>>,
     _place: Place<N, S>,
 }
 
 impl<N: Eq + Hash + Clone, S> Held<N, S> {
-    /// The state as `source` has it now: the one in memory where it is current, else read anew.
+    /// Returns the present state of `source`: the one in memory if it is current, otherwise read again.
     ///
     /// # Errors
     /// The source does not answer, or has no such state.
@@ -189,18 +191,18 @@ impl<N: Eq + Hash + Clone, S> Held<N, S> {
         Ok(self.state.insert(state))
     }
 
-    /// Empties the slot: before the source is asked for a change, whose outcome may stay unknown.
+    /// Empties the slot, before a change of the source whose outcome may stay unknown.
     pub(super) fn clear(&mut self) {
         *self.state = None;
     }
 
-    /// What the source has from now on.
+    /// Stores the new state of the source.
     pub(super) fn put(&mut self, state: S) {
         *self.state = Some(state);
     }
 }
 
-/// One of the holders of a slot.
+/// One holder of a slot.
 struct Place<N: Eq + Hash + Clone, S> {
     slots: Arc<Slots<N, S>>,
     name: N,

@@ -1,15 +1,16 @@
-//! Spans: what a request spends its time on, for OpenTelemetry.
+//! Spans of where a request spends its time, for OpenTelemetry.
 //!
-//! They have a target of their own, which the layer that hands them on listens to and nothing else does: where there is no
-//! such layer, a span costs one look at a static. They name routes, statuses and tenants, never keys, nor what was sent.
+//! They have a target of their own, to which only the exporting layer listens. Without such a layer, a span costs one
+//! read
+//! of a static. Spans name routes, statuses and tenants, never keys or request contents.
 
 use tracing::Span;
 use tracing::field::Empty;
 
-/// What a layer must listen to.
+/// The target that a layer must listen to.
 pub const TARGET: &str = "ballast_span";
 
-/// A request on its way to a route of the table.
+/// Opens the span of a request to a route of the table.
 pub fn of_request(method: &str, route: &str) -> Span {
     tracing::trace_span!(
         target: TARGET,
@@ -24,7 +25,7 @@ pub fn of_request(method: &str, route: &str) -> Span {
     )
 }
 
-/// Ends [`of_request`]; a tenant where the request had one.
+/// Records the outcome of the request in its span, with the tenant if it had one.
 pub fn answered(span: &Span, status: u16, tenant: Option<&str>) {
     if span.is_disabled() {
         return;
@@ -38,17 +39,17 @@ pub fn answered(span: &Span, status: u16, tenant: Option<&str>) {
     }
 }
 
-/// A write, until it is durable.
+/// Opens the span of a write, until it is durable.
 pub(super) fn of_write(what: &'static str) -> Span {
     tracing::trace_span!(target: TARGET, "write", otel.name = what)
 }
 
-/// The time until a place is free for work.
+/// Opens the span of the wait for a permit.
 pub(super) fn of_turn() -> Span {
     tracing::trace_span!(target: TARGET, "turn", otel.name = "wait for a turn")
 }
 
-/// Work on a thread that may block.
+/// Opens the span of work on a thread that may block.
 pub(super) fn of_work(what: &'static str) -> Span {
     tracing::trace_span!(target: TARGET, "work", otel.name = what)
 }

@@ -1,4 +1,4 @@
-//! Where a session stands, and where a report leads from there.
+//! The state of a session, and the transition that a report causes.
 
 use std::sync::Arc;
 
@@ -19,38 +19,39 @@ use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::moments::CentralMoments;
 
-/// Where a session stands between two periods.
+/// The state of a session between two periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
-    /// Of several assets, that of their fund.
+    /// For several assets, the state of their fund.
     pub state: State,
-    /// The assets, where there are several.
+    /// The assets, if there are several.
     pub assets: Option<Box<Assets>>,
     /// The price reported for the last period, if one was.
     pub price: Option<f64>,
     /// The last days of the periods.
     pub days: Days,
-    /// Against the returns' coming as they came.
+    /// The test of whether returns still come from the same law.
     pub bet: Bet,
-    /// All returns seen, where the law is of the last of them alone; of several assets always, their mean date by date.
+    /// All observed returns, if the law holds only the last ones. For several assets always present: the mean of each
+    /// date.
     seen: Option<EmpiricalDistribution>,
     session: Arc<str>,
 }
 
-/// What a report makes of a period.
+/// The effect of a report of a period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Passed {
     pub seen: Seen,
-    /// Of several assets, that of what was held.
+    /// For several assets, the log-return of the holdings.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
-    /// Shares of wealth held in several assets; none of one.
+    /// Shares of wealth held in several assets; empty for one asset.
     pub executed: Vec<f64>,
     pub standing: Standing,
 }
 
 impl Standing {
-    /// At the start of `session`.
+    /// Returns the state at the start of `session`.
     pub(super) fn at(session: &str, state: State, assets: Option<Box<Assets>>) -> Self {
         let seen = assets.as_ref().map(|assets| Assets::means(&assets.fund.rows));
         Standing {
@@ -64,10 +65,10 @@ impl Standing {
         }
     }
 
-    /// The same with the law that the last `window` dates of `record` teach, which holds all that were seen.
+    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns.
     ///
     /// # Errors
-    /// They are no history.
+    /// They are not a valid history.
     pub(super) fn renewed(
         &self,
         record: &Record,
@@ -92,15 +93,15 @@ impl Standing {
         Ok(Standing { state, assets, price, days, bet, seen, session: self.session.clone() })
     }
 
-    /// Names of the assets where there are several; none of one.
+    /// Returns the names of the assets if there are several; empty for one asset.
     pub(super) fn names(&self) -> &[String] {
         self.assets.as_ref().map_or(&[][..], |assets| &assets.names)
     }
 
-    /// What `report` tells of the coming period.
+    /// Reads the returns of the coming period from `report`.
     ///
     /// # Errors
-    /// A field breaks a rule; the date is none after the last.
+    /// A field breaks a rule, or the date is not after the last one.
     pub(super) fn read(&self, report: &Report) -> Result<Seen, FieldError> {
         report.check()?;
         if let (Some(date), Some(last)) = (report.date, self.days.last)
@@ -114,11 +115,12 @@ impl Standing {
         }
     }
 
-    /// After `period`, of which `report` tells, and for which `advised` was advised of all assets; a report without a day takes
-    /// the next one due where `periods_per_year` of them are a year.
+    /// Returns the effect of `report` on `period`, for which a total of `advised` was advised. A report without a day
+    /// takes
+    /// the next one due, if `periods_per_year` is known.
     ///
     /// # Errors
-    /// As [`Standing::read`]; wealth leaves the range that is taken.
+    /// As [`Standing::read`], or wealth leaves the permitted range.
     pub(super) fn after(
         &self,
         dynamics: Dynamics,
@@ -160,7 +162,7 @@ impl Standing {
         Ok(Passed { seen, log_return, executed_allocation, executed, standing })
     }
 
-    /// The report of a period in which nothing is traded unless it says so.
+    /// Returns the report of a period without trades unless it gives holdings.
     pub(super) fn held_on(&self, reported: &Report) -> Report {
         let mut report = reported.clone();
         if let Some(assets) = &self.assets {
@@ -169,7 +171,7 @@ impl Standing {
         report
     }
 
-    /// The record, the bet and the holdings after a period.
+    /// Updates the record, the drift test and the holdings after a period.
     fn learn(&mut self, seen: &Seen, executed: &[f64], period: usize) {
         let row = seen.row();
         if let Some(assets) = &mut self.assets {
@@ -183,7 +185,7 @@ impl Standing {
         self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), told, &self.session, period);
     }
 
-    /// The prices that were reported with what was passed.
+    /// Takes over the prices reported with the last period.
     pub(super) fn price_as(&mut self, report: &Report) {
         self.price = report.price;
         if let Some(assets) = &mut self.assets {
@@ -191,15 +193,15 @@ impl Standing {
         }
     }
 
-    /// Takes the composition that was told; the law is then to be made anew.
+    /// Applies a reported composition; the law must be rebuilt afterwards.
     ///
     /// # Errors
-    /// It is of other assets.
+    /// It names other assets.
     pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
         self.assets.as_mut().map_or(Ok(()), |assets| assets.take(told))
     }
 
-    /// The same with the law of the fund, where there are several assets.
+    /// Returns the state with the law of the fund rebuilt, if there are several assets.
     #[must_use]
     pub(super) fn with_law(mut self, learning: Learning) -> Self {
         if let Some(assets) = &self.assets {
@@ -208,13 +210,13 @@ impl Standing {
         self
     }
 
-    /// Chooses the composition before the period after `step`, where there are several assets.
+    /// Chooses the composition before the period after `step`, if there are several assets.
     pub(super) fn compose(&mut self, advisor: &Advisor, step: usize) {
         let Some(assets) = &mut self.assets else { return };
         self.state = assets.compose(advisor, step, &self.state);
     }
 
-    /// Supposes that wealth, or what is held of several assets, were another since the last choice of the composition.
+    /// Replaces wealth, or the holdings of several assets, as of the last choice of the composition.
     pub(super) fn suppose(&mut self, advisor: &Advisor, step: usize, wealth: Option<f64>, holdings: Option<Vec<f64>>) {
         let Some(assets) = &mut self.assets else { return };
         self.state.wealth = wealth.unwrap_or(self.state.wealth);
@@ -225,14 +227,14 @@ impl Standing {
         self.state = assets.compose_anew(advisor, step, &self.state);
     }
 
-    /// Returns that it holds.
+    /// Returns the number of returns that the state holds.
     pub(super) fn returns(&self) -> usize {
         let seen = self.seen.as_ref().map_or(0, EmpiricalDistribution::sample_size);
         let of_assets = self.assets.as_ref().map_or(0, |assets| assets.fund.rows.len() * assets.names.len());
         self.state.law.sample_size() + seen + of_assets
     }
 
-    /// Doubts about the returns of a report, each beside the record of its asset.
+    /// Returns doubts about the returns of a report, each against the record of its asset.
     pub(super) fn return_doubts(&self, report: &Report, seen: &Seen) -> Vec<Doubt> {
         match (seen, &self.assets) {
             (Seen::One(Some(log_return)), _) => {
@@ -254,7 +256,7 @@ impl Standing {
     }
 }
 
-/// Wealth as return, allocation and flow give it.
+/// Returns wealth as computed from return, allocation and flow.
 fn reached(wealth: f64, report: &Report) -> Result<f64, FieldError> {
     let (low, high) = rules::WEALTH;
     if (low..=high).contains(&wealth) {

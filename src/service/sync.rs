@@ -1,4 +1,4 @@
-//! What the slots lock with. `tests/slots.rs` compiles the same slots over a checker's primitives instead.
+//! The lock of the slots. `tests/slots.rs` compiles the same slots with a checker's primitives instead.
 
 pub(super) use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -1,12 +1,14 @@
-//! By whose clock things are dated, and whether it is right enough to delete by.
+//! The clock that dates everything, and a check that it is right enough to delete by.
 //!
-//! Replicas follow the clock of their database: what they date, what expires and what is deleted by age is the same
-//! whichever of them looks. A machine whose clock differs from it by more than [`LARGEST_SKEW_MS`] says so and deletes
-//! nothing by age.
+//! Replicas follow the clock of their database, so that dates, expiry and deletion by age agree on all of them. A
+//! machine
+//! whose clock differs from it by more than [`LARGEST_SKEW_MS`] reports that and deletes nothing by age.
 //!
-//! A folder has no clock but its machine's. That is compared with the newest moment stored: one that is more than
-//! [`LONGEST_GAP_MS`] from it has jumped, or the service was stopped for so long. Nothing is deleted by age until the
-//! service has run for as long as that.
+//! A folder has only the clock of its machine. That clock is compared with the newest time stored. If they differ by
+//! more
+//! than [`LONGEST_GAP_MS`], the clock has jumped or the service was stopped for that long. Nothing is deleted by age
+//! until
+//! the service has run for as long as that.
 
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,17 +20,17 @@ use crate::store::{Store, StoreError};
 
 const LARGEST_SKEW_MS: i64 = 60_000;
 const LONGEST_GAP_MS: i64 = 24 * 60 * 60 * 1000;
-/// A heartbeat is stored no more often.
+/// Shortest time between two stored heartbeats.
 const BETWEEN_BEATS_MS: i64 = 5 * 60 * 1000;
 
 /// Compares this machine's clock with the store's.
 pub(super) struct Timekeeper {
     store: Store,
-    /// The machine's own.
+    /// The clock of the machine.
     machine: Clock,
-    /// How far that is ahead of the database's.
+    /// How far the machine's clock is ahead of the database's.
     ahead_ms: Arc<AtomicI64>,
-    /// How far it is ahead of what it is compared with, as far as that matters.
+    /// How far it is ahead of its reference; 0 if the difference is tolerated.
     skew_ms: AtomicI64,
     gap: Mutex<Gap>,
 }
@@ -39,12 +41,12 @@ impl Timekeeper {
         Timekeeper { store, machine, ahead_ms, skew_ms: AtomicI64::new(0), gap: Mutex::new(Gap::default()) }
     }
 
-    /// The clock that things are dated by.
+    /// Returns the clock that dates everything.
     pub(super) fn clock(&self) -> Clock {
         self.machine.behind(self.ahead_ms.clone())
     }
 
-    /// The time to delete by, in milliseconds since 1970; `None` if nothing may be deleted.
+    /// Returns the time to delete by, in milliseconds since 1970; `None` if nothing may be deleted.
     ///
     /// # Errors
     /// The store does not answer.
@@ -63,7 +65,7 @@ impl Timekeeper {
         Ok((skew_ms == 0).then_some(time_ms))
     }
 
-    /// How many seconds the clock is ahead of the one it should be, as of the last comparison; 0 if it is right enough.
+    /// Returns how many seconds the clock was ahead of its reference at the last comparison; 0 if it is right enough.
     pub(super) fn skew_seconds(&self) -> i64 {
         self.skew_ms.load(Ordering::Relaxed) / 1000
     }
@@ -75,7 +77,7 @@ impl Timekeeper {
         let is_accepted = skew_ms == 0 && ahead_ms.abs() > LONGEST_GAP_MS;
         if last_ms == i64::MIN || is_accepted || (skew_ms == 0 && ahead_ms >= BETWEEN_BEATS_MS) {
             match self.store.beat(now_ms).await {
-                // What was stored before stays to be compared with.
+                // The heartbeat stored before stays as the reference.
                 Err(StoreError::Full { .. }) => {}
                 stored => stored?,
             }
@@ -84,19 +86,19 @@ impl Timekeeper {
     }
 }
 
-/// How far a clock that showed `before` and `after` around a look at another is ahead of that one at least.
+/// Returns how far at least a clock that read `before` and `after` around a reading of another is ahead of that one.
 fn ahead(before_ms: i64, other_ms: i64, after_ms: i64) -> i64 {
     if other_ms < before_ms { before_ms.saturating_sub(other_ms) } else { after_ms.saturating_sub(other_ms).min(0) }
 }
 
-/// A gap between a clock and the newest moment stored, since it was first seen.
+/// A gap between a clock and the newest time stored, since it was first seen.
 #[derive(Default)]
 struct Gap {
     since: Option<Instant>,
 }
 
 impl Gap {
-    /// The gap as far as it matters: 0 if it is short, or if the clock has run on for as long as a gap may be.
+    /// Returns the gap if it matters: 0 if it is short, or if the clock has since run for the longest gap allowed.
     fn judge(&mut self, ahead_ms: i64, now: Instant) -> i64 {
         if ahead_ms.abs() <= LONGEST_GAP_MS {
             self.since = None;
@@ -132,7 +134,7 @@ mod tests {
         assert_eq!(gap.judge(500 * DAY_MS, start), 500 * DAY_MS);
         assert_eq!(gap.judge(500 * DAY_MS, after(23)), 500 * DAY_MS);
         assert_eq!(gap.judge(500 * DAY_MS, after(24)), 0);
-        // A jump back is a gap too, and one that was mended is none.
+        // A jump back is a gap also, and one that was corrected is none.
         assert_eq!(gap.judge(-2 * DAY_MS, after(25)), -2 * DAY_MS);
         assert_eq!(gap.judge(10, after(26)), 0);
         assert_eq!(gap.judge(-2 * DAY_MS, after(50)), -2 * DAY_MS);

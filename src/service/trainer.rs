@@ -1,10 +1,13 @@
-//! The worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
+//! The worker: claims jobs one at a time and solves them step by step, with a checkpoint after each.
 //!
-//! It runs on a thread of its own with a pool of its own, so that the threads that answer requests stay free.
-//! Stopping (a cancel, a shutdown, a lost lease) always ends in `release_job`: the store knows whether a cancel was
-//! asked for, and requeues the job or cancels it; a worker that lost its lease changes nothing. The work itself looks
-//! for the stop signal often, but not inside a factorisation, which takes a minute at ten thousand points: past
-//! [`PATIENCE`] the job is given back without waiting for it, and what it still computes is dropped.
+//! It runs on a thread of its own with a pool of its own, so that the threads that answer requests stay free. Every
+//! stop (a
+//! cancel, a shutdown, a lost lease) ends in `release_job`. The store knows whether a cancel was requested, and
+//! requeues the
+//! job or cancels it. A worker that lost its lease changes nothing. The work itself checks the stop signal often, but
+//! not
+//! inside a factorisation, which takes a minute at ten thousand points. After [`PATIENCE`] the job is released without
+//! waiting for it, and what it still computes is dropped.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,17 +36,17 @@ mod evaluating;
 mod frontier;
 mod training;
 
-/// The queue is looked at this often even if nobody rang: a lease may have run out, or another replica queued a job.
+/// Interval for polling the queue without a notification: a lease may have run out, or another replica queued a job.
 const QUEUE_POLL: Duration = Duration::from_secs(1);
-/// The store is asked this often whether the running job should stop: half the second a cancel may take.
+/// Interval for asking the store whether the running job should stop: half the second a cancel may take.
 const CANCEL_POLL: Duration = Duration::from_millis(500);
 
-/// The stop signal is looked at this often, and stopped work has this long to end by itself: with [`CANCEL_POLL`] below
-/// the second a cancel may take.
+/// Interval for checking the stop signal, and the time for stopped work to end by itself. Together with [`CANCEL_POLL`]
+/// they stay below the second a cancel may take.
 const STOP_POLL: Duration = Duration::from_millis(50);
 const PATIENCE: Duration = Duration::from_millis(250);
 
-/// The worker thread, to be joined once.
+/// The worker thread, joined once.
 pub(super) struct Trainer(Mutex<Option<JoinHandle<()>>>);
 
 struct Worker {
@@ -62,7 +65,7 @@ struct Worker {
 /// How the work on a job ended.
 enum Ended {
     Finished(JobOutcome),
-    /// Stopped before the end.
+    /// The work stopped before its end.
     Stopped,
     /// The store failed in a way that may pass.
     Interrupted(StoreError),
@@ -97,7 +100,7 @@ impl Trainer {
         Ok(Trainer(Mutex::new(Some(thread.map_err(ServiceError::internal)?))))
     }
 
-    /// Waits for the worker to put its job back. Call after the shutdown has begun.
+    /// Waits until the worker has requeued its job. Call after the shutdown has begun.
     pub(super) async fn join(&self) {
         let thread = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(thread) = thread else { return };
@@ -149,7 +152,7 @@ impl Worker {
         let solving = std::thread::Builder::new().name("job".into()).spawn(move || {
             let ended = catch_unwind(AssertUnwindSafe(|| worker.solve(&claimed, &signal)))
                 .unwrap_or_else(|panic| failed(panic_reason(panic.as_ref())));
-            // Nobody listens where the work was given up.
+            // Nobody receives this if the work was abandoned.
             let _ = answer.send(ended);
         });
         let ended = match &solving {
@@ -165,7 +168,7 @@ impl Worker {
         }
     }
 
-    /// Ends the job in the store, again until it is done: a full disk must not cost a policy that took hours.
+    /// Ends the job in the store and retries until that succeeds: a full disk must not cost a policy that took hours.
     fn close_at_last(&self, job: &str, attempt: i64, ended: &Ended) {
         while let Err(error) = self.close(job, attempt, ended) {
             self.pause("ending a job; trying again", &error);
@@ -185,7 +188,8 @@ impl Worker {
         solved.map_or_else(|ended| ended, Ended::Finished)
     }
 
-    /// Waits for the memory of a job; how it ends where it can never have it: whoever queued it has more than is here.
+    /// Waits for the memory of a job. If this process can never provide it, fails the job: it was queued where there is
+    /// more.
     fn reserve(&self, estimate: &Footprint) -> Result<Reserved, Ended> {
         self.runtime.block_on(self.memory.reserve(estimate)).map_err(|error| failed(error.to_string()))
     }
@@ -231,7 +235,7 @@ impl Worker {
     }
 }
 
-/// The end of the work; `Stopped` where it goes on past [`PATIENCE`] after the stop signal.
+/// Returns how the work ended; `Stopped` if it runs for [`PATIENCE`] after the stop signal.
 fn until_solved(solved: &mpsc::Receiver<Ended>, stop: &AtomicBool) -> Ended {
     let mut stopped_at = None;
     loop {
@@ -248,7 +252,7 @@ fn until_solved(solved: &mpsc::Receiver<Ended>, stop: &AtomicBool) -> Ended {
     }
 }
 
-/// How a job ends whose checkpoints could not be read or written: trying again helps where the store was full or busy.
+/// Ends a job whose checkpoints could not be read or written: a retry helps if the store was full or busy.
 impl From<StoreError> for Ended {
     fn from(error: StoreError) -> Self {
         match error {
@@ -261,7 +265,7 @@ impl From<StoreError> for Ended {
     }
 }
 
-/// How a job ends whose training stopped or failed.
+/// Ends a job whose training stopped or failed.
 impl From<TrainError> for Ended {
     fn from(error: TrainError) -> Self {
         match error {
@@ -304,13 +308,13 @@ async fn keep_lease(
     }
 }
 
-/// What was asked for, as stored.
+/// Reads the stored request of a job.
 fn requested<T: DeserializeOwned>(claimed: &ClaimedJob) -> Result<T, Ended> {
     let read = serde_json::from_str(&claimed.request_json);
     read.map_err(|error| failed(format!("the stored request cannot be read: {error}")))
 }
 
-/// How a job ends that made a report.
+/// Ends a job that made a report.
 fn reported(report: &impl Serialize) -> Result<JobOutcome, Ended> {
     let report_json = serde_json::to_string(report).map_err(unwritten)?;
     Ok(JobOutcome::Reported { report_json })

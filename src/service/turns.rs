@@ -1,4 +1,4 @@
-//! Turns over tenants at what blocks no thread: each tenant has one at a time, and waits for it among one of each other.
+//! Fair queueing for work that blocks no thread: each tenant runs one call at a time and has one in the common queue.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,14 +9,14 @@ use tokio::time::{Instant, timeout_at};
 use super::allowance::{Allowance, Refused};
 use super::error::ServiceError;
 
-/// So many turns at a time.
+/// A limit on concurrent calls.
 #[derive(Clone)]
 pub(super) struct Turns {
     places: Arc<Semaphore>,
     wait: Duration,
 }
 
-/// A turn of a tenant, over when dropped.
+/// The permit of a tenant's call, released on drop.
 pub(super) struct Turn(#[expect(dead_code, reason = "held, not read")] [OwnedSemaphorePermit; 2]);
 
 impl Turns {
@@ -24,10 +24,11 @@ impl Turns {
         Turns { places: Arc::new(Semaphore::new(places)), wait }
     }
 
-    /// Waits for the other calls of the tenant first, so that it has one in the queue of all.
+    /// Waits for the other calls of the tenant first, so that it has only one in the common queue.
     ///
     /// # Errors
-    /// [`Refused::OwnWork`] if other calls of the tenant did not end in time, [`ServiceError::Busy`] if those of others did not.
+    /// [`Refused::OwnWork`] if the tenant's other calls did not end in time, [`ServiceError::Busy`] if those of others
+    /// did not.
     pub(super) async fn of(&self, tenant: &Allowance) -> Result<Turn, ServiceError> {
         let end = Instant::now() + self.wait;
         let own = timeout_at(end, tenant.lists().acquire_owned()).await;
@@ -56,7 +57,7 @@ mod tests {
         let mut other = Box::pin(turns.of(&south));
         assert!(poll!(&mut other).is_pending());
         drop(first);
-        // The next of the same tenant is behind the other's one.
+        // The tenant's next call is behind the other tenant's.
         let has_turn = poll!(&mut other);
         assert!(has_turn.is_ready() && poll!(&mut queue[0]).is_pending());
         drop(has_turn);

@@ -1,7 +1,7 @@
-//! What the service does for its store while nobody asks: ended jobs that expire, and the room that deleted things left.
+//! Background upkeep of the store: deletes expired jobs, and reclaims the space of deleted data.
 //!
-//! A little at a time: each step is a short transaction among those of the callers. Replicas may all do it; they pass
-//! over what another is at.
+//! Each step is a short transaction between those of callers. All replicas may do it; they skip what another is working
+//! on.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,18 +11,18 @@ use super::shutdown::Shutdown;
 use super::timekeeper::Timekeeper;
 use crate::store::{Store, StoreError};
 
-/// Between two looks at what expired and what is free.
+/// Time between two checks for expired jobs and free space.
 const PAUSE: Duration = Duration::from_secs(60);
-/// Between two steps while there is more to do.
+/// Time between two steps while there is more to do.
 const SHORT_PAUSE: Duration = Duration::from_millis(100);
 /// Jobs deleted in one step.
 const JOBS: usize = 64;
-/// Pages given back in one step: a megabyte.
+/// Pages returned in one step: a megabyte.
 const PAGES: u32 = 256;
-/// Free room that is left for what is written next, in bytes.
+/// Free space in bytes that stays for the next writes.
 const FREE_KEPT: u64 = 4 << 20;
 
-/// Keeps the store tidy until the service ends. Without `retain_jobs` ended jobs stay.
+/// Keeps the store tidy until the service ends. Without `retain_jobs`, ended jobs stay.
 pub(super) async fn keep_tidy(store: Store, time: Arc<Timekeeper>, retain_jobs: Option<Duration>, shutdown: Shutdown) {
     let mut is_skewed = false;
     while !shutdown.has_begun() {
@@ -46,7 +46,7 @@ pub(super) async fn keep_tidy(store: Store, time: Arc<Timekeeper>, retain_jobs: 
     }
 }
 
-/// One step; whether there is more to do.
+/// Does one step; returns whether there is more to do.
 async fn step(store: &Store, time: &Timekeeper, retain_jobs: Option<Duration>) -> Result<bool, StoreError> {
     let expired = match time.time_to_delete_by().await?.zip(retain_jobs) {
         Some((now_ms, retained)) => {

@@ -1,4 +1,4 @@
-//! Questions about a session that change nothing: one hypothesis, or one part of it swept over a range.
+//! What-if questions about a session, which change nothing: one hypothesis, or one quantity swept over a range.
 
 use std::collections::BTreeMap;
 
@@ -19,10 +19,10 @@ use crate::control::policy::what_if::{Hypothesis, HypotheticalRadius, Supposed};
 use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::store::Tenant;
 
-/// Points of a sweep; each is one turn among the robust steps that requests cause.
+/// Number of points of a sweep; each waits for its own permit among the robust steps that requests cause.
 pub const POINTS: std::ops::RangeInclusive<usize> = 2..=101;
 
-/// What is supposed of a session. What is not given stays as it is.
+/// A hypothesis about a session. Fields left out stay as they are.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WhatIf {
@@ -35,30 +35,30 @@ pub struct WhatIf {
     /// Factor on the radius of the uncertainty set of the period advised; later periods keep their own.
     #[schema(example = 0.5)]
     pub radius_scale: Option<f64>,
-    /// That radius itself, in the unit of an advice's.
+    /// The radius itself, in the unit of an advice's radius.
     pub radius: Option<f64>,
-    /// Return of the coming period, the advised allocation held through it; the advice is for the period after.
+    /// Return of the coming period, through which the advised allocation is held; the advice is for the period after.
     pub log_return: Option<f64>,
-    /// The same as `price / previous price - 1`.
+    /// The return as `price / previous price - 1` instead.
     pub simple_return: Option<f64>,
-    /// Of several assets, by their names, each of which has one: share of wealth in it now, before trading.
+    /// Share of wealth in each of several assets now, before trading, by name; each has one.
     pub holdings: Option<BTreeMap<String, f64>>,
-    /// Of several assets, returns of the coming period, in one of three ways; the advice is for the period after.
+    /// Returns of several assets in the coming period, in one of three ways; the advice is for the period after.
     #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
     pub log_returns: Option<BTreeMap<String, f64>>,
-    /// The same as `price / previous price - 1`.
+    /// The returns as `price / previous price - 1` instead.
     pub simple_returns: Option<BTreeMap<String, f64>>,
     /// Prices of several assets at the end of the coming period.
     pub prices: Option<BTreeMap<String, f64>>,
-    /// Their prices at its start. Default: those reported for the period before.
+    /// Prices of several assets at its start. Default: those reported for the period before.
     pub previous_prices: Option<BTreeMap<String, f64>>,
     /// `worst_case`: solve the step, and show the whole worst-case law.
     pub explain: Option<Explain>,
-    /// One of the above over a range instead; every point is solved.
+    /// A range for one of the fields above; every point is solved.
     pub sweep: Option<Sweep>,
 }
 
-/// Exactly one range.
+/// The swept range, exactly one.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
@@ -70,7 +70,7 @@ pub struct Sweep {
     pub simple_return: Option<SweepRange>,
 }
 
-/// Evenly spaced values, both ends among them.
+/// Evenly spaced values, including both ends.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepRange {
@@ -90,21 +90,21 @@ pub struct WhatIfPoint {
     pub period: usize,
     /// Wealth at its start.
     pub wealth: f64,
-    /// The return supposed, if one was.
+    /// The return of the hypothesis, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log_return: Option<f64>,
-    /// The factor on the radius supposed, if one was.
+    /// The factor on the radius in the hypothesis, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_scale: Option<f64>,
     #[serde(flatten)]
     pub advice: Advice,
-    /// Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved.
+    /// Lagrange multiplier of the ball: utility lost per unit of extra radius. Present if the step was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma: Option<f64>,
-    /// The law that is worst for the allocation, in figures. Where the step was solved.
+    /// Figures of the worst law for the allocation. Present if the step was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_law: Option<WorstLawSummary>,
-    /// That law itself, where it was asked for.
+    /// The worst law itself, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCase>,
 }
@@ -122,7 +122,7 @@ pub enum WhatIfAnswer {
         session: String,
         points: Vec<WhatIfPoint>,
     },
-    /// Of several assets.
+    /// One point for several assets.
     OneOfAssets {
         session: String,
         #[serde(flatten)]
@@ -141,7 +141,7 @@ impl SweepRange {
             return Err(FieldError::new(format!("sweep.{field}.points"), self.points, rule));
         }
         let last = self.points - 1;
-        // Both ends are met exactly.
+        // Both ends are exact.
         let at = |index| {
             if index == last { self.to } else { self.from + (self.to - self.from) * index as f64 / last as f64 }
         };
@@ -170,7 +170,7 @@ impl WhatIf {
         Ok(hypothesis)
     }
 
-    /// Every hypothesis asked about, in order; ends of the ranges are checked, and with them all between.
+    /// Returns every hypothesis of the request in order. Checking the ends of the ranges covers all values between.
     fn hypotheses(&self) -> Result<Vec<Hypothesis>, FieldError> {
         let Some(sweep) = &self.sweep else { return Ok(vec![self.hypothesis()?]) };
         type Field = fn(&mut WhatIf) -> &mut Option<f64>;
@@ -194,7 +194,7 @@ impl WhatIf {
             *field(&mut point) = Some(value);
             point.hypothesis()
         };
-        // Rules are intervals: where both ends keep them, so does all between.
+        // Rules are intervals: if both ends keep them, all values between do.
         for (end, value) in [("from", range.from), ("to", range.to)] {
             at(value).map_err(|error| match error.field == name {
                 true => FieldError { field: format!("sweep.{name}.{end}"), ..error },
@@ -204,7 +204,7 @@ impl WhatIf {
         range.values(name)?.into_iter().map(at).collect()
     }
 
-    /// Refuses what the session, of one asset or several, has not.
+    /// Rejects fields that do not fit a session of one asset or of several.
     fn fits(&self, several: bool) -> Result<(), FieldError> {
         let sweep = self.sweep.clone().unwrap_or_default();
         if several {
@@ -228,7 +228,7 @@ impl WhatIf {
         none_of(&of_several, OF_SEVERAL)
     }
 
-    /// The report of several assets that is supposed of the coming period, and the field that says it.
+    /// Returns the hypothetical report of several assets for the coming period, and the field that gives it.
     fn report(&self) -> Option<(&'static str, Report)> {
         let WhatIf { log_returns, simple_returns, prices, previous_prices, .. } = self.clone();
         let field = match (&log_returns, &simple_returns, &prices, &previous_prices) {
@@ -246,7 +246,7 @@ impl WhatIf {
         if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate }
     }
 
-    /// A refusal of the return supposed, under the name by which the request gave it.
+    /// Renames the field of an error about the hypothetical return to the one that the request used.
     fn renamed(&self, error: FieldError) -> FieldError {
         let sweep = self.sweep.clone().unwrap_or_default();
         let given = match error.field.as_str() {
@@ -260,11 +260,12 @@ impl WhatIf {
 }
 
 impl Sessions {
-    /// The advice were something else the case; the session is not touched. Each point of a sweep waits its turn by
-    /// itself, so that a long one starves nobody, and a caller who goes away stops it.
+    /// Returns the advice under the hypotheses without changing the session. Each point of a sweep waits for its own
+    /// permit.
+    /// So a long sweep starves nobody, and a disconnected caller stops it.
     ///
     /// # Errors
-    /// A field breaks a rule, there is no such session, it has reached its horizon, or too much waits already.
+    /// A field breaks a rule, there is no such session, it has reached its horizon, or too much work waits already.
     pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<Large<WhatIfAnswer>, ServiceError> {
         let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
@@ -305,7 +306,7 @@ impl Sessions {
         Ok(Large { value, room })
     }
 
-    /// The same of several assets, point by point.
+    /// Answers the hypotheses for several assets, point by point.
     async fn suppose_of_assets(
         &self,
         tenant: &Tenant,

@@ -1,4 +1,5 @@
-//! What is supposed of a session of several assets, and what would then be told: what a report of it would lead to.
+//! Hypotheses about a session of several assets, and the advice under them, which is what a report of them would lead
+//! to.
 
 use std::collections::BTreeMap;
 
@@ -24,33 +25,33 @@ pub struct AssetsWhatIfPoint {
     pub period: usize,
     /// Wealth at its start.
     pub wealth: f64,
-    /// The returns supposed, by asset, if any were.
+    /// The returns of the hypothesis by asset, if it has any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log_returns: Option<BTreeMap<String, f64>>,
-    /// The factor on the radius supposed, if one was.
+    /// The factor on the radius in the hypothesis, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_scale: Option<f64>,
     #[serde(flatten)]
     pub advice: FundAdvice,
-    /// Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved.
+    /// Lagrange multiplier of the ball: utility lost per unit of extra radius. Present if the step was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma: Option<f64>,
-    /// The law of the fund's log-return that is worst for the total, in figures. Where the step was solved.
+    /// Figures of the worst law of the fund's log-return for the total. Present if the step was solved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_law: Option<WorstLawSummary>,
-    /// That law itself, where it was asked for.
+    /// The worst law itself, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCase>,
 }
 
-/// What is supposed of several assets, beside a hypothesis of wealth and radius.
+/// A hypothesis about several assets, besides one about wealth and radius.
 #[derive(Debug, Clone)]
 pub(super) struct Supposition {
     standing: Standing,
     /// Periods observed.
     observed: usize,
     step: usize,
-    /// The step that advises the period after the coming one, if one does.
+    /// The step that advises the period after the coming one, if there is one.
     following: Option<usize>,
     dynamics: Dynamics,
     /// Shares of wealth held now, before trading.
@@ -60,8 +61,10 @@ pub(super) struct Supposition {
 }
 
 impl Supposition {
+    /// Builds the hypothesis.
+    ///
     /// # Errors
-    /// Holdings that are no shares of wealth in the assets; returns past the last period.
+    /// The holdings are not shares of wealth in the assets, or there are returns past the last period.
     pub(super) fn new(
         live: &Live,
         holdings: Option<&BTreeMap<String, f64>>,
@@ -83,16 +86,17 @@ impl Supposition {
         })
     }
 
-    /// Whether a composition must be chosen for `hypothesis`.
+    /// Returns whether a composition must be chosen for `hypothesis`.
     pub(super) fn composes(&self, hypothesis: &Hypothesis) -> bool {
         self.holdings.is_some() || self.report.is_some() || hypothesis.wealth.is_some()
     }
 
-    /// What would be told. With another wealth or other holdings the composition is chosen anew from the one held before, as it
-    /// would have been; after a return it is chosen as the report of it would.
+    /// Returns the advice under the hypothesis. With another wealth or other holdings, the composition is chosen again
+    /// from the
+    /// one held before. After a return, it is chosen as a report of that return would choose it.
     ///
     /// # Errors
-    /// Returns that are not of the assets, or lead out of the wealth that is taken.
+    /// The returns are not of the assets, or wealth leaves the permitted range.
     pub(super) fn answer(
         self,
         advisor: &Advisor,

@@ -1,4 +1,4 @@
-//! Where a renewal is, by the jobs that train its policy.
+//! The progress of a renewal, by the jobs that train its policy.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -8,10 +8,10 @@ use crate::service::live::Live;
 use crate::service::sessions::Sessions;
 use crate::store::{JobRow, JobState, Store, TrainingRequest};
 
-/// Where a renewal is that is due.
+/// A due renewal and its progress.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RenewalDue {
-    /// Its number.
+    /// Number of the renewal.
     pub renewal: usize,
     pub state: RenewalState,
     /// The job that trains the policy, or last did; null before there is one.
@@ -27,11 +27,11 @@ pub struct RenewalDue {
 pub enum RenewalState {
     /// Its policy is about to be trained.
     Due,
-    /// Its policy is trained.
+    /// Its policy is being trained.
     Training,
-    /// The last attempt failed; the next one comes by itself. Until then the session goes on by its policy.
+    /// The last attempt failed; the next one starts by itself. Until then the session keeps its present policy.
     Failed,
-    /// Its policy is there, and about to be gone on by.
+    /// Its policy is trained, and the session is about to switch to it.
     Trained,
 }
 
@@ -69,7 +69,7 @@ pub(super) fn request(live: &Live, renewal: usize, attempt: usize) -> TrainingRe
 }
 
 impl Sessions {
-    /// Where the next renewal of a session is; `None` where it is not due.
+    /// Returns the progress of a session's next renewal; `None` if it is not due.
     ///
     /// # Errors
     /// The store does not answer.

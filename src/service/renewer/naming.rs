@@ -1,13 +1,13 @@
-//! What the jobs and the policies are called that nobody asked for by hand.
+//! Labels of the jobs and policies that are created automatically.
 
 use jiff::Timestamp;
 
 use crate::store::{LONGEST_NAME, Relabel};
 
-/// Marks the policies that nobody trained by hand.
+/// Tag of policies that were trained automatically.
 const TAG: &str = "renewed";
 
-/// The labels of the next policy: the name of the one before it, and the month it was trained in.
+/// Returns the labels of the next policy: the name of its predecessor, and the month it was trained in.
 pub(super) fn next_labels(parent: &str, now_ms: i64) -> Relabel {
     let month = Timestamp::from_millisecond(now_ms).map_or(String::new(), |now| now.strftime(" %b %Y").to_string());
     let stem = parent.split(" (renewed ").next().unwrap_or_default();

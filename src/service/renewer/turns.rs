@@ -1,27 +1,28 @@
-//! Which session is looked at next: of a tenant one at a time, and tenants side by side, so that nobody waits for the sessions
-//! of another.
+//! Chooses the next session to handle: one at a time for each tenant, and tenants concurrently, so that no tenant waits
+//! for
+//! the sessions of another.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
 use crate::service::sessions::Name;
 use crate::store::Tenant;
 
-/// Tenants looked at side by side; of more, each waits for one session of another at most.
+/// Tenants handled concurrently; beyond that, each waits for at most one session of another.
 const AT_ONCE: usize = 64;
 
-/// Sessions that wait to be looked at, and those that are.
+/// Sessions that wait to be handled, and those being handled.
 #[derive(Default)]
 pub(super) struct Turns {
-    /// By tenant; no queue is empty.
+    /// Queues by tenant; none is empty.
     waiting: HashMap<Tenant, VecDeque<Name>>,
-    /// Tenants with a queue of whom no session is looked at, whose turn is next first.
+    /// Tenants with a queue and no session being handled, the next one first.
     ring: VecDeque<Tenant>,
     looked_at: HashMap<Tenant, Name>,
     known: HashSet<Name>,
 }
 
 impl Turns {
-    /// Queues a session, unless it waits already or is looked at.
+    /// Queues a session, unless it waits already or is being handled.
     pub fn queue(&mut self, name: Name) {
         if !self.known.insert(name.clone()) {
             return;
@@ -34,7 +35,7 @@ impl Turns {
         }
     }
 
-    /// The session to look at next, until [`Self::done`]; `None` where none waits that may be.
+    /// Returns the session to handle next, until [`Self::done`]; `None` if no session may be handled now.
     pub fn next(&mut self) -> Option<Name> {
         if self.looked_at.len() >= AT_ONCE {
             return None;
@@ -49,7 +50,7 @@ impl Turns {
         Some(name)
     }
 
-    /// The session was looked at.
+    /// Marks the session as handled.
     pub fn done(&mut self, name: &Name) {
         self.known.remove(name);
         self.looked_at.remove(&name.0);
@@ -58,12 +59,12 @@ impl Turns {
         }
     }
 
-    /// Whether no session waits or is looked at.
+    /// Returns whether no session waits or is being handled.
     pub fn is_empty(&self) -> bool {
         self.known.is_empty()
     }
 
-    /// Sessions of a tenant that wait.
+    /// Returns how many sessions of a tenant wait.
     pub fn waiting(&self, tenant: &Tenant) -> usize {
         self.waiting.get(tenant).map_or(0, VecDeque::len)
     }
@@ -83,7 +84,7 @@ mod tests {
         (0..200).for_each(|session| turns.queue(name("north", session)));
         turns.queue(name("south", 0));
         assert_eq!([turns.next(), turns.next(), turns.next()], [Some(name("north", 0)), Some(name("south", 0)), None]);
-        // What is looked at and what waits is known.
+        // Sessions that wait or are being handled are not queued again.
         turns.queue(name("north", 0));
         turns.queue(name("north", 7));
         assert_eq!(turns.waiting(&"north".parse().unwrap()), 199);

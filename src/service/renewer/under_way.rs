@@ -1,33 +1,34 @@
-//! The sessions that are being renewed: those to look at, and those that wait for a training.
+//! The sessions being renewed: those to handle, and those that wait for a training.
 
 use super::turns::Turns;
 use super::waiting::Waiting;
 use crate::service::sessions::Name;
 
-/// Sessions of one tenant that are renewed at a time in this process: a bound of memory, half a megabyte. Those beyond it
-/// follow.
+/// Sessions of one tenant renewed concurrently in this process: a bound on memory, half a megabyte. Further ones follow
+/// later.
 const OF_ONE: usize = 4096;
 
-/// What is left to do for a session.
+/// The work left for a session.
 pub(super) enum Left {
     Nothing,
-    /// Once the job has ended.
+    /// Continues once the job has ended.
     Job(String),
-    /// Once the queue has room for its training.
+    /// Continues once the queue has room for its training.
     Room,
 }
 
-/// The sessions under way.
+/// The sessions in progress.
 #[derive(Default)]
 pub(super) struct UnderWay {
     pub turns: Turns,
     pub waiting: Waiting,
-    /// The session before the first that a round left out, as many of its tenant being under way as may be.
+    /// Sequence of the session before the first that a round left out because its tenant has as many in progress as it
+    /// may.
     pub left_after: Option<i64>,
 }
 
 impl UnderWay {
-    /// Begins with a session; false if as many of its tenant are under way as may be.
+    /// Begins with a session; returns false if its tenant has as many in progress as it may.
     pub fn begin(&mut self, name: Name) -> bool {
         if self.waiting.contains(&name) {
             return true;
@@ -39,7 +40,7 @@ impl UnderWay {
         true
     }
 
-    /// A session's step is done. One that needed no room in the queue may leave some to the next in line.
+    /// Records that a session's step is done. If it needed no room in the queue, the next in line is tried.
     pub fn stepped(&mut self, name: Name, left: Left) {
         self.turns.done(&name);
         let next = match left {
@@ -59,7 +60,7 @@ impl UnderWay {
         }
     }
 
-    /// The sessions that waited for a job, which has ended: the queue has room for the next in line.
+    /// Returns the sessions that waited for an ended job. The queue now has room for the next in line.
     pub fn ended(&mut self, job: &str) -> Vec<Name> {
         let names = self.waiting.ended(job);
         let next = names.first().and_then(|(tenant, _)| self.waiting.next_in_line(tenant));
@@ -69,7 +70,7 @@ impl UnderWay {
         names
     }
 
-    /// Looks again whether the queue has room, for each tenant.
+    /// Tries again whether the queue has room, for each tenant.
     pub fn retry(&mut self) {
         for name in self.waiting.first_in_line() {
             self.turns.queue(name);

@@ -1,16 +1,17 @@
-//! Sessions that wait for the training of their next policies: those of one job together, and in line those whose trainings the
-//! queue has no room for.
+//! Sessions that wait for the training of their next policies: grouped by job, or in line if the queue has no room for
+//! their
+//! training.
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 
 use crate::service::sessions::Name;
 use crate::store::Tenant;
 
-/// Sessions that wait; each is there once.
+/// Waiting sessions; each is there once.
 #[derive(Default)]
 pub(super) struct Waiting {
     for_job: BTreeMap<String, Vec<Name>>,
-    /// By tenant; no line is empty.
+    /// Lines by tenant; none is empty.
     in_line: HashMap<Tenant, VecDeque<Name>>,
     known: HashSet<Name>,
     counts: HashMap<Tenant, usize>,
@@ -25,12 +26,12 @@ impl Waiting {
         self.known.contains(name)
     }
 
-    /// Sessions of a tenant that wait.
+    /// Returns how many sessions of a tenant wait.
     pub fn count(&self, tenant: &Tenant) -> usize {
         self.counts.get(tenant).copied().unwrap_or_default()
     }
 
-    /// The jobs that are waited for.
+    /// Returns the jobs that sessions wait for.
     pub fn jobs(&self) -> Vec<String> {
         self.for_job.keys().cloned().collect()
     }
@@ -47,14 +48,14 @@ impl Waiting {
         }
     }
 
-    /// Those that waited for a job, which wait no more.
+    /// Removes and returns the sessions that waited for a job.
     pub fn ended(&mut self, job: &str) -> Vec<Name> {
         let names = self.for_job.remove(job).unwrap_or_default();
         names.iter().for_each(|name| self.leave(name));
         names
     }
 
-    /// The first in a tenant's line, which waits no more.
+    /// Removes and returns the first session in a tenant's line.
     pub fn next_in_line(&mut self, tenant: &Tenant) -> Option<Name> {
         let line = self.in_line.get_mut(tenant)?;
         let name = line.pop_front()?;
@@ -65,7 +66,7 @@ impl Waiting {
         Some(name)
     }
 
-    /// The first of every line, which wait no more.
+    /// Removes and returns the first session of every line.
     pub fn first_in_line(&mut self) -> Vec<Name> {
         let tenants: Vec<Tenant> = self.in_line.keys().cloned().collect();
         tenants.iter().filter_map(|tenant| self.next_in_line(tenant)).collect()

@@ -1,5 +1,6 @@
-//! Walk-forward jobs: the trainings from one stretch to the next, or the strategies of several assets, a checkpoint each; then the
-//! books.
+//! Walk-forward jobs: first the trainings of each stretch, or the strategies of several assets, with a checkpoint each;
+//! then
+//! the books.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -33,7 +34,7 @@ impl Worker {
         reported(&BacktestReport::new(&backtest.walked(decisions)))
     }
 
-    /// A checkpoint is all that a strategy held.
+    /// Runs a walk-forward of several assets. A checkpoint holds all that a strategy held.
     fn backtest_of_assets(
         &self,
         claimed: &ClaimedJob,
@@ -57,8 +58,9 @@ impl Worker {
         reported(&report)
     }
 
-    /// What each strategy decided in every period. The trainings of a stretch run side by side: policy `index` of them is
-    /// checkpoint `stretch * policies + index` of the job.
+    /// Returns the decisions of each strategy in every period. The trainings of a stretch run in parallel: policy
+    /// `index` of
+    /// them is checkpoint `stretch * policies + index` of the job.
     fn decided(
         &self,
         claimed: &ClaimedJob,
@@ -67,10 +69,10 @@ impl Worker {
     ) -> Result<Vec<Vec<Decision>>, Ended> {
         let kept = Kept::new(estimate::kept_by_backtest(backtest, self.threads));
         let checkpoints = self.checkpoints(claimed)?;
-        // Progress within one of several trainings says nothing of the others.
+        // Progress within one of several trainings says nothing about the others.
         let watch = Watch { stop, progress: &|_| {} };
         let strategies = backtest.plain_strategies();
-        // They stand first.
+        // Trained strategies come first.
         let policies = strategies.iter().filter(|strategy| strategy.is_trained()).count();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
         for stretch in 0..backtest.walk.stretches(backtest.periods.len()) {
@@ -90,7 +92,7 @@ impl Worker {
         Ok(decisions)
     }
 
-    /// What was done before, by the step that it was done in.
+    /// Returns the checkpoints by step.
     fn checkpoints(&self, claimed: &ClaimedJob) -> Result<BTreeMap<usize, Vec<u8>>, Ended> {
         let job = claimed.row.job.as_str();
         let found: BTreeMap<usize, Vec<u8>> = self.runtime.block_on(self.store.checkpoints(job))?.into_iter().collect();
@@ -98,7 +100,8 @@ impl Worker {
         Ok(found)
     }
 
-    /// What was decided in a step before, or is decided now and kept; without a step it is not.
+    /// Returns the decision of a step from its checkpoint, or decides now and saves it; without a step nothing is
+    /// saved.
     fn checkpointed<T: Serialize + DeserializeOwned>(
         &self,
         claimed: &ClaimedJob,

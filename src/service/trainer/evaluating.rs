@@ -1,4 +1,5 @@
-//! Evaluation jobs: the trainings first, one after another, with a checkpoint a step; then the simulation, as one step.
+//! Evaluation jobs: first the trainings, one after another, with a checkpoint at each step; then the simulation, as one
+//! step.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -30,7 +31,7 @@ impl Worker {
         self.pool.install(|| self.report(claimed, &evaluation, &followers, training_seconds, stop))
     }
 
-    /// A framework with its policy: stored, or trained here as the steps of the job after `steps_done`.
+    /// Returns a framework with its policy: stored, or trained here as the steps of the job after `steps_done`.
     fn follower(
         &self,
         claimed: &ClaimedJob,

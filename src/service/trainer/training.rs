@@ -1,4 +1,4 @@
-//! Training jobs, and the trainings inside other jobs: a checkpoint a step.
+//! Training jobs, and the trainings inside other jobs, with a checkpoint at each step.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -27,7 +27,8 @@ impl Worker {
         Ok(JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json })
     }
 
-    /// The policy of a specification, going on from the checkpoints; step s is checkpoint `first + s` of the job, whose
+    /// Returns the policy of a specification, resumed from the checkpoints. Step s is checkpoint `first + s` of the
+    /// job, whose
     /// checkpoints below `first` are all there. `Err` is how the job ends instead.
     pub(super) fn trained(
         &self,
@@ -64,8 +65,8 @@ impl Worker {
     }
 }
 
-/// The solutions that need not be computed again: those of the checkpoints in `range`, from its end downwards without a
-/// gap and in the format of this release.
+/// Returns the solutions that need not be computed again. These are the checkpoints in `range`, from its end downwards
+/// without a gap, in the format of this release.
 fn resumed(range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
     let newest_first = checkpoints.iter().rev().filter(|(step, _)| range.contains(step));
     let in_order = newest_first.zip(range.clone().rev()).take_while(|((step, _), expected)| step == expected);
