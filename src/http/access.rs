@@ -1,14 +1,16 @@
 //! Who may call what: one table, and one gate before every handler.
 //!
-//! Open to everybody: `/livez` and `/readyz`, which orchestrators ask without keys and which say one word; the dashboard's
-//! page and files, which are the same for everybody and where a key is typed in; `/openapi.json`, the page `/docs` and the
-//! guide, which describe a published program. Everything else tells of somebody's data, so it asks for a key: `/health` and `/metrics`
-//! too, whose figures are of all tenants together. An operation that is in no line of the table is for admins alone.
+//! Some operations are open to everybody. `/livez` and `/readyz` answer with one word, and orchestrators call them
+//! without keys. The dashboard's page and files are the same for everybody, and people type their key there.
+//! `/openapi.json`, the page `/docs` and the guide describe a published program.
+//! Everything else reveals somebody's data, so it needs a key. This includes `/health` and `/metrics`, whose figures
+//! cover all tenants. An operation that is in no line of the table is for admins alone.
 //!
-//! The gate refuses in this order: not meant for this service, no key, no role. A handler then takes the call off its
-//! class by asking for its caller: too fast is said before a body is read, too much at a time after it. What class a call
-//! has is decided by its route or from its parsed question, never from its text. An unknown or another tenant's thing is
-//! found to be so by the use cases, with one and the same 404.
+//! The gate refuses in this order: not meant for this service, no key, no role. A handler then counts the call against
+//! the rate limit of its class by extracting its caller. A call that comes too often is refused before its body is
+//! read; too many calls at a time are refused after it.
+//! The class of a call is decided by its route or its parsed parameters, never by its text. The use cases answer an
+//! unknown object and another tenant's object with one and the same 404.
 
 use std::marker::PhantomData;
 use std::ops::Deref;
@@ -32,7 +34,7 @@ use crate::service::error::ServiceError;
 use crate::service::keys::{Caller, PREFIX, Turned};
 use crate::store::{KeyRole, Tenant};
 
-/// What an operation asks of who calls it.
+/// The key that an operation needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
     Open,
@@ -41,7 +43,7 @@ pub enum Access {
     Role(KeyRole),
 }
 
-/// What an operation asks for; `route` is `None` where nothing stands at the address.
+/// Returns the access that an operation needs; `route` is `None` if there is nothing at the address.
 pub fn access(method: &str, route: Option<&str>) -> Access {
     let Some(route) = route else { return Access::AnyKey };
     match (method, route) {
@@ -62,29 +64,30 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
     }
 }
 
-/// The one body that is large by nature.
+/// The route of the one body that is large by nature.
 const LARGE_BODY: &str = "/policies/import";
-/// A body that holds a text, and how many bytes: the longest that is read, every second letter of it escaped.
+/// The route whose body holds a text, and its limit in bytes: the longest text that is read, with every second letter
+/// escaped.
 const TEXT_BODY: (&str, usize) = ("/returns", 12_000_000);
 
-/// What the gate knows.
+/// The state of the gate.
 #[derive(Clone)]
 pub struct Gate {
     pub service: Arc<Service>,
-    /// Of an imported policy.
+    /// Limit on the body of an imported policy.
     pub large_body_bytes: usize,
-    /// Of any other request.
+    /// Limit on the body of any other request.
     pub body_bytes: usize,
     pub bodies: Bodies,
     pub hosts: Arc<Hosts>,
 }
 
-/// Whose request was answered, for those who record it: an extension of the response.
+/// The caller whose request was answered, for logs and metrics: an extension of the response.
 #[derive(Debug, Clone)]
 pub struct Asker {
-    /// Of the key shown, also where it is no longer in force; `None` where none is known.
+    /// The tenant of the key shown, even if the key is no longer in force; `None` if the key is unknown.
     pub tenant: Option<Tenant>,
-    /// The name of the key, which is no secret; empty where none was asked for.
+    /// The name of the key, which is no secret; empty if no key was needed or accepted.
     pub key: Arc<str>,
 }
 
@@ -95,7 +98,7 @@ impl Asker {
     }
 }
 
-/// Lets a request through to its handler, with its [`Call`] and the size its body may have.
+/// Lets a request through to its handler, with its [`Call`] and its body limit.
 pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -> Response {
     let matched = request.extensions().get::<MatchedPath>().cloned();
     let route = matched.as_ref().map(MatchedPath::as_str);
@@ -136,7 +139,7 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
     answered(call, response)
 }
 
-/// Here the call ends: not before are the places of a heavy one given up.
+/// Ends the call; a heavy call releases its permits here and not before.
 fn answered(call: Option<Call>, response: Response) -> Response {
     match call {
         Some(call) => Asker::signed(Some(call.tenant.clone()), call.key().clone(), response),
@@ -144,7 +147,7 @@ fn answered(call: Option<Call>, response: Response) -> Response {
     }
 }
 
-/// Whether the request is meant for this service, as far as it says.
+/// Rejects a request whose headers say that it is not meant for this service.
 fn addressed(gate: &Gate, request: &Request) -> Result<(), Problem> {
     hosts::refuse_ambiguous(request.headers())?;
     if !gate.service.keys.are_absent() {
@@ -175,13 +178,13 @@ fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Ar
     }
 }
 
-/// What stands after the scheme of an `Authorization: Bearer`; the scheme's name has no case (RFC 9110).
+/// Returns the text after the scheme of an `Authorization: Bearer`; the scheme's name has no case (RFC 9110).
 fn bearer(headers: &HeaderMap) -> Option<&str> {
     let (scheme, key) = headers.get(header::AUTHORIZATION)?.to_str().ok()?.split_once(' ')?;
     scheme.eq_ignore_ascii_case("bearer").then(|| key.trim())
 }
 
-/// What was shown may be a key with one letter wrong, so it is not shown back.
+/// Returns the problem without the key shown, because that may be a valid key with one letter wrong.
 fn unauthenticated(turned: Turned) -> Problem {
     let (detail, value) = match turned {
         Turned::NoKey => ("the call needs a key".to_owned(), "no key".to_owned()),
@@ -195,7 +198,7 @@ fn unauthenticated(turned: Turned) -> Problem {
     Problem::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)
 }
 
-/// A call let through by the gate: who calls, and what it must take before it does heavy work.
+/// A call let through by the gate: its caller, and the permits that it needs before heavy work.
 #[derive(Debug, Clone)]
 pub struct Call {
     pub caller: Arc<Caller>,
@@ -208,7 +211,7 @@ impl Call {
         Call { caller, turn }
     }
 
-    /// Takes the call off its class.
+    /// Counts the call against the rate limit of its class.
     fn counted(self, class: Class) -> Result<Self, Refused> {
         match class {
             Class::Heavy => self.turn.count()?,
@@ -218,7 +221,7 @@ impl Call {
     }
 
     fn of(parts: &Parts) -> Result<Self, Problem> {
-        // A handler whose operation the table calls open cannot know for whom it works.
+        // If the table says that an operation is open, its handler cannot get a caller.
         let call = parts.extensions.get::<Call>().cloned();
         call.ok_or_else(|| Problem::new(ProblemKind::Internal, "the call has no caller"))
     }
@@ -256,9 +259,9 @@ impl Classed for Read {
     const CLASS: Class = Class::Read;
 }
 
-/// Who calls, once the call is taken off its class. No handler learns for whom it works in another way but [`Asked`], so
-/// none is reached without its class. Places of heavy calls are taken when the body is there, so that whoever sends his
-/// slowly holds none.
+/// The caller, once the call is counted against the rate limit of its class. A handler can get its caller only through
+/// this or [`Asked`], so every handler is rate-limited. Heavy calls take their permits after the body has arrived, so
+/// clients that send slowly hold none.
 pub struct By<C>(pub Call, pub PhantomData<C>);
 
 impl<C: Classed, S: Send + Sync> FromRequestParts<S> for By<C> {
@@ -284,13 +287,13 @@ impl<C: Classed, S: Send + Sync> OptionalFromRequestParts<S> for By<C> {
     }
 }
 
-/// A question whose class its parsed parameters decide.
+/// Query parameters that decide the class of their call.
 pub trait Question {
     fn class(&self) -> Class;
 }
 
-/// Who calls, and what is asked, once the call is taken off the class of what is asked; a question that cannot be read
-/// costs a call too.
+/// The caller and the parsed query, once the call is counted against the rate limit of the query's class. A query that
+/// cannot be parsed also counts as a call.
 pub struct Asked<Q>(pub Call, pub Q);
 
 impl<Q: Question + DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Asked<Q> {
@@ -325,7 +328,7 @@ mod tests {
         }
     }
 
-    /// A route in no line would be the admins' alone, and found out by the first who holds another key.
+    /// Checks that every route for users has a line; one without would be for admins alone, and other keys would fail.
     #[test]
     fn every_operation_of_users_is_in_a_line() {
         let description = serde_json::to_value(crate::http::router::description()).unwrap();

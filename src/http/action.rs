@@ -1,4 +1,4 @@
-//! The answer of `/action`, of one asset and of several.
+//! The answer of `/action`, for one asset and for several.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -25,12 +25,12 @@ pub struct Action {
     pub period: usize,
     #[serde(flatten)]
     pub advice: Advice,
-    /// The law that is worst for this allocation, where it was asked for.
+    /// The law that is worst for this allocation; present only if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCase>,
-    /// What to know before the advice is followed.
+    /// Points to know before you follow the advice.
     pub caution: Vec<Caution>,
-    /// How near it is to changing, where that was asked for.
+    /// Closeness of the advice to changing; present only if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<Sensitivity>,
 }
@@ -42,10 +42,10 @@ pub struct AssetsAction {
     pub period: usize,
     #[serde(flatten)]
     pub advice: FundAdvice,
-    /// The law of the fund's log-return that is worst for this total, where it was asked for.
+    /// The law of the fund's log-return that is worst for this total allocation; present only if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCase>,
-    /// What to know before the advice is followed.
+    /// Points to know before you follow the advice.
     pub caution: Vec<Caution>,
 }
 

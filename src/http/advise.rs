@@ -19,7 +19,7 @@ use crate::service::advise::{Advise, Advised};
 use crate::service::advise_assets::{AdviseAssets, AssetsAdvised};
 use crate::service::metrics::ACTION_SECONDS;
 
-/// A question about one asset, or about several, which `problem.assets` names.
+/// A request about one asset, or about several, which `problem.assets` names.
 #[derive(Debug, ToSchema)]
 #[serde(untagged)]
 #[allow(clippy::large_enum_variant)]
@@ -28,7 +28,7 @@ pub enum AdviseQuestion {
     Assets(AdviseAssets),
 }
 
-/// The answer to a question about one asset or several.
+/// The answer to a request about one asset or several.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum AdviseAnswer {
@@ -36,7 +36,8 @@ pub enum AdviseAnswer {
     Assets(Box<AssetsAdvised>),
 }
 
-/// What to hold through one period, from a record of returns of one asset or several: solved exactly, nothing is stored.
+/// Returns the allocation for one period, from a history of returns of one asset or several. It is solved exactly, and
+/// nothing is stored.
 #[utoipa::path(post, path = "/advise", tag = "advice",
     request_body(content = AdviseQuestion, example = json!({
         "problem": { "history": [0.012, -0.034, 0.021, 0.008, 0.017, -0.009], "rate_per_step": 0.001,
@@ -65,7 +66,7 @@ pub async fn advise(
     bodies::written(&service, answer).await
 }
 
-/// What tells whether a question says its horizon, and whether it names assets.
+/// The parts of a request that show if it gives a horizon and if it names assets.
 #[derive(Deserialize)]
 struct Said {
     problem: SaidOfProblem,
@@ -77,12 +78,12 @@ pub(super) struct SaidOfProblem {
     pub(super) assets: Option<IgnoredAny>,
 }
 
-/// `None` where there is no problem to be read.
+/// Reads the shape of `problem`; `None` if there is no readable problem.
 pub(super) fn said(bytes: &[u8]) -> Option<SaidOfProblem> {
     decode::object(bytes).ok().map(|Said { problem }| problem)
 }
 
-/// The question, with the horizon that is meant where none is given.
+/// Decodes the request; the horizon defaults to 1.
 fn question(bytes: &[u8]) -> Result<AdviseQuestion, Problem> {
     let Some(problem) = said(bytes) else { return Ok(AdviseQuestion::Asset(decode::object(bytes)?)) };
     if problem.assets.is_some() {

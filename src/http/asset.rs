@@ -1,4 +1,4 @@
-//! Files that are embedded in the binary and served as they stand.
+//! Files that are embedded in the binary and served unchanged.
 
 use axum::Extension;
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
@@ -18,9 +18,9 @@ pub struct Asset {
     pub name: &'static str,
     media: &'static str,
     bytes: &'static [u8],
-    /// Whether the bytes are a gzip of the file; every browser reads one.
+    /// True if the bytes are a gzip of the file; every browser can decode it.
     is_compressed: bool,
-    /// Strong entity tag: the hash of the bytes. A browser asks each time and gets 304 until the binary changes.
+    /// Strong entity tag: the hash of the bytes. A browser revalidates each time and gets 304 until the binary changes.
     tag: String,
 }
 
@@ -31,7 +31,7 @@ impl Asset {
         Asset { name, media, bytes, is_compressed: false, tag: format!("\"{hex}\"") }
     }
 
-    /// The same file, whose bytes are a gzip of it.
+    /// Marks the bytes as a gzip of the file.
     pub fn compressed(self) -> Self {
         Asset { is_compressed: true, ..self }
     }
@@ -40,10 +40,10 @@ impl Asset {
         self.bytes
     }
 
-    /// The file of `page` that is called `name`.
+    /// Returns the file of `page` with this name.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no such file.
     pub fn find(files: &'static [Asset], name: &str, page: &str) -> Result<&'static Asset, Problem> {
         files.iter().find(|asset| asset.name == name).ok_or_else(|| {
             let problem = Problem::new(ProblemKind::NotFound, format!("{page} has no file {name}"));
@@ -51,7 +51,8 @@ impl Asset {
         })
     }
 
-    /// The answer to a request with these headers; `policy` says what a browser may load and run beside it.
+    /// Returns the answer to a request with these headers; `policy` is the content security policy, which limits what a
+    /// browser may load and run.
     pub fn served(&'static self, policy: &'static str, headers: &HeaderMap) -> Response {
         let known = headers.get(header::IF_NONE_MATCH).and_then(|tags| tags.to_str().ok());
         let unchanged =

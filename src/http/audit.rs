@@ -1,4 +1,4 @@
-//! Who did what, for admins: over all tenants, as `/health` and `/metrics` are.
+//! Who did what, for admins: over all tenants, like `/health` and `/metrics`.
 
 use std::sync::Arc;
 
@@ -26,36 +26,37 @@ pub struct Ask {
     object: Option<String>,
 }
 
-/// One thing that was done.
+/// One recorded action.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct AuditEntry {
-    /// When, in milliseconds since 1970.
+    /// Time of the action, in milliseconds since 1970.
     pub at_ms: i64,
     pub tenant: String,
-    /// The key's name; null where none was asked for, and of what was done by a command on the store.
+    /// Name of the key; null if no key was needed, or if a command on the store did it.
     pub key: Option<String>,
-    /// The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`. Empty for
-    /// `session.observe`: an observation keeps the name of the key alone.
+    /// Roles of the key. `anybody` if no key was needed, `operator` for a command on the store, or `service`. Empty for
+    /// `session.observe`, because an observation keeps only the name of the key.
     pub roles: String,
     #[schema(example = "session.delete")]
     pub action: String,
-    /// What it was done to.
+    /// The object of the action.
     pub object: String,
-    /// What came of it.
+    /// Result of the action.
     #[schema(example = "deleted, with 12 entries")]
     pub outcome: String,
-    /// From 1 among the entries of its key in this tenant; of `session.observe`, among the entries of its session.
+    /// Number of the entry, from 1, among those of its key in this tenant. For `session.observe`, among those of its
+    /// session.
     pub number: i64,
-    /// SHA-256 over the entry and the seal of the one before, in hexadecimal digits: a copy of it shows later that the entry and
-    /// all before it are what they were.
+    /// SHA-256 over the entry and the seal of the entry before it, in hexadecimal digits. A saved copy proves later
+    /// that this entry and all before it are unchanged.
     pub seal: String,
 }
 
-/// A page of the audit, newest first.
+/// A page of the audit log, newest first.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct AuditPage {
     pub entries: Vec<AuditEntry>,
-    /// Give it as `after` for the next page; null on the last.
+    /// Cursor to pass as `after` for the next page; null on the last page.
     pub next: Option<i64>,
 }
 
@@ -75,7 +76,7 @@ impl From<AuditRow> for AuditEntry {
     }
 }
 
-/// Who did what, newest first, over all tenants.
+/// Lists who did what, newest first, over all tenants.
 #[utoipa::path(get, path = "/audit", tag = "operations",
     params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<i64>, Query, description = "The `next` of the page before."),

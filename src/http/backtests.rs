@@ -1,4 +1,4 @@
-//! Walk-forwards through records of returns.
+//! Walk-forward backtests through histories of returns.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use super::problem::Problem;
 use crate::control::request::backtest_assets::BacktestQuestion;
 use crate::service::Service;
 
-/// Queue a walk-forward through a record of returns, of one asset or of several.
+/// Queues a walk-forward backtest through a history of returns, of one asset or of several.
 #[utoipa::path(post, path = "/backtest", tag = "jobs",
     request_body(content = BacktestQuestion, example = json!({
         "simple_returns": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.017, -0.009, 0.024, 0.011, -0.03, 0.019],
@@ -37,13 +37,13 @@ pub async fn backtest(
     Ok(accepted(service.jobs.backtest(&caller, asked, idempotency_key(&headers)?).await?))
 }
 
-/// What tells whether a request names assets.
+/// The part of a request that shows if it names assets.
 #[derive(Deserialize)]
 struct Said {
     assets: Option<IgnoredAny>,
 }
 
-/// Read as what it is, so that what is wrong in it is told by its own field.
+/// Decodes the request by its shape, so that an error names the right field.
 fn question(bytes: &[u8]) -> Result<BacktestQuestion, Problem> {
     match decode::object(bytes) {
         Ok(Said { assets: Some(_) }) => decode::object(bytes).map(BacktestQuestion::Assets),

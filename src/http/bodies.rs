@@ -1,8 +1,8 @@
-//! The bytes that the bodies of requests under way may take together, and how a large answer leaves.
+//! The memory budget for request bodies under way, and how a large answer is sent.
 //!
-//! A large body takes its part of one budget before its first byte is read, and gives it back when the call is answered:
-//! many callers who send large bodies at a time are told to come again, and the process never holds more of them than the
-//! budget. Small bodies are not counted; the connections bound them.
+//! A large body reserves its share of one budget before its first byte is read, and releases it when the call is
+//! answered. If many callers send large bodies at once, some are asked to retry, and the process never holds more than
+//! the budget. Small bodies are not counted, because the limit on connections bounds them.
 
 use std::convert::Infallible;
 use std::io;
@@ -21,10 +21,10 @@ use crate::service::Service;
 use crate::service::error::ServiceError;
 use crate::service::memory::{Large, UNIT};
 
-/// Part of the memory limit that bodies may take: half of what the process has for itself.
+/// Divisor of the memory limit that gives the budget for bodies: half of the process's own part.
 const PART: usize = 16;
 
-/// The budget.
+/// The memory budget for request bodies.
 #[derive(Clone)]
 pub struct Bodies {
     room: Arc<Semaphore>,
@@ -32,15 +32,15 @@ pub struct Bodies {
 }
 
 impl Bodies {
-    /// A sixteenth of the memory limit, and one body of the largest size at least.
+    /// Creates a budget of a sixteenth of the memory limit, but at least one body of the largest size.
     pub fn new(memory_limit: usize, largest: usize) -> Self {
         let bytes = (memory_limit / PART).max(largest);
         let units = bytes.div_ceil(UNIT).min(u32::MAX as usize);
         Bodies { room: Arc::new(Semaphore::new(units)), bytes }
     }
 
-    /// The part of the budget that the body of `request` takes, which may have `limit` bytes; `None` for one that is small,
-    /// or so large that it is refused for that.
+    /// Reserves budget for the body of `request`, which may have `limit` bytes. Returns `None` for a body that is
+    /// small, or so large that it is refused for its size.
     ///
     /// # Errors
     /// The bodies under way leave too little.
@@ -61,11 +61,11 @@ impl Bodies {
     }
 }
 
-/// A value as the answer. What is large has its part of the budget, by its length where nobody could estimate it before, is written
-/// where nobody waits for the thread, and leaves in parts.
+/// Sends a value as the answer, in JSON. A large answer reserves memory: by its actual length if there was no estimate
+/// before. It is serialised on a thread that may block, and is sent in parts.
 ///
 /// # Errors
-/// Other large answers leave no room for it; it cannot be written as JSON.
+/// Other large answers leave too little memory, or the value cannot be written as JSON.
 pub async fn written<T: Serialize + Send + 'static>(
     service: &Service,
     Large { value, room }: Large<T>,
@@ -86,10 +86,11 @@ pub async fn written<T: Serialize + Send + 'static>(
     Ok(sent(Large { value: bytes, room: Some(room) }))
 }
 
-/// What was recorded as the answer to a call, which the same call gets again: so one that finds no room may come again.
+/// Sends the recorded answer to a call. The same call gets the same answer again, so a call refused for lack of memory
+/// can be retried.
 ///
 /// # Errors
-/// Other large answers leave no room for it.
+/// Other large answers leave too little memory.
 pub async fn recorded(service: &Service, json: String) -> Result<Response, Problem> {
     Ok(match service.room_for(json.len()).await? {
         Some(room) => sent(Large { value: json.into_bytes(), room: Some(room) }),
@@ -101,7 +102,7 @@ fn as_json(bytes: Vec<u8>) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], bytes).into_response()
 }
 
-/// Keeps what is written as long as it is small, and counts it all.
+/// A writer that keeps the bytes as long as they are few, and counts all of them.
 struct Start {
     bytes: Vec<u8>,
     length: usize,
@@ -121,14 +122,15 @@ impl io::Write for Start {
     }
 }
 
-/// Marks an answer whose bytes are part of the program, so that it takes no memory.
+/// Marks an answer whose bytes are part of the program, so that it needs no memory.
 #[derive(Clone)]
 pub struct Embedded;
 
-/// `response` as it leaves: a large one has its part of the budget, by [`written`] or [`sent`]. One that has none is a fault of its
-/// operation, which stops a development build; in a release build it is given its part late.
+/// Returns `response`, if large with its memory reserved by [`written`] or [`sent`]. A large answer without a
+/// reservation is a bug in its operation: it panics in a development build, and reserves memory late in a release
+/// build.
 ///
-/// Test: `tests/operation/answers.rs` asks every operation for its largest answer.
+/// Checked by: `tests/operation/answers.rs` requests the largest answer of every operation.
 pub async fn budgeted(service: &Service, response: Response) -> Response {
     let bytes = response.body().size_hint().exact().map_or(0, |bytes| bytes as usize);
     if bytes <= UNIT || response.extensions().get::<Embedded>().is_some() {
@@ -147,15 +149,15 @@ pub async fn budgeted(service: &Service, response: Response) -> Response {
     }
 }
 
-/// A document as the answer, in parts: its memory is held until the last of them is taken from it, however slowly a client reads.
-/// What was reserved beyond its length is given back.
+/// Sends a document in parts. Its memory stays reserved until the last part is sent, however slowly a client reads.
+/// Memory reserved beyond its length is released.
 pub fn sent(Large { value: bytes, room }: Large<Vec<u8>>) -> Response {
     let room = room.and_then(|room| room.only(bytes.len()));
     let headers =
         [(header::CONTENT_TYPE, "application/json".to_owned()), (header::CONTENT_LENGTH, bytes.len().to_string())];
     let parts = stream::unfold((Bytes::from(bytes), room), async |(mut left, room)| {
         let part = left.split_to(left.len().min(UNIT));
-        // A copy: the connection keeps what it has not sent yet, and would keep the whole document for a part of it.
+        // A copy: the connection keeps unsent bytes, and a slice would keep the whole document alive.
         (!part.is_empty()).then(|| (Ok::<_, Infallible>(Bytes::copy_from_slice(&part)), (left, room)))
     });
     (headers, Body::from_stream(parts)).into_response()
@@ -184,7 +186,7 @@ mod tests {
         let first = bodies.admit(&of_length(7 * UNIT), largest).unwrap();
         assert!(first.is_some());
         assert!(bodies.admit(&of_length(7 * UNIT), largest).is_err());
-        // A body of unknown length may be as long as it may be.
+        // A body of unknown length counts as the longest allowed.
         assert!(bodies.admit(&request(&[("transfer-encoding", "chunked")]), largest).is_err());
         assert!(bodies.admit(&of_length(4 * UNIT + 1), largest).unwrap().is_some());
         for uncounted in [of_length(UNIT), of_length(largest + 1), request(&[])] {

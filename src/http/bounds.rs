@@ -1,7 +1,9 @@
-//! The rules of single fields that JSON Schema can tell, told: lengths, ends of ranges, exactly one of several.
+//! Adds the rules of single fields to the description, as far as JSON Schema can express them: lengths, ranges, exactly
+//! one of several.
 //!
-//! The rules stand in `control::request::rules` and beside the requests they are of; what is here repeats their numbers for readers
-//! of the description, and a test asks the rules themselves at both ends. Rules between fields are the service's to tell.
+//! The rules are defined in `control::request::rules` and beside their requests. This module repeats their numbers for
+//! readers of the description, and a test checks the rules themselves at both ends. Rules between fields are left to
+//! the service.
 
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
@@ -26,7 +28,7 @@ use crate::service::reports::REPORTS;
 use crate::service::what_if::POINTS;
 use crate::store::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, MOST_TAGS};
 
-/// Adds to every schema what its fields may hold.
+/// Adds to every schema the bounds of its fields.
 pub fn tell(description: &mut OpenApi) {
     let Some(components) = &mut description.components else { return };
     for (name, field, rule) in rules() {
@@ -45,7 +47,7 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
-/// Schema, or schema and variant; field; rule.
+/// Returns all rules, each as schema (or schema and variant), field and rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
     let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
@@ -117,12 +119,12 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         .collect()
 }
 
-/// Of the states that surrogates are trained on.
+/// Returns the rules for the design of training states.
 fn of_designs() -> [(&'static str, &'static str, Value); 2] {
     [("accuracy", within(ACCURACY)), ("count", whole(&COUNT))].map(|(field, rule)| ("DesignSpecification", field, rule))
 }
 
-/// Of the problems that have an investor and a bank.
+/// Returns the rules of the problems that have an investor and a bank.
 fn of_investor(problem: &'static str) -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
     let rules = [
@@ -134,7 +136,7 @@ fn of_investor(problem: &'static str) -> impl Iterator<Item = (&'static str, &'s
     rules.into_iter()
 }
 
-/// Of questions about several assets.
+/// Returns the rules of requests about several assets.
 fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let (log_return, names) = (within((-LOG_RETURN, LOG_RETURN)), asset_names());
     let rules = [
@@ -150,7 +152,7 @@ fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     rules.into_iter()
 }
 
-/// Of sessions and what is recorded of them.
+/// Returns the rules of sessions, and of what is recorded in them.
 fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let rules = [
         ("OpenSession", "policy", json!({ "minLength": 1 })),
@@ -171,7 +173,7 @@ fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     rules.into_iter()
 }
 
-/// Of what is supposed of a session.
+/// Returns the rules of what-if requests.
 fn supposed() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let rules = [
         ("WhatIf", "session", json!({ "minLength": 1 })),
@@ -187,7 +189,7 @@ fn supposed() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     rules.into_iter()
 }
 
-/// Of what things are called.
+/// Returns the rules of names, notes and tags.
 fn of_labels() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     ["Train", "OpenSession", "Relabel"].into_iter().flat_map(|schema| {
         let tag = json!({ "minLength": 1, "maxLength": LONGEST_TAG });
@@ -197,7 +199,7 @@ fn of_labels() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     })
 }
 
-/// Of a walk-forward.
+/// Returns the rules of a walk-forward backtest.
 fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let fields = [
         ("periods_per_year", whole(&backtest::YEAR)),
@@ -216,7 +218,7 @@ fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule)).chain(walked_of_assets())
 }
 
-/// Of a walk-forward of several assets.
+/// Returns the rules of a walk-forward backtest of several assets.
 fn walked_of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let rows = |bounds| listed(&backtest::PERIODS, listed(&ASSETS, within(bounds)));
     let fields = [
@@ -234,7 +236,7 @@ fn walked_of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value
     fields.into_iter().map(|(field, rule)| ("AssetsBacktestRequest", field, rule))
 }
 
-/// Names of several assets.
+/// Returns the rule for the names of several assets.
 fn asset_names() -> Value {
     let length = whole(&NAME_LENGTH);
     let name = json!({ "minLength": length["minimum"], "maxLength": length["maximum"] });
@@ -243,7 +245,7 @@ fn asset_names() -> Value {
     names
 }
 
-/// Of what a period reports, wherever it stands.
+/// Returns the rules of a period's report, in every schema that has one.
 fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     ["Observe", "Correct", "Report", "WhatIf"].into_iter().flat_map(|schema| {
         let of_assets = ["log_returns", "simple_returns", "prices", "previous_prices"];
@@ -275,7 +277,7 @@ fn listed(counts: &std::ops::RangeInclusive<usize>, items: Value) -> Value {
     json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items })
 }
 
-/// Of each asset, by its name.
+/// Returns the rule for an object with a value for each asset, by its name.
 fn each(value: Value) -> Value {
     json!({ "additionalProperties": value })
 }
@@ -305,7 +307,7 @@ pub fn with_field(
     }
 }
 
-/// Whether a field of the variant can hold its name alone.
+/// Returns true if a field of the variant can hold only its name.
 fn is_tagged(variant: &Object, name: &str) -> bool {
     let only = Some(vec![json!(name)]);
     variant
@@ -339,7 +341,7 @@ mod tests {
     use crate::control::request::specification::Specification;
     use crate::http::router;
 
-    /// The field that the rules refuse in a sound specification with `value` at `pointer`.
+    /// Sets `value` at `pointer` in a valid specification, and returns the field that the rules reject.
     fn refused(pointer: &str, value: Value) -> Option<String> {
         let mut given = json!({
             "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "periods_per_year": 12.0,

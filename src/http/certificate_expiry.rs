@@ -1,6 +1,6 @@
-//! When a certificate expires, which rustls judges of others and tells of none.
+//! Reads when a certificate expires: rustls checks the expiry of others' certificates, but reports none.
 //!
-//! Of the encoding (DER) no more is read than leads there: `Certificate`, its first part, and in that the fifth field after
+//! The parser reads only the DER encoding on the way: `Certificate`, its first part, and in that the fifth field after
 //! the version, which is `SEQUENCE { notBefore, notAfter }`. Source: RFC 5280, section 4.1.
 
 use jiff::civil::DateTime;
@@ -11,7 +11,7 @@ const VERSION: u8 = 0xa0;
 const UTC_TIME: u8 = 0x17;
 const GENERALIZED_TIME: u8 = 0x18;
 
-/// The moment after which a certificate is not valid, in seconds since 1970; `None` if it cannot be read.
+/// Returns the moment after which a certificate is not valid, in seconds since 1970; `None` if it cannot be read.
 pub fn expiry(certificate: &[u8]) -> Option<i64> {
     let (signed, _) = content(SEQUENCE, certificate)?;
     let (fields, _) = content(SEQUENCE, signed)?;
@@ -34,12 +34,12 @@ pub fn expiry(certificate: &[u8]) -> Option<i64> {
     moment.to_zoned(TimeZone::UTC).ok().map(|moment| moment.timestamp().as_second())
 }
 
-/// The content of the first element, if it is of this kind, and what follows it.
+/// Returns the content of the first element, if it is of this kind, and the bytes after it.
 fn content(kind: u8, bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     element(bytes).filter(|(found, ..)| *found == kind).map(|(_, content, rest)| (content, rest))
 }
 
-/// The kind and the content of the first element, and what follows it.
+/// Returns the kind and the content of the first element, and the bytes after it.
 fn element(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let (&[kind, first], rest) = bytes.split_first_chunk()?;
     let (length, rest) = match first {
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn the_end_of_a_certificate_is_read_in_either_form_of_time() {
-        // The second is written with four digits of the year.
+        // The second certificate writes its year with four digits.
         for (year, seconds) in [(2031, 1_925_164_800), (2061, 2_871_936_000)] {
             let mut params = CertificateParams::new(vec!["localhost".to_owned()]).unwrap();
             params.not_after = date_time_ymd(year, 1, 3);

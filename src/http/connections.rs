@@ -1,11 +1,12 @@
-//! Who is connected: a table in which waiting never holds a place against somebody who asks.
+//! The table of connections, in which an idle connection never keeps an active client out.
 //!
-//! Whether a client is honest cannot be told from a connection that says nothing. So a full table does not keep new
-//! callers out: the connection that has waited longest for its client gives way, among those of the caller's own address
-//! where that has its share, else among those of the address with most. What gives way is, in this order, a connection
-//! between two requests, one whose body is still to come, and a stream of events, which its client resumes where it ended.
-//! A call that is being worked on never gives way; such calls are bounded by the limits of their tenants and by the time
-//! of a request. Where even they fill the table, a few places beyond it take callers who may ask the probes only.
+//! An idle connection does not show if its client is honest. So a full table does not reject new clients: the
+//! connection that has waited longest for its client is closed. It is one of the client's own address if that address
+//! has its share, and otherwise one of the address with most connections.
+//! Connections are closed in this order: those between two requests, those whose request body is still to come, and
+//! event streams, which clients can resume. A connection that works on a call is never closed; such calls are bounded
+//! by the tenants' limits and by the request timeout. If even they fill the table, a few reserved connections beyond it
+//! serve the probes only.
 //!
 //! An address is an IPv4 address, or the first 64 bits of an IPv6 address: what one subscriber has.
 
@@ -17,33 +18,33 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::Notify;
 
-/// How many connections there may be.
+/// Limits on the number of connections.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounds {
     pub all: usize,
-    /// Those of one address.
+    /// Most connections of one address.
     pub of_address: usize,
-    /// Places beyond `all` for the probes.
+    /// Connections beyond `all`, for the probes.
     pub for_probes: usize,
 }
 
-/// What a connection does.
+/// The activity of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// Waits for a request, or for the client to take the end of an answer.
     Waiting,
-    /// Has a request whose body is not whole yet.
+    /// Has a request whose body has not fully arrived.
     Receiving,
     /// Sends events.
     Streaming,
     /// Has a request that is being answered.
     Working,
-    /// Gave way: nothing more is answered.
+    /// Closed to make room: nothing more is answered.
     Closed,
 }
 
 impl Phase {
-    /// In the order in which they give way; the last two never do.
+    /// All phases, in the order in which they are closed to make room; the last two never are.
     pub const ALL: [Phase; 5] = [Phase::Waiting, Phase::Receiving, Phase::Streaming, Phase::Working, Phase::Closed];
 
     pub fn name(self) -> &'static str {
@@ -61,16 +62,16 @@ impl Phase {
     }
 }
 
-/// What a connection may ask.
+/// The requests that a connection may make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     Any,
-    /// One question to a probe.
+    /// One request to a probe.
     Probes,
 }
 
-/// One connection: its phase, and since when, in one number, so that whoever takes its place and whoever begins a request
-/// on it cannot both succeed.
+/// One connection. Its phase and the time of its last change are packed in one number, so that closing it to make room
+/// and beginning a request on it cannot both succeed.
 #[derive(Debug)]
 pub struct Connection {
     pub place: Place,
@@ -114,7 +115,7 @@ impl Connection {
         self.unpacked().1
     }
 
-    /// Since when it is in its phase, or took something of an answer.
+    /// Returns when the phase began, or when the client last read part of an answer.
     pub fn since(&self) -> Instant {
         self.unpacked().2
     }
@@ -123,34 +124,34 @@ impl Connection {
         self.opened.elapsed()
     }
 
-    /// Requests begun.
+    /// Returns the number of requests begun.
     pub fn requests(&self) -> u64 {
         self.requests.load(Ordering::Relaxed)
     }
 
-    /// Begins a request, in the phase `to`; whether the connection still has its place.
+    /// Begins a request, in the phase `to`; returns true if the connection is still open.
     #[must_use]
     pub fn begin(&self, to: Phase) -> bool {
         self.requests.fetch_add(1, Ordering::Relaxed);
         self.change(|phase| (phase != Phase::Closed).then_some(to))
     }
 
-    /// The body of the request is whole.
+    /// Records that the body of the request is complete.
     pub fn received(&self) {
         self.change(|phase| (phase == Phase::Receiving).then_some(Phase::Working));
     }
 
-    /// The answer is a stream of events.
+    /// Records that the answer is a stream of events.
     pub fn stream(&self) {
         self.change(|phase| (phase != Phase::Closed).then_some(Phase::Streaming));
     }
 
-    /// The answer is given.
+    /// Records that the answer was sent.
     pub fn rest(&self) {
         self.change(|phase| (phase != Phase::Closed).then_some(Phase::Waiting));
     }
 
-    /// The answer came before the request was read to its end.
+    /// Records that the answer came before the request was fully read.
     pub fn leave(&self) {
         self.left.store(true, Ordering::Relaxed);
     }
@@ -159,7 +160,7 @@ impl Connection {
         self.left.load(Ordering::Relaxed)
     }
 
-    /// The client took something.
+    /// Records that the client read something.
     pub fn taken(&self) {
         self.change(|phase| (phase == Phase::Waiting).then_some(Phase::Waiting));
     }
@@ -176,7 +177,7 @@ impl Connection {
         }
     }
 
-    /// Takes the place away, unless it was begun to be used since it was looked at.
+    /// Closes the connection to make room, unless its state has changed since `looked_at`.
     fn give_way(&self, looked_at: u64) -> bool {
         let closed = self.packed(Phase::Closed);
         let gives = self.state.compare_exchange(looked_at, closed, Ordering::AcqRel, Ordering::Acquire).is_ok();
@@ -186,7 +187,7 @@ impl Connection {
         gives
     }
 
-    /// Resolves once the connection has to give way.
+    /// Resolves once the connection must close to make room.
     pub async fn gave_way(&self) {
         self.gave_way.notified().await;
     }
@@ -206,7 +207,7 @@ struct Table {
     probing: Vec<Arc<Connection>>,
 }
 
-/// A connection's place, given up when dropped.
+/// A connection's slot in the table, released when dropped.
 pub struct Held {
     pub connection: Arc<Connection>,
     address: IpAddr,
@@ -224,14 +225,14 @@ impl Connections {
         Arc::new(Connections { bounds, table: Mutex::default() })
     }
 
-    /// A place for a connection from `address`; `None` where every one is worked on, those for probes too.
+    /// Adds a connection from `address`; `None` if every slot is busy with a call, including those for probes.
     pub fn place(self: &Arc<Self>, address: IpAddr) -> Option<Held> {
         let address = subscriber(address);
         let connection = self.lock().placed(address, &self.bounds)?;
         Some(Held { connection, address, connections: self.clone() })
     }
 
-    /// How many there are in each phase.
+    /// Counts the connections in each phase.
     pub fn count(&self) -> [(Phase, usize); 5] {
         let table = self.lock();
         let all = || table.by_address.values().flatten().chain(&table.probing);
@@ -265,13 +266,13 @@ impl Table {
         Some(connection)
     }
 
-    /// Has one connection of the address give way.
+    /// Closes one connection of the address.
     fn make_room_at(&mut self, address: IpAddr) -> bool {
         let gave = self.by_address.get(&address).and_then(|own| longest_waiting(own.iter()));
         gave.is_some_and(|gave| self.remove(address, &gave))
     }
 
-    /// Has one connection give way: of the address with most, else of any.
+    /// Closes one connection: of the address with most, and otherwise of any address.
     fn make_room(&mut self) -> bool {
         let largest = self.by_address.iter().max_by_key(|(_, own)| own.len()).map(|(address, _)| *address);
         if largest.is_some_and(|address| self.make_room_at(address)) {
@@ -297,9 +298,9 @@ impl Table {
     }
 }
 
-/// The one among them that gave way: first in the order of phases, then of time.
+/// Closes one of the connections and returns it: the first in the order of phases, then of time.
 fn longest_waiting<'a>(among: impl Iterator<Item = &'a Arc<Connection>> + Clone) -> Option<Arc<Connection>> {
-    // Whoever was chosen may begin a request in the same moment; then another is.
+    // The chosen connection may begin a request at the same moment; then another is chosen.
     const TRIES: usize = 8;
     (0..TRIES).find_map(|_| {
         let seen = among.clone().map(|connection| (connection, connection.unpacked()));
@@ -341,7 +342,7 @@ mod tests {
         later();
         let second = table.place(address(1)).unwrap();
         later();
-        // Used again: now the second is the one that has waited longest.
+        // The first was used again, so now the second has waited longest.
         assert!(first.connection.begin(Phase::Working));
         first.connection.rest();
         let third = table.place(address(1)).unwrap();

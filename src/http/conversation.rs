@@ -1,4 +1,4 @@
-//! One connection from its first byte to its last: requests one after the other, each in the phase it is in.
+//! One connection from its first byte to its last: its requests one after the other, with the phase of each.
 
 use std::convert::Infallible;
 use std::net::SocketAddr;
@@ -27,31 +27,33 @@ use super::patient::{Patience, Patient};
 use super::problem::{Problem, ProblemKind};
 use crate::service::shutdown::Shutdown;
 
-/// A head that is not whole after so many bytes, and one read of as many, is refused; hyper takes 100 lines at most.
+/// Size limit of a request head: it is refused if it is incomplete after so many bytes plus one read of as many. hyper
+/// allows at most 100 lines.
 const HEAD_BYTES: usize = 32 << 10;
-/// A body that was refused unread is taken after all where it is so small and comes so soon: the connection can go on.
+/// A refused body of at most this size is still read if it arrives within [`SMALL_BODY_WAIT`], so that the connection
+/// can go on.
 const SMALL_BODY: u64 = 64 << 10;
 const SMALL_BODY_WAIT: Duration = Duration::from_millis(100);
-/// What may be asked where every other place is worked on.
+/// Paths that may be requested if every other connection is busy.
 const PROBES: [&str; 4] = ["/livez", "/readyz", "/health", "/metrics"];
 
-/// A request's own end of its connection.
+/// The local address of a request's connection.
 #[derive(Debug, Clone, Copy)]
 pub struct LocalAddress(pub SocketAddr);
 
-/// How a connection learns that the service stops.
+/// The signals that tell a connection that the service stops.
 pub struct Stopping {
     pub shutdown: Shutdown,
-    /// Ends it between two requests.
+    /// Ends the connection between two requests.
     pub watcher: Watcher,
 }
 
-/// The place was taken by somebody else before the request was begun.
+/// The error of a connection that was closed to make room before its request began.
 #[derive(Debug, Error)]
 #[error("the connection gave way")]
 struct GaveWay;
 
-/// Answers what comes over `stream` until it ends, has to give way, or the service stops.
+/// Serves `stream` until it ends, must close to make room, or the service stops.
 pub async fn hold<S>(
     stream: S,
     held: &Held,
@@ -71,7 +73,7 @@ pub async fn hold<S>(
     let stream = TokioIo::new(Patient::new(stream, patience, held.connection.clone()));
     let serving = http1::Builder::new()
         .timer(TokioTimer::new())
-        // The stream has a patience of its own, which tells a head under way from none.
+        // The stream has timeouts of its own, which distinguish a head under way from an idle connection.
         .header_read_timeout(None)
         .max_buf_size(HEAD_BYTES)
         .serve_connection(stream, service);
@@ -86,7 +88,7 @@ pub async fn hold<S>(
     }
 }
 
-/// Resolves at the shutdown where nothing was ever asked: hyper waits for a first request before it ends a connection.
+/// Resolves at the shutdown if there was no request: hyper waits for a first request before it ends a connection.
 async fn unused_at_the_end(shutdown: &Shutdown, connection: &Connection) {
     shutdown.begun().await;
     if connection.requests() > 0 {
@@ -135,12 +137,13 @@ async fn answer(
     Ok(response.map(|body| Body::new(Writing { body, connection })))
 }
 
-/// Whether the rest of a refused body is worth waiting for; whoever waits to be told to send it has not sent it.
+/// Returns true if the rest of a refused body is small enough to wait for. Clients that wait for `100 Continue` have
+/// not sent it.
 fn is_small(headers: &HeaderMap, body: &Incoming) -> bool {
     !headers.contains_key(header::EXPECT) && body.size_hint().upper().is_some_and(|bytes| bytes <= SMALL_BODY)
 }
 
-/// Whether the body is whole, after its rest was thrown away where that is little.
+/// Returns true if the body is complete, after discarding a small rest.
 async fn take_rest(inbox: &Arc<Mutex<Incoming>>, small: bool) -> bool {
     let is_whole = || inbox.lock().unwrap_or_else(PoisonError::into_inner).is_end_stream();
     if is_whole() || !small {
@@ -150,12 +153,12 @@ async fn take_rest(inbox: &Arc<Mutex<Incoming>>, small: bool) -> bool {
         let mut body = Rest(inbox.clone());
         while let Some(Ok(_)) = body.frame().await {}
     };
-    // Too late is as good as not at all.
+    // A rest that is too late counts as missing.
     let _ = tokio::time::timeout(SMALL_BODY_WAIT, rest).await;
     is_whole()
 }
 
-/// The body of a request, which outlives who reads it.
+/// The body of a request, which outlives its reader.
 struct Rest(Arc<Mutex<Incoming>>);
 
 impl hyper::body::Body for Rest {
@@ -168,7 +171,7 @@ impl hyper::body::Body for Rest {
     }
 }
 
-/// The same for the application; its end is the end of a phase.
+/// The body of a request as the application reads it; its end ends the phase [`Phase::Receiving`].
 struct Reading {
     inbox: Arc<Mutex<Incoming>>,
     connection: Arc<Connection>,
@@ -196,7 +199,7 @@ impl hyper::body::Body for Reading {
     }
 }
 
-/// The body of an answer; the connection rests once it is gone.
+/// The body of an answer; its connection returns to waiting when it is dropped.
 struct Writing {
     body: Body,
     connection: Arc<Connection>,
@@ -241,7 +244,7 @@ mod tests {
 
     const LONG: Duration = Duration::from_secs(60);
 
-    /// The client's end of a connection that is closed after so many requests, or at this age.
+    /// Returns the client's end of a connection that closes after so many requests, or at this age.
     fn connection(requests: u64, age: Duration) -> DuplexStream {
         let (here, there) = tokio::io::duplex(4096);
         let patience =
@@ -256,7 +259,7 @@ mod tests {
         there
     }
 
-    /// Asks once; whether the answer says that the connection is closed with it.
+    /// Sends one request; returns true if the answer says that the connection closes with it.
     async fn is_last(stream: &mut DuplexStream) -> bool {
         stream.write_all(b"GET / HTTP/1.1\r\nhost: a\r\n\r\n").await.unwrap();
         let mut head = Vec::new();

@@ -1,8 +1,8 @@
-//! The dashboard: files of this folder, embedded, at `/` and below `/dashboard/`.
+//! The dashboard: the files of this folder, embedded, at `/` and below `/dashboard/`.
 //!
-//! Plain HTML, CSS and ES modules as they stand in the repository: no framework, nothing built, nothing loaded from
-//! elsewhere, so it works where the network ends at this machine. The browser may run these files and nothing else: the
-//! policy below allows no inline script or style, and the modules make elements, never markup from text.
+//! Plain HTML, CSS and ES modules, exactly as in the repository: no framework, no build, nothing loaded from elsewhere.
+//! So it works on a machine without a network. The browser may run only these files: the policy below allows no inline
+//! script or style, and the modules create elements and never parse text as markup.
 
 use std::sync::LazyLock;
 
@@ -19,7 +19,7 @@ use super::problem::Problem;
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
     font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
     require-trusted-types-for 'script'";
-/// RFC 8631: where a program that starts at `/` finds the interface.
+/// Link headers by which a program that starts at `/` finds the interface (RFC 8631).
 const LINKS: &str = "</openapi.json>; rel=\"service-desc\", </docs>; rel=\"service-doc\"";
 
 macro_rules! assets {
@@ -125,12 +125,12 @@ fn asset(name: &str) -> Option<&'static Asset> {
     ASSETS.iter().find(|asset| asset.name == name)
 }
 
-/// The bytes of a file of the dashboard: a report that stands by itself is drawn by the same modules.
+/// Returns the bytes of a file of the dashboard; a standalone report is drawn by the same modules.
 pub fn embedded(name: &str) -> Option<&'static [u8]> {
     asset(name).map(Asset::bytes)
 }
 
-/// The dashboard. A program that asks for JSON and not for HTML gets the description of the interface instead.
+/// Serves the dashboard. A program that accepts JSON and not HTML gets the description of the interface instead.
 #[utoipa::path(get, path = "/", tag = "operations",
     responses(
         (status = 200, description = "A page; the description of this interface where only JSON is accepted.", body = String, content_type = "text/html"),
@@ -150,7 +150,7 @@ fn wants_json(headers: &HeaderMap) -> bool {
     accepted.contains("application/json") && !accepted.contains("text/html")
 }
 
-/// A file of the dashboard.
+/// Serves a file of the dashboard.
 #[utoipa::path(get, path = "/dashboard/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
     responses(
         (status = 200, description = "The file.", body = String, content_type = "text/javascript"),

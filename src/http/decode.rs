@@ -1,4 +1,4 @@
-//! From bytes to a typed request, naming the field, the value and the rule when they disagree.
+//! Decodes bytes into a typed request; an error names the field, the value and the rule.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -12,14 +12,14 @@ use serde_path_to_error::{Path, Segment};
 use super::problem::{Problem, ProblemKind, SHOWN_VALUE, shortened};
 use crate::control::error::FieldError;
 
-/// What is meant by fields that must be given because no default is right for all.
+/// Explanations of required fields for which no default is right for everybody.
 const MEANT: [(&str, &str); 1] = [(
     "problem.rate_per_step",
     "it is what the bank pays per period of problem.history, as a fraction; 3 % a year are 0.00247 where periods are months",
 )];
 
-/// Parses a JSON body. Refuses NaN, infinities, numbers beyond double precision, unknown fields (where the type
-/// does), trailing bytes and nesting deeper than 128.
+/// Parses a JSON body. Refuses NaN, infinities, numbers beyond double precision, unknown fields (if the type does),
+/// trailing bytes and nesting deeper than 128.
 pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     match serde_path_to_error::deserialize(&mut reader) {
@@ -37,7 +37,7 @@ pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     }
 }
 
-/// As [`json`], of an object: a list would be read as its fields in their order.
+/// Parses a JSON body as [`json`] does, but rejects a list, which serde would read as the fields in their order.
 pub fn object<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     if bytes.trim_ascii_start().starts_with(b"[") {
         json::<IgnoredAny>(bytes)?;
@@ -47,7 +47,7 @@ pub fn object<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     json(bytes)
 }
 
-/// Reads the parameters of a query string, all of them text.
+/// Reads the parameters of a query string; all of them are text.
 pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T, Problem> {
     let mut object = serde_json::Map::new();
     for (name, value) in pairs {
@@ -65,13 +65,13 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
     })
 }
 
-/// To JSON Schema 5.0 is an integer, to serde it is none: the same body with every such number written as one, read
-/// under the same rules.
+/// Reads a body with every number such as 5.0 rewritten as 5, under the same rules. JSON Schema counts 5.0 as an
+/// integer; serde does not.
 fn with_whole_numbers<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
     serde_json::from_slice(&whole_numbers(bytes)).ok()
 }
 
-/// The same JSON without fractions of nothing but zeros; minus zero keeps its own.
+/// Rewrites the JSON without fractions that consist of zeros only; minus zero keeps its fraction.
 fn whole_numbers(bytes: &[u8]) -> Vec<u8> {
     let mut written = Vec::with_capacity(bytes.len());
     let (mut in_string, mut at) = (false, 0);
@@ -102,19 +102,19 @@ fn whole(number: &[u8]) -> &[u8] {
     if is_whole { whole } else { number }
 }
 
-/// Valid JSON of the wrong shape.
+/// Returns the problem of valid JSON of the wrong shape.
 fn mismatch(bytes: &[u8], path: String, cause: &serde_json::Error) -> Problem {
     let value_of = |field: &str| at(bytes, field);
     Problem::of_field(ProblemKind::InvalidField, located(value_of, path, &without_position(cause)))
 }
 
-/// The parser stops at an element too many as at a byte too many, and at a list where it wants a word; the body is JSON
-/// all the same.
+/// Returns the problem if the body is valid JSON after all. The parser reports an extra element like an extra byte, and
+/// a list instead of a word, as a syntax error.
 fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Problem> {
     const ELEMENT_TOO_MANY: &str = "trailing characters";
     const NO_NUMBER: &str = "number out of range";
     let message = without_position(cause);
-    // What is passed over is not read as a number, so it would be no fault of the syntax.
+    // Skipped values are not parsed as numbers, so the check below would miss this syntax error.
     if message == NO_NUMBER {
         return None;
     }
@@ -128,7 +128,7 @@ fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Prob
     Some(Problem::of_field(ProblemKind::InvalidField, FieldError::new(field, value, rule)))
 }
 
-/// Names the field a message of serde is about: unknown and missing fields stand in the message, not in the path.
+/// Names the field that a serde message is about: unknown and missing fields appear in the message, not in the path.
 fn located(value_of: impl Fn(&str) -> Option<String>, path: String, message: &str) -> FieldError {
     let mut field = path;
     let mut rule = message.to_owned();
@@ -150,7 +150,7 @@ fn located(value_of: impl Fn(&str) -> Option<String>, path: String, message: &st
     FieldError::new(field, value, rule)
 }
 
-/// Text that is not JSON: shows the token the parser stopped at.
+/// Returns the problem of text that is not JSON; it shows the token at which the parser stopped.
 fn syntax(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Problem {
     let field = if path.is_empty() { "body" } else { path };
     let rule = format!("must be JSON: {} at line {}, column {}", without_position(cause), cause.line(), cause.column());
@@ -192,14 +192,14 @@ fn dotted(path: &Path) -> String {
     text
 }
 
-/// The text of the value at a dotted path, as far as a problem shows it. What is not on the path is passed over: a tree of a large
-/// body would take ten times its bytes.
+/// Returns the text of the value at a dotted path, as far as a problem shows it. Values off the path are skipped,
+/// because a tree of a large body would take ten times its bytes.
 fn at(bytes: &[u8], field: &str) -> Option<String> {
     let path: Vec<&str> = field.split(['.', '[']).filter(|part| !part.is_empty()).collect();
     Along(&path).deserialize(&mut serde_json::Deserializer::from_slice(bytes)).ok()?
 }
 
-/// The way from a value to one inside it.
+/// The path from a value to one inside it.
 struct Along<'a>(&'a [&'a str]);
 
 impl<'de> DeserializeSeed<'de> for Along<'_> {

@@ -1,7 +1,7 @@
-//! The defaults of requests, told as reading a request gives them.
+//! Adds the defaults of requests to the description, as the decoder applies them.
 //!
-//! The least request that can be read is read and written again: what was not in it is a default. What depends on other
-//! fields is filled in later, by the service, and told by the field's own description.
+//! The smallest valid request is decoded and written again: every field that was not in it has its default. A default
+//! that depends on other fields is filled in later by the service, and is described by the field itself.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -20,7 +20,7 @@ use crate::control::request::specification::{
     DesignSpecification, HyperparameterBounds, ProblemSpecification, Specification, SurrogateSpecification,
 };
 
-/// Adds to every schema of a request what stands for its fields where they are left out.
+/// Adds to every request schema the defaults of its fields.
 pub fn tell(description: &mut OpenApi) {
     let Some(components) = &mut description.components else { return };
     for (name, defaults) in told() {

@@ -1,7 +1,8 @@
-//! The problems, as a table and of every operation, derived from its shape, the table of access and the problem table.
+//! The problems in the description: a table of all, and the list of each operation. The list is derived from the
+//! operation's shape, the access table and the problem table.
 //!
-//! A handler describes the problems that are its own, such as the 409 of a period gap; what follows from having a body,
-//! a query, a path or the store is added here, so that no operation forgets it.
+//! A handler describes its own problems, such as the 409 of a period gap. Problems that follow from having a body, a
+//! query, a path or the store are added here, so that no operation omits them.
 
 use std::collections::BTreeMap;
 
@@ -12,10 +13,11 @@ use utoipa::openapi::{ContentBuilder, OpenApi, Ref, RefOr, Response, ResponseBui
 use super::access::{Access, access};
 use super::problem::ProblemKind;
 
-/// Operations that touch no store and take no input: but for how they are addressed, they answer or the process is gone.
+/// Operations that touch no store and take no input: except for addressing problems, they cannot fail while the process
+/// lives.
 const INFALLIBLE: [&str; 4] = ["/livez", "/openapi.json", "/docs", "/"];
 
-/// Adds what is missing; what a handler describes itself stays.
+/// Adds the missing problems; those that a handler describes itself stay.
 pub fn with_every_problem(description: &mut OpenApi) {
     for (path, item) in &mut description.paths.paths {
         let is_infallible = INFALLIBLE.contains(&path.as_str());
@@ -58,7 +60,7 @@ pub fn with_every_problem(description: &mut OpenApi) {
 const SCHEME: &str = "key";
 const KEY: &str = "A key of `ballast keys create`. A service whose store holds none asks for none.";
 
-/// Says that the operation asks for a key with this role.
+/// Adds that the operation needs a key with this role.
 fn guard(operation: &mut Operation, role: &str) {
     operation.security = Some(vec![SecurityRequirement::new(SCHEME, [role])]);
     let (_, status, title) = ProblemKind::Forbidden.entry();
@@ -66,7 +68,7 @@ fn guard(operation: &mut Operation, role: &str) {
     operation.responses.responses.insert(status.as_str().into(), RefOr::T(refused));
 }
 
-/// What every request may break: who it says is asked, and who asks.
+/// Problems possible for every request: an invalid `Host` or `Authorization` header, or a request for another host.
 const ADDRESSED: [ProblemKind; 2] = [ProblemKind::InvalidHeader, ProblemKind::Misdirected];
 
 fn describe(operation: &mut Operation, kinds: &[ProblemKind]) {
@@ -81,7 +83,7 @@ fn describe(operation: &mut Operation, kinds: &[ProblemKind]) {
     }
 }
 
-/// What may keep an operation from writing.
+/// Returns the problems that can keep an operation from writing.
 fn by_deed(method: &str, path: &str) -> &'static [ProblemKind] {
     use ProblemKind as Kind;
     match (method, path) {

@@ -1,7 +1,7 @@
 //! The OpenAPI description as a page: Swagger UI, embedded, at `/docs` and below `/docs/`.
 //!
-//! It works where the network ends at this machine. The files of Swagger UI come with the crate `utoipa-swagger-ui`; the
-//! page that loads them is ours, so that it stands at one address and loads no more than it shows.
+//! It works on a machine without a network. The files of Swagger UI come with the crate `utoipa-swagger-ui`. The page
+//! that loads them is our own, so that it has one address and loads no more than it shows.
 
 use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
@@ -13,11 +13,12 @@ use super::asset::{Asset, HTML, SCRIPT, STYLE};
 use super::extract::Id;
 use super::problem::Problem;
 
-/// What the router hands to those of its handlers that publish the description of all of them, as checked in under
-/// `api/openapi.json`. Made once: anybody may ask for it, as often as he likes.
+/// The OpenAPI description, as checked in under `api/openapi.json`, for the handlers that publish it. It is made once,
+/// because anybody may request it at any rate.
 pub type Published = &'static LazyLock<String>;
 
-/// The dashboard's, but that Swagger UI has pictures in its style sheet and makes markup from text, which it cleans.
+/// The dashboard's policy, except that Swagger UI has pictures in its style sheet and makes markup from text, which it
+/// sanitises.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -33,7 +34,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     theirs.into_iter().filter_map(|(name, media)| embedded(name, media)).chain(ours).collect()
 });
 
-/// A file of Swagger UI, compressed as it is kept.
+/// Returns a file of Swagger UI, compressed as the crate stores it.
 fn embedded(name: &'static str, media: &'static str) -> Option<Asset> {
     let file = utoipa_swagger_ui::serve(name, Arc::default()).ok()??;
     let Cow::Borrowed(bytes) = file.bytes else { return None };
@@ -41,7 +42,7 @@ fn embedded(name: &'static str, media: &'static str) -> Option<Asset> {
     Some(if file.gzpipped { asset.compressed() } else { asset })
 }
 
-/// This interface as a page to read and to try: calls with their parameters, bodies, defaults and examples.
+/// Serves this interface as a page to read and to try: calls with their parameters, bodies, defaults and examples.
 #[utoipa::path(get, path = "/docs", tag = "operations",
     responses(
         (status = 200, description = "A page.", body = String, content_type = "text/html"),
@@ -50,7 +51,7 @@ pub async fn docs(headers: HeaderMap) -> Response {
     PAGE.served(CONTENT_SECURITY_POLICY, &headers)
 }
 
-/// A file of the page `/docs`.
+/// Serves a file of the page `/docs`.
 #[utoipa::path(get, path = "/docs/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
     responses(
         (status = 200, description = "The file.", body = String, content_type = "text/javascript"),

@@ -15,7 +15,7 @@ use super::wire;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::service::Service;
 
-/// Queue a comparison of frameworks on common simulated returns.
+/// Queues a comparison of frameworks on common simulated returns.
 #[utoipa::path(post, path = "/evaluate", tag = "jobs",
     request_body(content = EvaluationRequest, example = json!({
         "problem": {
@@ -41,7 +41,7 @@ pub async fn evaluate(
     Ok(accepted(service.evaluate(&caller, request, idempotency_key(&headers)?).await?))
 }
 
-/// The report of a succeeded evaluation, walk-forward or frontier.
+/// Returns the report of a succeeded evaluation, walk-forward backtest or frontier.
 #[utoipa::path(get, path = "/jobs/{id}/report", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 200, description = "The report.", body = wire::JobReport),

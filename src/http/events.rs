@@ -1,14 +1,14 @@
-//! The event stream of a job: levels, not edges.
+//! The event stream of a job: each event carries the whole state, not a change.
 //!
-//! Each event carries the whole job, and its id is made of the state and the progress shown. A client that comes back
-//! with `Last-Event-ID` therefore misses nothing and sees nothing twice, even across a restart of the service. A client
-//! that has seen the terminal state gets 204, which tells an `EventSource` to stay away.
+//! The id of an event is made of the state and the progress shown. So a client that reconnects with `Last-Event-ID`
+//! misses nothing and sees nothing twice, even across a restart of the service. A client that has seen the terminal
+//! state gets 204, which tells an `EventSource` not to reconnect.
 //!
-//! A tenant may have so many streams open, and each ends after some minutes; its client comes back with the id of what it
-//! saw last, and has lost nothing.
+//! The number of open streams of a tenant is limited, and each stream ends after some minutes. Its client reconnects
+//! with the id of the last event, and loses nothing.
 //!
-//! A job that another replica runs is followed by asking the store: its finished steps show, the points inside a step do
-//! not. Notifications of PostgreSQL would come sooner but can be lost, so that asking would have to stay beside them.
+//! A job that another replica runs is followed by polling the store: finished steps appear, the points inside a step do
+//! not. Notifications of PostgreSQL would be faster, but can be lost, so polling would still be needed.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -31,10 +31,10 @@ use crate::service::error::ServiceError;
 use crate::service::keys::Caller;
 use crate::store::JobState;
 
-/// A change made by another process is noticed within this time.
+/// Interval within which a change by another process is noticed.
 const POLL: Duration = Duration::from_secs(1);
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
-/// Asks proxies that collect answers to pass on each event as it comes; nginx collects unless told so.
+/// Header that makes buffering proxies pass on each event as it comes; nginx buffers unless this is set.
 const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
 
 struct JobStream {
@@ -47,7 +47,7 @@ struct JobStream {
     place: StreamPlace,
 }
 
-/// Follow a job: events `state` and `progress` carry the job; the stream ends at a terminal state.
+/// Follows a job: events `state` and `progress` carry the job. The stream ends at a terminal state.
 #[utoipa::path(get, path = "/jobs/{id}/events", tag = "jobs",
     params(("id" = String, Path, description = "The job."),
            ("Last-Event-ID" = Option<String>, Header, description = "The id of the last event seen.")),
@@ -61,7 +61,7 @@ pub async fn follow(
     Id(job): Id,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    // First: what is one too many costs the store nothing.
+    // First of all, because a refused stream must cost the store nothing.
     let place = caller.allowance.stream().map_err(ServiceError::from)?;
     let changes = service.jobs.changes();
     let now = wire::Job::from(service.jobs.get(&caller.tenant, &job).await?);
@@ -77,8 +77,8 @@ pub async fn follow(
 }
 
 impl JobStream {
-    /// The next event that differs from the last; none once the job or the service ends, the key is revoked, or the stream
-    /// is old.
+    /// Returns the next event that differs from the last. Returns none once the job or the service ends, the key is
+    /// revoked, or the stream is old.
     async fn next(mut self) -> Option<(Result<Event, Infallible>, Option<Self>)> {
         while !self.caller.has_ended() {
             self.changes.mark_unchanged();

@@ -1,4 +1,4 @@
-//! Extractors that refuse with problem documents where axum's own refuse with plain text.
+//! Extractors that reject with problem documents instead of axum's plain text.
 
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub struct JsonBytes {
     large: Option<LargeBody>,
 }
 
-/// The turns that a large body is decoded in, and whose body it is, as the gate tells its extractors.
+/// The queue in which a large body is decoded, and its tenant, as the gate passes them to the extractors.
 #[derive(Clone)]
 pub struct LargeBody {
     pub decoding: Bounded,
@@ -40,15 +40,16 @@ pub struct LargeBody {
 }
 
 impl JsonBytes {
-    /// Bytes of it.
+    /// Returns the length in bytes.
     pub fn length(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Decodes the body: a large one in a turn, on a thread that may block, so that the calls of others go on meanwhile.
+    /// Decodes the body. A large one waits in the queue and runs on a thread that may block, so that it does not delay
+    /// other calls.
     ///
     /// # Errors
-    /// Those of `decode`; no turn came in time.
+    /// Those of `decode`, or if no permit came in time.
     pub async fn decoded<T: Send + 'static>(
         self,
         decode: impl FnOnce(&[u8]) -> Result<T, Problem> + Send + 'static,
@@ -61,11 +62,11 @@ impl JsonBytes {
     }
 }
 
-/// The turn of a heavy call, to be begun once its body is read.
+/// The permits of a heavy call, to be taken once its body is read.
 #[derive(Clone)]
 pub struct AfterBody(pub Arc<HeavyTurn>);
 
-/// Largest body taken, in bytes, as the router tells its extractors.
+/// Largest body allowed, in bytes, as the gate passes it to the extractors.
 #[derive(Debug, Clone, Copy)]
 pub struct BodyLimit(pub usize);
 
@@ -112,7 +113,7 @@ fn refuse_other_media(headers: &HeaderMap) -> Result<(), Problem> {
     Err(problem.naming("content-type", declared, "must be application/json"))
 }
 
-/// Nothing here decodes a body: one that says it is encoded would be read as what it is not.
+/// Rejects an encoded body, because nothing here decodes one: it would be misread.
 fn refuse_encoded(headers: &HeaderMap) -> Result<(), Problem> {
     let mut encodings = headers.get_all(header::CONTENT_ENCODING).iter().map(|value| value.to_str().unwrap_or("?"));
     let Some(encoding) = encodings.find(|encoding| !encoding.eq_ignore_ascii_case("identity")) else { return Ok(()) };
@@ -166,7 +167,7 @@ mod tests {
     use super::*;
     use crate::service::bounded::Size;
 
-    /// A body that is large, or is not, beside as many as are decoded at a time.
+    /// Decodes a large or a small body while no decoding permit is free.
     async fn decoded(is_large: bool) -> Result<Value, Problem> {
         let decoding = Bounded::new("decode", Size { first: 0, long: 0 }, Duration::from_millis(1));
         let request = Request::builder().header(header::CONTENT_TYPE, "application/json");

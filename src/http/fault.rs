@@ -1,4 +1,4 @@
-//! From what failed below to a problem document.
+//! Translates errors of the lower layers into problem documents.
 
 use std::error::Error;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use crate::service::gate::Doubts;
 use crate::service::metrics as names;
 use crate::store::{OverQuota, Quota, StoreError};
 
-/// After which a tenant whose own work is in the way may call again.
+/// Wait before a tenant whose own work is in the way may call again.
 const OWN_WORK: Duration = Duration::from_secs(1);
 
 impl From<ServiceError> for Problem {
@@ -69,7 +69,7 @@ impl From<ServiceError> for Problem {
                 let rule = format!("must come at most {per_second} times a second, over all keys of the tenant");
                 problem(Kind::TooManyRequests).naming("rate", class.name(), rule).to_be_asked_again_in(wait)
             }
-            // Said at the start, before anybody asks.
+            // These errors occur at the start, before there are any callers.
             error @ (ServiceError::NobodyAsked { .. } | ServiceError::KeysLost { .. } | ServiceError::KeysRequired) => {
                 Problem::new(Kind::Internal, error.to_string())
             }
@@ -87,7 +87,7 @@ impl From<ServiceError> for Problem {
 }
 
 fn of_store(error: &StoreError) -> Problem {
-    // A probe needs no key, and fails as often as it is asked.
+    // A probe needs no key, and each failed probe would log a line.
     if telemetry::may_log() {
         tracing::error!(error = error as &dyn Error, "the store failed");
     }

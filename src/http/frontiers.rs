@@ -1,4 +1,4 @@
-//! Radii tried on records like the one at hand.
+//! Radii compared on histories like the given one.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::ProblemSpecification;
 use crate::service::Service;
 
-/// Queue the frontier of caution: what multiples of the radius lose on resampled records.
+/// Queues the frontier of caution: what multiples of the radius lose on resampled histories.
 #[utoipa::path(post, path = "/frontier", tag = "jobs",
     request_body(content = FrontierRequest, example = json!({
         "problem": { "history": [0.012, -0.034, 0.021, 0.008, 0.017, -0.009, 0.024, 0.011, -0.03, 0.019, 0.006, -0.012],
@@ -38,13 +38,13 @@ pub async fn frontier(
     Ok(accepted(service.jobs.frontier(&caller, request, idempotency_key(&headers)?).await?))
 }
 
-/// A request of which the problem alone is read.
+/// A request of which only the problem is read.
 #[derive(Deserialize)]
 struct Only<P> {
     problem: P,
 }
 
-/// The request. Its problem is read by itself first, so that what is wrong in it is told by its own field.
+/// Decodes the request. Its problem is decoded by itself first, so that an error names the right field.
 fn request(bytes: &[u8]) -> Result<FrontierRequest, Problem> {
     match said(bytes) {
         Some(SaidOfProblem { assets: Some(_), .. }) => reads::<AssetsProblem>(bytes)?,

@@ -1,7 +1,7 @@
 //! The documents of this project as a site, embedded, at `/guide` and below `/guide/`.
 //!
-//! The pages are the Markdown files as they stand in the repository, turned into HTML when the first of them is asked for: what is
-//! read here is of the version that runs, and works where the network ends at this machine.
+//! The pages are the Markdown files of the repository, turned into HTML at the first request. So they describe the
+//! running version, and can be read on a machine without a network.
 
 use std::sync::LazyLock;
 
@@ -14,11 +14,11 @@ use super::problem::Problem;
 
 mod page;
 
-/// No script at all.
+/// The policy of the pages, which allows no script at all.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; style-src 'self'; img-src 'self'; font-src 'self'; \
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// One page: its name in the address, its title in the list of pages, where it stands in the repository, and its text.
+/// One page: its name in the address, its title in the list of pages, its path in the repository, and its text.
 struct Document {
     name: &'static str,
     title: &'static str,
@@ -37,7 +37,7 @@ macro_rules! documents {
     };
 }
 
-/// By part, in the order in which they are listed; the first is the start.
+/// The pages by part, in the order of the list; the first is the start page.
 const PARTS: &[(&str, &[Document])] = documents! {
     "Start": [
         "start" "What it is" "README.md",
@@ -78,7 +78,7 @@ fn documents() -> impl Iterator<Item = &'static Document> {
 static PAGES: LazyLock<Vec<Asset>> =
     LazyLock::new(|| documents().map(|document| Asset::new((document.name, HTML, page::made(document)))).collect());
 
-/// Of a picture that has its own colours for light and dark.
+/// The policy of a picture that has its own colours for light and dark.
 const DRAWING_SECURITY_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'";
 
 macro_rules! pictures {
@@ -95,7 +95,7 @@ static FILES: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     pictures.into_iter().chain(drawings).chain([style]).map(Asset::new).collect()
 });
 
-/// The guide: its first page, and the list of all pages.
+/// Serves the guide: its first page, and the list of all pages.
 #[utoipa::path(get, path = "/guide", tag = "operations",
     responses(
         (status = 200, description = "A page.", body = String, content_type = "text/html"),
@@ -104,7 +104,7 @@ pub async fn start(headers: HeaderMap) -> Response {
     PAGES[0].served(CONTENT_SECURITY_POLICY, &headers)
 }
 
-/// A page of the guide, or a picture.
+/// Serves a page of the guide, or a picture.
 #[utoipa::path(get, path = "/guide/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
     responses(
         (status = 200, description = "The page or the picture.", body = String, content_type = "text/html"),

@@ -1,4 +1,4 @@
-//! Whose key a call shows: for people, who hold several and see only letters.
+//! The holder of the key that a call shows: for people who hold several keys and cannot tell them apart.
 
 use axum::Json;
 use serde::Serialize;
@@ -7,21 +7,21 @@ use utoipa::ToSchema;
 use super::access::{By, Read};
 use crate::store::KeyRole;
 
-/// Who a call is answered to.
+/// The caller that the key belongs to.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct KeyHolder {
-    /// The key's name, which is no secret; null where the store asks for none.
+    /// Name of the key, which is no secret; null if the store needs no keys.
     pub key: Option<String>,
-    /// Whose jobs, policies and sessions are answered.
+    /// Tenant whose jobs, policies and sessions the key reaches.
     pub tenant: String,
-    /// What the holder may do: `read`, `operate`, `train`, `admin`. Who is an admin may do all of them.
+    /// Roles of the key: `read`, `operate`, `train`, `admin`. An admin may do everything that the others may.
     #[schema(value_type = Vec<String>)]
     pub roles: Vec<&'static str>,
-    /// When the key ends, in milliseconds since 1970; null where that is not set.
+    /// Expiry of the key, in milliseconds since 1970; null if it does not expire.
     pub expires_ms: Option<i64>,
 }
 
-/// The holder of the key that is shown.
+/// Returns the holder of the key in use.
 #[utoipa::path(get, path = "/key", tag = "operations",
     responses((status = 200, description = "Who is answered, and what he may do.", body = KeyHolder)))]
 pub async fn get(By(caller, _): By<Read>) -> Json<KeyHolder> {

@@ -1,8 +1,8 @@
-//! By which names the service is spoken to.
+//! The host names to which the service answers.
 //!
-//! Exactly one `Host`, always. A service that asks for no key would also answer a web page whose name was made to resolve
-//! to it, so it takes the names of loopback, the address the connection came to, and those the operator gives; a page
-//! comes by its own name, and is refused.
+//! A request must have exactly one `Host`. A service without keys could also be reached by a web page whose name was
+//! made to resolve to it. So it accepts only the names of loopback, the address of the connection, and those that the
+//! operator gives. Such a page sends its own name and is refused.
 
 use std::net::IpAddr;
 
@@ -13,7 +13,7 @@ use super::problem::{Problem, ProblemKind};
 
 const RULE: &str = "must be localhost, a loopback address, the address connected to, or a name given by --host";
 
-/// The names an operator gives beside the service's own.
+/// The names that an operator gives, besides the service's own.
 #[derive(Debug, Clone, Default)]
 pub struct Hosts(Vec<String>);
 
@@ -22,6 +22,8 @@ impl Hosts {
         Hosts(names.iter().map(|name| name.trim_end_matches('.').to_ascii_lowercase()).collect())
     }
 
+    /// Rejects a request that names a foreign host.
+    ///
     /// # Errors
     /// The request names a host that is not this service.
     pub fn refuse_foreign(&self, headers: &HeaderMap, uri: &Uri, local: Option<IpAddr>) -> Result<(), Problem> {
@@ -47,8 +49,10 @@ impl Hosts {
     }
 }
 
+/// Rejects a request with ambiguous headers.
+///
 /// # Errors
-/// A header that says who is asked, or who asks, is not there exactly once.
+/// There is not exactly one `Host`, or there is more than one `Authorization`.
 pub fn refuse_ambiguous(headers: &HeaderMap) -> Result<(), Problem> {
     let count = |name| headers.get_all(name).iter().count();
     let refused = |name: &str, given: usize, rule: &str| {

@@ -1,4 +1,4 @@
-//! Jobs: trainings queued, and all of them listed and cancelled.
+//! Jobs: trainings are queued; all jobs are listed, cancelled and deleted.
 
 use std::sync::Arc;
 
@@ -29,33 +29,33 @@ use crate::service::memory::Large;
 use crate::service::sessions::Sessions;
 use crate::store::{Relabel, Tenant};
 
-/// A training: its specification, and what its policy is to be called, which is no part of that.
+/// A training: its specification, and the labels of its policy, which are no part of the specification.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Train {
-    /// What the investor is and may do.
+    /// Decision problem of the investor.
     problem: ProblemSpecification,
-    /// The assets of the fund that a completed specification is of.
+    /// Assets of the fund, in a completed specification for several assets.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     fund: Option<Box<FundSpecification>>,
-    /// Where the surrogates are trained.
+    /// States at which the surrogates are trained.
     #[serde(default)]
     design: DesignSpecification,
-    /// How the surrogates are made.
+    /// Construction of the surrogates.
     #[serde(default)]
     surrogate: SurrogateSpecification,
-    /// The same specification and seed give the same policy, bit for bit.
+    /// Seed of the training: equal specifications and seeds give equal policies, bit for bit.
     #[serde(default = "default_seed")]
     seed: u64,
-    /// What the policy is to be called, in at most 100 letters.
+    /// Name of the policy, at most 100 letters.
     name: Option<String>,
-    /// At most 2,000 letters.
+    /// Notes, at most 2,000 letters.
     notes: Option<String>,
-    /// At most 20, each another, of 1 to 50 letters.
+    /// Tags: at most 20, all different, of 1 to 50 letters each.
     tags: Option<Vec<String>>,
 }
 
-/// Queue a training.
+/// Queues a training.
 #[utoipa::path(post, path = "/train", tag = "jobs",
     request_body(content = TrainQuestion, example = json!({
         "problem": {
@@ -92,7 +92,7 @@ pub enum TrainQuestion {
     Assets(Box<TrainAssets>),
 }
 
-/// The request, decoded as the one that it is, so that a fault is reported under its own field.
+/// Decodes the request by its shape, so that an error names the right field.
 fn question(bytes: &[u8]) -> Result<TrainQuestion, Problem> {
     match said(bytes) {
         Some(SaidOfProblem { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
@@ -106,20 +106,20 @@ fn question(bytes: &[u8]) -> Result<TrainQuestion, Problem> {
 pub struct TrainAssets {
     /// The assets and the investor.
     problem: AssetsProblem,
-    /// Where the surrogates are trained; laws start resampled.
+    /// States at which the surrogates are trained; the initial laws are resampled.
     #[serde(default)]
     design: DesignSpecification,
-    /// How the surrogates are made.
+    /// Construction of the surrogates.
     #[serde(default)]
     surrogate: SurrogateSpecification,
-    /// The same request and seed give the same policy, bit for bit.
+    /// Seed of the training: equal requests and seeds give equal policies, bit for bit.
     #[serde(default = "default_seed")]
     seed: u64,
-    /// What the policy is to be called, in at most 100 letters.
+    /// Name of the policy, at most 100 letters.
     name: Option<String>,
-    /// At most 2,000 letters.
+    /// Notes, at most 2,000 letters.
     notes: Option<String>,
-    /// At most 20, each another, of 1 to 50 letters.
+    /// Tags: at most 20, all different, of 1 to 50 letters each.
     tags: Option<Vec<String>>,
 }
 
@@ -138,11 +138,11 @@ impl TrainAssets {
     }
 }
 
-/// What a call that queues a job answers; told here for all of them.
+/// The answers of every call that queues a job, described here once.
 #[derive(IntoResponses)]
 #[expect(dead_code, reason = "answers are made of their parts: this describes them")]
 pub enum Queueing {
-    /// Queued; poll the Location or follow its events.
+    /// Queued. Poll the Location, or follow the job's events.
     #[response(status = 202, headers(
         ("Location" = String, description = "The job."),
         ("Retry-After" = u32, description = "Seconds to wait before asking for the job.")))]
@@ -158,7 +158,7 @@ pub enum Queueing {
     BrokenRule(Problem),
 }
 
-/// The answer to a job that was queued.
+/// Returns the answer for a queued job.
 pub fn accepted(accepted: Accepted) -> Response {
     let accepted = wire::AcceptedJob::from(accepted);
     let location = [(header::LOCATION, format!("/jobs/{}", accepted.job.job)), (header::RETRY_AFTER, "1".to_owned())];
@@ -173,7 +173,7 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     })
 }
 
-/// List jobs, newest first.
+/// Lists jobs, newest first.
 #[utoipa::path(get, path = "/jobs", tag = "jobs",
     params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
@@ -193,7 +193,7 @@ pub async fn list(
     bodies::written(&service, Large { value, room }).await
 }
 
-/// A job: state, progress, result.
+/// Returns a job: its state, progress and result.
 #[utoipa::path(get, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 200, description = "The job.", body = wire::Job),
@@ -206,7 +206,7 @@ pub async fn get(
     bodies::written(&service, Large::from(wire::Job::from(service.jobs.get(&caller.tenant, &id).await?))).await
 }
 
-/// Cancel a job: always accepted; it stops within a second. An ended job stays as it is.
+/// Cancels a job: always accepted, and the job stops within a second. An ended job stays as it is.
 #[utoipa::path(post, path = "/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 202, description = "The job as it is now.", body = wire::Job),
@@ -220,7 +220,7 @@ pub async fn cancel(
     Ok((StatusCode::ACCEPTED, Json(job)).into_response())
 }
 
-/// Delete an ended job, its report and its idempotency key; a policy that it made stays.
+/// Deletes an ended job, its report and its idempotency key; the policy that it made stays.
 #[utoipa::path(delete, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 204, description = "Deleted."),

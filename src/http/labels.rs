@@ -1,4 +1,4 @@
-//! What policies and sessions are called.
+//! Names, notes and tags of policies and sessions.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::problem::Problem;
 use crate::service::Service;
 use crate::store::{Labelled, Labels, Relabel};
 
-/// Change what a policy is called: what is absent stays, what is null or empty is cleared.
+/// Changes the name, notes and tags of a policy: an absent field stays, and one that is null or empty is cleared.
 #[utoipa::path(patch, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     request_body(content = Relabel, example = json!({ "name": "World, monthly", "tags": ["equity"] })),
     responses(
@@ -27,7 +27,7 @@ pub async fn of_policy(
     Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change).await?))
 }
 
-/// Change what a session is called: what is absent stays, what is null or empty is cleared.
+/// Changes the name, notes and tags of a session: an absent field stays, and one that is null or empty is cleared.
 #[utoipa::path(patch, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     request_body(content = Relabel, example = json!({ "name": "Ada", "notes": "Reports by post.", "tags": ["monthly"] })),
     responses(

@@ -1,7 +1,6 @@
-//! A door: the address listened on, and who has come in by it.
+//! A listener: the address that it listens on, and the connections that it accepts.
 //!
-//! Whoever knocks is let in at once or told to come back: nobody waits in the kernel's queue behind somebody who says
-//! nothing.
+//! A client is accepted or asked to retry at once: nobody waits in the kernel's queue behind an idle connection.
 
 use std::io;
 use std::net::SocketAddr;
@@ -19,9 +18,9 @@ use super::patient::Patience;
 use crate::service::metrics::CONNECTIONS_REFUSED;
 use crate::service::shutdown::Shutdown;
 
-/// Pause after a failed accept: out of descriptors, most likely.
+/// Pause after a failed accept; most likely the process is out of descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
-/// For those who get no place: written once where it fits the empty buffer, as it does.
+/// The answer to clients that get no connection. It is written once, because it fits the empty socket buffer.
 const NO_PLACE: &[u8] =
     b"HTTP/1.1 503 Service Unavailable\r\nretry-after: 1\r\nconnection: close\r\ncontent-length: 0\r\n\r\n";
 
@@ -30,25 +29,27 @@ pub struct Door {
     listener: TcpListener,
 }
 
-/// How those who come in are treated.
+/// Settings for accepted connections.
 #[derive(Clone)]
 pub struct Manners {
     pub application: Router,
     pub connections: Arc<Connections>,
     pub patience: Patience,
-    /// `None` where connections are not encrypted.
+    /// `None` if connections are not encrypted.
     pub encryption: Option<TlsAcceptor>,
 }
 
 impl Door {
+    /// Binds to the address.
+    ///
     /// # Errors
-    /// The address is taken, or none of this machine.
+    /// The address is in use, or is not one of this machine.
     pub async fn at(address: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(address).await?;
         Ok(Door { address: listener.local_addr()?, listener })
     }
 
-    /// Lets callers in until the shutdown begins.
+    /// Accepts connections until the shutdown begins.
     pub async fn open(&self, manners: Manners, shutdown: &Shutdown, stopping: &GracefulShutdown) {
         loop {
             let accepted = tokio::select! {
@@ -66,7 +67,7 @@ impl Door {
                 }
                 None => {
                     metrics::counter!(CONNECTIONS_REFUSED).increment(1);
-                    // Over TLS it would be noise; and whoever does not take it is gone.
+                    // A TLS client could not read it. If the write fails, the client is gone.
                     if manners.encryption.is_none() {
                         let _ = stream.try_write(NO_PLACE);
                     }

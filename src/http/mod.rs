@@ -1,4 +1,4 @@
-//! Floor 4: translation between the wire and the use cases, and nothing else.
+//! Floor 4: translates between the wire and the use cases, and does nothing else.
 
 mod access;
 mod action;

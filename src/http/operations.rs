@@ -1,4 +1,4 @@
-//! For the operator: is it alive, is it ready, how is it doing.
+//! For the operator: is the process alive, is it ready, how is it doing.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use super::telemetry;
 use crate::service::Service;
 use crate::service::memory::Large;
 
-/// The service in a few words.
+/// The state of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Health {
     pub status: &'static str,
@@ -26,14 +26,14 @@ pub struct Health {
     pub sessions: u64,
 }
 
-/// Whether the process answers.
+/// Returns 200 as long as the process answers.
 #[utoipa::path(get, path = "/livez", tag = "operations",
     responses((status = 200, description = "It does.", body = String, content_type = "text/plain")))]
 pub async fn livez() -> &'static str {
     "ok"
 }
 
-/// Whether the store answers and the service takes work.
+/// Returns 200 if the store answers and the service accepts work.
 #[utoipa::path(get, path = "/readyz", tag = "operations",
     responses(
         (status = 200, description = "It does. If the clock of its machine is wrong, that is said too.", body = String, content_type = "text/plain"),
@@ -46,7 +46,7 @@ pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, Probl
     })
 }
 
-/// Both, with detail.
+/// Reports liveness and readiness, with the version and the numbers of jobs and sessions.
 #[utoipa::path(get, path = "/health", tag = "operations",
     responses(
         (status = 200, description = "Alive and ready.", body = Health),
@@ -63,7 +63,7 @@ pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>,
     }))
 }
 
-/// Metrics for Prometheus.
+/// Returns metrics for Prometheus.
 #[utoipa::path(get, path = "/metrics", tag = "operations",
     responses((status = 200, description = "Text exposition format.", body = String, content_type = "text/plain")))]
 pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Problem> {
@@ -77,7 +77,7 @@ pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Pr
     Ok(response)
 }
 
-/// The description of this interface.
+/// Returns the description of this interface.
 #[utoipa::path(get, path = "/openapi.json", tag = "operations",
     responses((status = 200, description = "OpenAPI 3.1.", body = serde_json::Value)))]
 pub async fn openapi(Extension(published): Extension<Published>) -> Response {

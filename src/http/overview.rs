@@ -1,4 +1,4 @@
-//! The list of sessions: searched, put in order, page by page.
+//! The list of sessions: searched, sorted, and page by page.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::store::{
     Care, CareCounts, Counted, Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery,
 };
 
-/// Letters of what is searched for: more than any name has.
+/// Most letters of a search text: more than any name has.
 const LONGEST_SEARCH: usize = 100;
 
 /// Query parameters of the list, as text.
@@ -66,11 +66,11 @@ pub struct SessionEntry {
     pub session: String,
     #[serde(flatten)]
     pub labels: Labels,
-    /// The one that advises the coming period.
+    /// The policy that advises the coming period.
     pub policy: String,
-    /// What that is called; empty where it is called nothing.
+    /// Name of that policy; empty if it has none.
     pub policy_name: String,
-    /// Of that policy, where it says.
+    /// Periods a year of that policy; null if it gives none.
     pub periods_per_year: Option<f64>,
     /// The coming period, from 1; `horizon + 1` once completed.
     pub period: usize,
@@ -81,23 +81,24 @@ pub struct SessionEntry {
     pub wealth: f64,
     /// Share of wealth in the risky asset, before trading.
     pub holding: f64,
-    /// Change of wealth by the last period; null before the first.
+    /// Change of wealth in the last period; null before the first.
     pub wealth_change: Option<f64>,
-    /// The last day that was reported.
+    /// Last day that was reported.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
-    /// When it last reported a period, or put one right.
+    /// Time of the last report or correction, in milliseconds since 1970.
     pub last_report_ms: Option<i64>,
-    /// The last day on which its next report is not overdue, by how many periods a year its policy has: a period after the last day
-    /// reported, else after the day, in UTC, of the last report or of its opening. Null where that is not known, or it is completed.
+    /// Last day on which the next report is not overdue, by the policy's periods a year. It is one period after the
+    /// last day reported. If no day was reported, it counts from the day, in UTC, of the last report or of the opening.
+    /// Null if this is not known, or the session is completed.
     #[schema(value_type = Option<String>, format = Date)]
     pub next: Option<Date>,
-    /// Why it needs care, where it does.
+    /// Reasons why the session needs care; empty if it needs none.
     pub care: Vec<CareReason>,
-    /// Standard deviation of the log-returns learned; of several assets, of their fund. Null before the first report, or where the
-    /// policy tells fewer than two moments.
+    /// Standard deviation of the log-returns learned so far; for several assets, those of their fund. Null before the
+    /// first report, or if the policy reports fewer than two moments.
     pub deviation: Option<f64>,
-    /// Whether the returns still come as they came.
+    /// Evidence that the returns have changed.
     pub drift: DriftLevel,
     pub created_ms: i64,
 }
@@ -128,17 +129,17 @@ impl From<Listed> for SessionEntry {
     }
 }
 
-/// Why a session needs care.
+/// Reason why a session needs care.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CareReason {
-    /// Its next report is late.
+    /// The next report is late.
     Overdue,
-    /// It waits for its next policy.
+    /// The session waits for its next policy.
     Renewal,
-    /// Its returns have changed.
+    /// The returns of the session have changed (drift alarm).
     Alarm,
-    /// It is completed, or in its last period and not renewed by itself.
+    /// The session is completed, or in its last period without automatic renewal.
     Ending,
 }
 
@@ -153,20 +154,20 @@ impl From<Care> for CareReason {
     }
 }
 
-/// How many sessions need care, and why; one may have several reasons.
+/// Numbers of sessions that need care, by reason; a session may have several reasons.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct CareCount {
-    /// Those that are found.
+    /// Sessions that match.
     pub sessions: usize,
-    /// In need of care for any of the reasons.
+    /// Sessions that need care for any of the reasons.
     pub any: usize,
-    /// Their next report is late.
+    /// Sessions whose next report is late.
     pub overdue: usize,
-    /// They wait for their next policies.
+    /// Sessions that wait for their next policies.
     pub renewal: usize,
-    /// Their returns have changed.
+    /// Sessions whose returns have changed (drift alarm).
     pub alarm: usize,
-    /// Completed, or in their last period and not renewed by themselves.
+    /// Sessions that are completed, or in their last period without automatic renewal.
     pub ending: usize,
 }
 
@@ -180,18 +181,19 @@ impl From<CareCounts> for CareCount {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct SessionPage {
     pub sessions: Vec<SessionEntry>,
-    /// Sessions of this page that are not what was written: nothing of them is shown, and a call for one gets 500 until an
+    /// Sessions of this page whose stored data is damaged. They are not shown, and a call for one gets 500 until an
     /// operator has restored it.
     pub damaged: Vec<String>,
-    /// Sessions that match, on all pages together; null unless `count` asks for it.
+    /// Sessions that match, over all pages; null unless `count` requests it.
     pub total: Option<usize>,
-    /// Who needs care among those that `search` and `tag` find, in whatever `state`; null unless `count` asks for it.
+    /// Sessions that need care among those that match `search` and `tag`, in any `state`; null unless `count` requests
+    /// it.
     pub care: Option<CareCount>,
-    /// Give it as `after` for the next page; null on the last.
+    /// Cursor to pass as `after` for the next page; null on the last page.
     pub next: Option<String>,
 }
 
-/// List sessions: all, or those that match, in some order, newest first unless told.
+/// Lists sessions: all, or those that match, newest first by default.
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
     params(("search" = Option<String>, Query, max_length = 100, description = "Words, each the beginning of a word of the session's name or tags, of its policy's name or tags, or eight digits or more with which either's identifier begins, in any order and whatever the case."),
            ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
@@ -267,7 +269,7 @@ impl Asked {
     }
 }
 
-/// The order of a list, as its cursors begin.
+/// Returns the prefix of a cursor, which identifies the order of the list.
 fn mark(asked: &SessionQuery) -> String {
     let order = match asked.order {
         SessionOrder::Created => 'c',
@@ -278,7 +280,7 @@ fn mark(asked: &SessionQuery) -> String {
     format!("{order}{}", if asked.descending { 'd' } else { 'a' })
 }
 
-/// The place of a page's last row: what it is put in order by, as it was then, and which of those with the same it is.
+/// Returns the cursor of a page's last row: its sort key at that time, and its sequence number among equal keys.
 fn cursor(asked: &SessionQuery, SessionPlace { key, sequence }: &SessionPlace) -> String {
     let key = match key {
         SessionKey::Created => String::new(),
@@ -305,7 +307,7 @@ fn place(asked: &SessionQuery, text: &str) -> Option<SessionPlace> {
     Some(SessionPlace { key, sequence: sequence.parse().ok()? })
 }
 
-/// Text from the hexadecimal digits of its bytes.
+/// Decodes text from the hexadecimal digits of its bytes.
 fn text_of(digits: &str) -> Option<String> {
     let pairs = digits.as_bytes().chunks(2);
     let bytes = pairs.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());

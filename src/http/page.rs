@@ -8,10 +8,10 @@ use crate::control::error::FieldError;
 const DEFAULT_LIMIT: usize = 50;
 const LARGEST_LIMIT: usize = 1000;
 
-/// Most bytes of a row of a list: labels at their limits take 12,400, and what else it tells less than 3,000.
+/// Most bytes of a row in a list: labels at their limits take 12,400, and the rest of the row less than 3,000.
 const ROW_BYTES: usize = 16 << 10;
 
-/// Most bytes of a page of so many rows, for the budget of large answers.
+/// Returns the most bytes of a page with so many rows, for the budget of large answers.
 pub fn bytes(limit: usize) -> usize {
     limit * ROW_BYTES
 }
@@ -29,7 +29,7 @@ impl Page {
         Page { limit, after }
     }
 
-    /// The limit and the cursor.
+    /// Returns the limit and the cursor.
     pub fn bounds(&self) -> Result<(usize, Option<i64>), Problem> {
         let refused = |field, value: &str, rule| {
             Problem::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
@@ -49,7 +49,7 @@ impl Page {
     }
 }
 
-/// The cursor of the page after one that ends at `last`, where the page is full.
+/// Returns the cursor of the page after one that ends at `last`, if the page is full.
 pub fn next(length: usize, limit: usize, last: Option<i64>) -> Option<i64> {
     last.filter(|_| length == limit)
 }

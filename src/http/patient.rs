@@ -1,9 +1,9 @@
-//! A connection that is patient, but not without end, and that is polite at its end.
+//! A connection with timeouts, which also closes cleanly.
 //!
-//! A client that stops reading its answer is cut off; so is one that begins a head and does not finish it, and one that
-//! asks nothing for long. Where an answer was given before the request was read to its end, what is still on its way is
-//! taken and thrown away, within bounds, before the connection closes: else the system would answer it by a reset, which
-//! makes many clients throw the answer away unread.
+//! A client is cut off if it stops reading its answer, begins a head and does not finish it, or makes no request for
+//! long. If an answer was sent before the request was fully read, the rest of the request is read and discarded, within
+//! bounds, before the connection closes. Otherwise the system would send a reset, which makes many clients discard the
+//! answer unread.
 
 use std::future::Future;
 use std::io;
@@ -17,37 +17,37 @@ use tokio::time::{Instant, Sleep};
 
 use super::connections::{Connection, Phase};
 
-/// How long a client may take.
+/// The time limits for a client.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
-    /// To take anything of its answer.
+    /// Limit to read any part of its answer.
     pub to_read: Duration,
-    /// From the first byte of a head to its last.
+    /// Limit from the first byte of a head to its last.
     pub for_head: Duration,
-    /// Between two requests.
+    /// Limit between two requests.
     pub between: Duration,
-    /// To send what is left of a request that was answered already.
+    /// Limit to send the rest of a request that was already answered.
     pub to_finish: Duration,
-    /// Bytes of it that are taken.
+    /// Most bytes of that rest that are read.
     pub left_bytes: usize,
-    /// Requests after which its connection is closed with the answer.
+    /// Number of requests after which the connection closes with the answer.
     pub requests: u64,
-    /// The age at which it is.
+    /// Age at which the connection closes with the answer.
     pub age: Duration,
 }
 
-/// `stream`, whose reads and writes fail once the patience with its client is over.
+/// A `stream` whose reads and writes fail once a time limit of its client has passed.
 pub struct Patient<S> {
     stream: S,
     patience: Patience,
     connection: Arc<Connection>,
-    /// Runs while a write waits.
+    /// Timer that runs while a write waits.
     stalled: Option<Pin<Box<Sleep>>>,
-    /// When the head under way was begun, and of which request it is.
+    /// The number of the request whose head is under way, and when the head began.
     head: Option<(u64, Instant)>,
-    /// Runs while a request is waited for; at most as late as it must be.
+    /// Timer that runs while the connection waits for a request; it never fires late.
     silent: Option<Pin<Box<Sleep>>>,
-    /// Bytes thrown away at the end, and until when they are.
+    /// Number of bytes discarded at the end, and the timer that bounds it.
     end: Option<(usize, Pin<Box<Sleep>>)>,
 }
 
@@ -72,7 +72,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
         stalled.as_mut().poll(context).map(|()| Err(io::ErrorKind::TimedOut.into()))
     }
 
-    /// Fails where the client has been silent for too long; wakes the task no later than then.
+    /// Fails if the client has been silent for too long; wakes the task no later than then.
     fn silence(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
         loop {
             let ends = match self.head {
@@ -83,7 +83,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
                 return Poll::Ready(io::ErrorKind::TimedOut.into());
             }
             let silent = self.silent.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(ends)));
-            // Put off only when it fires: a busy connection moves its end with every request.
+            // Postponed only when it fires, because every request on a busy connection moves the deadline.
             if silent.deadline() > ends {
                 silent.as_mut().reset(ends);
             }
@@ -92,7 +92,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
         }
     }
 
-    /// Throws away what the client still sends; ready once it has nothing more to say, or has said too much.
+    /// Discards what the client still sends; ready once the client has ended or has sent too much.
     fn finish(&mut self, context: &mut Context<'_>) -> Poll<()> {
         let patience = self.patience;
         let (taken, over) = self.end.get_or_insert_with(|| (0, Box::pin(tokio::time::sleep(patience.to_finish))));
@@ -157,7 +157,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for Patient<S> {
             Poll::Pending => self.silence(context).map(Err),
             Poll::Ready(_) if buffer.filled().len() > before => {
                 let (_, began) = *self.head.get_or_insert_with(|| (asked, Instant::now()));
-                // A client that sends a byte now and then never leaves a read waiting.
+                // A client that sends a byte now and then never leaves a read pending.
                 if began.elapsed() < self.patience.for_head {
                     read
                 } else {
@@ -203,7 +203,7 @@ mod tests {
             }
             there
         });
-        // Seven times what the pipe holds, in longer than the limit, but never silent for that long.
+        // Seven times the capacity of the pipe: longer than the limit in all, but never silent for that long.
         patient.write_all(&[7; 16 * 7]).await.unwrap();
         let _there = reading.await.unwrap();
         let refused = patient.write_all(&[7; 16]).await.unwrap_err();

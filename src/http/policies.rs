@@ -1,4 +1,4 @@
-//! Policies: immutable, named by the hash of their bytes.
+//! Policies: immutable, identified by the hash of their bytes.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::control::policy::Policy;
 use crate::service::Service;
 use crate::service::memory::Large;
 
-/// List policies, newest first.
+/// Lists policies, newest first.
 #[utoipa::path(get, path = "/policies", tag = "policies",
     params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
@@ -38,7 +38,7 @@ pub async fn list(
     bodies::written(&service, Large { value, room }).await
 }
 
-/// A policy with its specification and the diagnostics of every step.
+/// Returns a policy with its specification and the diagnostics of every step.
 #[utoipa::path(get, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     responses(
         (status = 200, description = "The policy.", body = wire::PolicyDetail),
@@ -65,7 +65,7 @@ pub async fn get(
     bodies::written(&service, Large::from(detail)).await
 }
 
-/// The portable document of a policy; its SHA-256 is the policy's name.
+/// Returns the portable document of a policy; its SHA-256 is the policy's identifier.
 #[utoipa::path(get, path = "/policies/{id}/export", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     responses(
         (status = 200, description = "The document.", body = serde_json::Value),
@@ -78,7 +78,7 @@ pub async fn export(
     Ok(bodies::sent(service.policies.document(&caller.tenant, &id).await?))
 }
 
-/// Store an exported policy.
+/// Stores an exported policy.
 #[utoipa::path(post, path = "/policies/import", tag = "policies", request_body = serde_json::Value,
     responses(
         (status = 201, description = "Stored, or known already.", body = wire::Imported,
@@ -94,7 +94,7 @@ pub async fn import(
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
 }
 
-/// Delete a policy that no session lives by.
+/// Deletes a policy that no session uses.
 #[utoipa::path(delete, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     responses(
         (status = 204, description = "Deleted."),

@@ -1,7 +1,7 @@
-//! Every way a request can fail, once: RFC 9457 problem documents.
+//! Every way in which a request can fail, defined once: RFC 9457 problem documents.
 //!
-//! [`ProblemKind::entry`] is the only place that pairs a kind with its slug, status and title; responses, the
-//! OpenAPI description, its table of all kinds among it, are derived from it.
+//! [`ProblemKind::entry`] is the only place that pairs a kind with its slug, status and title. Responses and the
+//! OpenAPI description, including its table of all kinds, are derived from it.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use crate::control::error::FieldError;
 use crate::service::gate::{Doubt, Doubts};
 use crate::service::metrics::PROBLEMS;
 
-/// What went wrong, chosen by what the client should do next.
+/// The kind of a failure; kinds differ by what the client should do next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProblemKind {
     MalformedJson,
@@ -47,7 +47,7 @@ pub enum ProblemKind {
 }
 
 impl ProblemKind {
-    /// In ascending order of status.
+    /// All kinds, in ascending order of status.
     pub const ALL: [ProblemKind; 25] = [
         ProblemKind::MalformedJson,
         ProblemKind::InvalidQuery,
@@ -76,7 +76,7 @@ impl ProblemKind {
         ProblemKind::StorageFull,
     ];
 
-    /// Slug, status and title.
+    /// Returns the slug, status and title.
     pub fn entry(self) -> (&'static str, StatusCode, &'static str) {
         use StatusCode as S;
         match self {
@@ -124,37 +124,37 @@ pub struct Problem {
     pub title: &'static str,
     #[schema(example = 422)]
     pub status: u16,
-    /// This occurrence, in one sentence.
+    /// This occurrence of the problem, in one sentence.
     #[schema(value_type = String, example = "problem.horizon is 0: must lie in [1, 520]")]
     pub detail: Box<str>,
-    /// Dotted path of the offending field, header or parameter; every problem that the client can mend names it.
+    /// The invalid field (as a dotted path), header or parameter; every problem that the client can correct names it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>, example = "problem.horizon")]
     pub field: Option<Box<str>>,
-    /// What the field held.
+    /// Value that the field had.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Value>)]
     pub value: Option<Box<Value>>,
-    /// What the field must be.
+    /// Rule that the field must satisfy.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>, example = "must lie in [1, 520]")]
     pub rule: Option<Box<str>>,
-    /// All that is doubted in a report; with `confirm` it is recorded.
+    /// Everything in a report that is probably a mistake; sent again with `confirm`, the report is recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Vec<Doubt>>)]
     pub doubts: Option<Box<Doubts>>,
-    /// When to ask again, where that is known; shown as `Retry-After`.
+    /// Time to wait before a retry, if known; sent as `Retry-After`.
     #[serde(skip)]
     pub retry_after: Option<Duration>,
 }
 
-/// Longest text shown of a field's name, of a value and of a sentence, in characters: refused text is the caller's own and
-/// may hold megabytes.
+/// Most characters shown of a field's name, of a value and of a sentence. Refused text is the caller's own and may hold
+/// megabytes.
 const SHOWN_FIELD: usize = 120;
 pub const SHOWN_VALUE: usize = 80;
 const SHOWN_SENTENCE: usize = 400;
 
-/// `text` itself where it is no longer than `limit` characters, else its start.
+/// Returns `text` if it has at most `limit` characters, and otherwise its start.
 pub fn shortened(text: &str, limit: usize) -> String {
     match text.char_indices().nth(limit) {
         Some((end, _)) => format!("{}...", &text[..end]),
@@ -178,7 +178,7 @@ impl Problem {
         }
     }
 
-    /// A field that breaks a rule. A value that is not JSON is shown as text.
+    /// Creates the problem of a field that breaks a rule. A value that is not JSON is shown as text.
     pub fn of_field(kind: ProblemKind, error: FieldError) -> Self {
         let error = FieldError {
             field: shortened(&error.field, SHOWN_FIELD),
@@ -190,7 +190,7 @@ impl Problem {
         Problem::new(kind, detail).naming(error.field, value, error.rule)
     }
 
-    /// The same problem with what it is about: the field, what it held, what it must be.
+    /// Adds the field, its value and the rule that it must satisfy.
     pub fn naming(self, field: impl Into<String>, value: impl Into<Value>, rule: impl Into<Box<str>>) -> Self {
         let value = match value.into() {
             Value::String(text) => Value::String(shortened(&text, SHOWN_VALUE)),
@@ -200,7 +200,7 @@ impl Problem {
         Problem { field: Some(field.into()), value: Some(Box::new(value)), rule: Some(rule.into()), ..self }
     }
 
-    /// The same problem with the time after which it may be gone.
+    /// Adds the time after which a retry may succeed.
     pub fn to_be_asked_again_in(self, wait: Duration) -> Self {
         Problem { retry_after: Some(wait), ..self }
     }
@@ -211,13 +211,13 @@ impl Problem {
         self.kind.trim_start_matches("/problems/")
     }
 
-    /// Counts it as met, once, where it is answered.
+    /// Counts the problem; call it once, when the problem is answered.
     pub fn count(&self) {
         metrics::counter!(PROBLEMS, "problem" => self.slug().to_owned()).increment(1);
     }
 }
 
-/// Shows every kind of problem as never met, so that the first one is seen as an increase.
+/// Sets the count of every kind to zero, so that the first problem shows as an increase.
 pub fn count_from_zero() {
     for kind in ProblemKind::ALL {
         metrics::counter!(PROBLEMS, "problem" => kind.entry().0).increment(0);

@@ -1,4 +1,4 @@
-//! What periods gave: one report, or a list of many sessions' reports.
+//! Reports of periods: one report, or a list of reports for many sessions.
 
 use std::fmt;
 use std::sync::Arc;
@@ -23,11 +23,12 @@ use crate::service::memory::Large;
 use crate::service::report::Observe;
 use crate::service::reports::{self, REPORTS, Reported};
 
-/// Most bytes of the answer to a report, and for each byte of it: names of assets that it has are told in four places at most.
+/// Most bytes of the answer to a report: a constant, and a factor for each byte of the request, because the answer
+/// repeats asset names in at most four fields.
 const ANSWER_BYTES: usize = 2048;
 const ANSWERED_A_BYTE: usize = 8;
 
-/// One report, or a list of reports of as many sessions.
+/// One report, or a list of reports, each for another session.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum Reports {
@@ -41,7 +42,7 @@ impl<'de> Deserialize<'de> for Reports {
     }
 }
 
-/// Reads which of the two it is off the first byte, so that what is wrong in it is named as it stands there.
+/// Decides by the first byte which of the two it is, so that an error names the field at its position.
 struct OneOrMany;
 
 impl<'de> Visitor<'de> for OneOrMany {
@@ -67,7 +68,7 @@ impl<'de> Visitor<'de> for OneOrMany {
     }
 }
 
-/// The answer to one report, or to each of a list in its order.
+/// The answer to one report, or the answers to a list in its order.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "answers travel as they are stored: this describes them")]
@@ -81,19 +82,19 @@ pub enum ReportsAnswered {
 pub struct ElementAnswered {
     pub session: String,
     pub period: usize,
-    /// What a call with this report alone would be answered with.
+    /// HTTP status that a call with this report alone would get.
     #[schema(example = 200)]
     pub status: u16,
-    /// Where the status is 200.
+    /// The answer, if the status is 200.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub answer: Option<Observed>,
-    /// Where it is another.
+    /// The problem, if the status is not 200.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<Problem>,
 }
 
-/// Report the return of a period, or of one period of each of up to 1000 sessions: each exactly once, durable before it is
-/// answered.
+/// Records the return of a period, or of one period of each of up to 1000 sessions. Each is recorded exactly once, and
+/// is durable before it is answered.
 #[utoipa::path(post, path = "/observe", tag = "sessions",
     request_body(content = Reports, example = json!({
         "session": "session_0123456789abcdef0123456789abcdef", "period": 1, "simple_return": 0.012, "executed_allocation": 0.3
@@ -123,7 +124,7 @@ pub async fn observe(
     }
 }
 
-/// One element's answer, written around the answer as it is stored.
+/// Formats the answer for one element, around the answer as it is stored.
 fn answered(Reported { session, period, outcome }: Reported, tenant: &str) -> String {
     let session = json!(session);
     match outcome.map_err(Problem::from) {

@@ -1,4 +1,4 @@
-//! Returns read from text.
+//! Reads returns from text.
 
 use std::sync::Arc;
 
@@ -14,10 +14,11 @@ use crate::service::Service;
 use crate::service::memory::Large;
 use crate::service::returns::ReadReturns;
 
-/// Most bytes of an answer for each of the text: a number of two digits is told with seventeen.
+/// Most bytes of the answer for each byte of the text: a number of two digits may be written with seventeen.
 const ANSWERED_A_BYTE: usize = 16;
 
-/// What a text of returns or prices says: one record, or what must be asked, or where it is wrong. Nothing is stored.
+/// Reads returns or prices from a text. The answer is one history, the questions that you must answer first, or where
+/// the text is wrong. Nothing is stored.
 #[utoipa::path(post, path = "/returns", tag = "advice",
     request_body(content = ReadReturns, example = json!({
         "text": "month,fund,rf\n2020-01,1.2,0.1\n2020-02,-3.4,0.1\n2020-03,2.1,0.1\n",

@@ -29,12 +29,12 @@ use super::{
 use crate::service::Service;
 use crate::service::config::Config;
 
-/// Bodies other than policies: the longest history and a design fit several times.
+/// Limit for bodies other than policies: the longest history and design fit several times.
 const BODY_BYTES: usize = 4 << 20;
 
 #[derive(OpenApi)]
 #[openapi(
-    // `jobs::Queueing` refers to it and does not describe it.
+    // `jobs::Queueing` refers to it without describing it.
     components(schemas(wire::AcceptedJob)),
     info(title = "Ballast", description = "Nonparametric adaptive robust control of an investor. Every error is a problem document (RFC 9457)."),
     tags(
@@ -98,7 +98,7 @@ fn pages() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(guide::file))
 }
 
-/// The OpenAPI description.
+/// Returns the OpenAPI description.
 pub fn description() -> utoipa::openapi::OpenApi {
     let mut description = routes().into_openapi();
     described::with_every_problem(&mut description);
@@ -109,12 +109,12 @@ pub fn description() -> utoipa::openapi::OpenApi {
 
 static PUBLISHED: LazyLock<String> = LazyLock::new(|| description().to_pretty_json().unwrap_or_default() + "\n");
 
-/// The description as checked in under `api/openapi.json`.
+/// Returns the description as checked in under `api/openapi.json`.
 pub fn description_json() -> &'static str {
     &PUBLISHED
 }
 
-/// The whole application; for a replica that only works, the operator's part of it.
+/// Returns the whole application; for a replica that only runs jobs, its operator part.
 pub fn application(service: Arc<Service>, config: &Config) -> Router {
     let routes = match config.role.answers() {
         true => publishing(operators().merge(pages())).merge(users()),
@@ -123,12 +123,13 @@ pub fn application(service: Arc<Service>, config: &Config) -> Router {
     guarded(routes, service, config)
 }
 
-/// The operator's part of it.
+/// Returns the operator part of the application.
 pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
     guarded(publishing(operators()), service, config)
 }
 
-/// What is answered while the service starts: that the process lives, and that it is not ready. Each connection is for one answer.
+/// Returns the application that answers while the service starts: the process is alive, and not ready. Each connection
+/// gets one answer.
 pub fn starting() -> Router {
     let not_yet = || async {
         let problem = Problem::new(ProblemKind::Overloaded, "the service is starting");
@@ -138,7 +139,8 @@ pub fn starting() -> Router {
     Router::new().route("/livez", get(alive)).fallback(not_yet)
 }
 
-/// With the description at hand. Not the users' routes, which have no need of it and are asked most.
+/// Adds the description to the routes. The users' routes do without it, because they do not need it and are called
+/// most.
 fn publishing(routes: OpenApiRouter<Arc<Service>>) -> OpenApiRouter<Arc<Service>> {
     let published: Published = &PUBLISHED;
     routes.route_layer(Extension(published))
@@ -160,15 +162,15 @@ fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, config: &
         .with_state(service)
 }
 
-/// What every handler is run in.
+/// The context in which every handler runs.
 #[derive(Clone)]
 struct Surroundings {
     gate: Gate,
     limit: Duration,
 }
 
-/// Admits a request, bounds its time, answers where it panics, and records it. One layer, since each costs a request the
-/// clones and the allocations of all below it.
+/// Admits a request, bounds its time, answers if it panics, and records it. This is one layer, because each layer costs
+/// every request the clones and allocations of all below it.
 async fn answered(State(around): State<Surroundings>, request: Request, next: Next) -> Response {
     let recording = telemetry::Recording::start(&request);
     let service = around.gate.service.clone();
@@ -184,7 +186,7 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
     response
 }
 
-/// A browser that is sent to a page by its address without the `#` is sent there; the page itself asks for a key.
+/// Redirects a browser that requests a page by its address without the `#`; the page itself asks for a key.
 async fn unknown_route(
     caller: Result<By<Read>, Problem>,
     method: Method,
@@ -205,7 +207,7 @@ async fn wrong_method(_: Option<By<Read>>, method: Method, uri: Uri) -> Problem 
     problem.naming("method", method.as_str(), "must be one that the Allow header names")
 }
 
-/// Bounds the time to the head of the response, and so the time a slow body may take; event streams run on.
+/// Bounds the time to the head of the response, and so also the time for a slow body; event streams run on.
 async fn within_time(limit: Duration, answering: impl Future<Output = Response>) -> Response {
     match tokio::time::timeout(limit, answering).await {
         Ok(response) => response,

@@ -1,4 +1,4 @@
-//! Schemas of figures that a report carries as floor 0 computes them, which describes nothing for the wire.
+//! OpenAPI schemas for figures of floor 0 that reports carry; floor 0 itself describes nothing for the wire.
 
 use std::borrow::Cow;
 
@@ -7,15 +7,15 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::numerics::summary::Estimate;
 
-/// A figure and the interval around it.
+/// A figure and its interval.
 #[derive(ToSchema)]
 #[expect(dead_code, reason = "read by the derive alone")]
 struct Described {
-    /// The estimate itself.
+    /// The estimate.
     value: f64,
-    /// Lower end of its interval.
+    /// Lower end of the interval.
     low: f64,
-    /// Upper end of its interval.
+    /// Upper end of the interval.
     high: f64,
 }
 

@@ -1,4 +1,5 @@
-//! From a configuration to a service that answers: one door for callers, one for the operator, a drain at the end.
+//! From a configuration to a service that answers: one listener for callers, one for the operator, and a drain at the
+//! end.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -23,18 +24,19 @@ use crate::service::error::ServiceError;
 use crate::service::shutdown::Shutdown;
 use crate::store::StoreError;
 
-/// A client that has not sent its head by then is cut off.
+/// Time within which a client must send its request head.
 const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
-/// A client that takes nothing of its answer for so long is cut off.
+/// Time within which a client must read some of its answer.
 const READER_TIMEOUT: Duration = Duration::from_secs(30);
-/// A connection that asks nothing for so long is closed: longer than the proxies usual keep theirs (60 s), so that they close
-/// it first and no request crosses the end. Such a connection gives way long before, where its place is needed.
+/// Time after which an idle connection is closed. It is longer than common proxies keep theirs (60 s), so that they
+/// close it first and no request meets a closing connection. If its slot is needed, an idle connection is closed long
+/// before.
 const BETWEEN_REQUESTS: Duration = Duration::from_secs(75);
-/// The rest of a refused body is taken for so long, so that its sender comes to read why.
+/// Time for which the rest of a refused body is read, so that its sender can read the refusal.
 const REFUSED_BODY_TIME: Duration = Duration::from_secs(10);
-/// Places of the door for the operator: probes, a scrape, a person, and as much again.
+/// Connections of the operator's listener: probes, a scrape, a person, and as many again.
 const OPERATORS: usize = 64;
-/// Places for probes at the door for callers, where calls under way fill it.
+/// Extra connections for probes at the callers' listener, for when calls under way fill it.
 const PROBES: usize = 16;
 /// Descriptors that are not connections: the store's files, the runtime, the standard streams.
 const OTHER_DESCRIPTORS: usize = 128;
@@ -55,11 +57,11 @@ pub enum ServeError {
     Stopped,
 }
 
-/// A server at work.
+/// A running server.
 pub struct Running {
-    /// The address bound.
+    /// The bound address.
     pub address: SocketAddr,
-    /// That of the operator's own, where there is one.
+    /// The bound address of the operator's own listener, if there is one.
     pub operations: Option<SocketAddr>,
     /// `http` or `https`.
     pub scheme: &'static str,
@@ -68,7 +70,7 @@ pub struct Running {
 }
 
 impl Running {
-    /// Waits until the server has ended by its own shutdown signal: drained, job requeued, store closed.
+    /// Waits until the server has ended by its own shutdown signal: connections drained, job requeued, store closed.
     ///
     /// # Errors
     /// The store failed past recovery, and the process must end at once.
@@ -85,7 +87,7 @@ impl Running {
         }
     }
 
-    /// Asks the server to end, and waits for it.
+    /// Stops the server, and waits for its end.
     ///
     /// # Errors
     /// The store failed past recovery.
@@ -98,9 +100,10 @@ impl Running {
 /// Starts the service and serves it until `shutdown` begins.
 ///
 /// # Errors
-/// An address is taken, or public without encryption; the certificate cannot be used; the service cannot start.
+/// An address is in use, or is public without encryption; the certificate cannot be used; the service cannot start.
 pub fn serve(config: Config, shutdown: Shutdown) -> LocalBoxFuture<'static, Result<Running, ServeError>> {
-    // Boxed, the whole application is compiled into the library, and not again into every program that serves it.
+    // Boxed, so that the whole application is compiled once in the library and not again in every program that serves
+    // it.
     Box::pin(start(config, shutdown))
 }
 
@@ -122,7 +125,7 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError
     let starting = manners(router::starting(), bounds(&config), &config, &encryption);
     let service = tokio::select! {
         service = Service::start(&config, Clock::system(), shutdown.clone()) => service?,
-        // Another's migration may take minutes, and probes ask meanwhile.
+        // Another process's migration may take minutes, and probes come in meanwhile.
         _ = open((&door, starting.clone()), back_door.as_ref().map(|door| (door, starting)), &shutdown) => {
             return Err(ServeError::Stopped);
         }
@@ -136,8 +139,8 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError
     Ok(Running { address, operations, scheme, service, task })
 }
 
-/// A connection that has asked so often, or is so old, is closed with the next answer: what balances callers over
-/// replicas sees them anew, and nothing that gathers with a connection gathers for ever.
+/// Number of requests and age after which a connection closes with the next answer. Load balancers can then distribute
+/// its client anew, and nothing accumulates with a connection for ever.
 const LARGEST_REQUESTS: u64 = 100_000;
 const LARGEST_AGE: Duration = Duration::from_secs(60 * 60);
 const OPERATORS_BOUNDS: Bounds = Bounds { all: OPERATORS, of_address: OPERATORS, for_probes: PROBES };
@@ -154,7 +157,7 @@ fn manners(application: Router, bounds: Bounds, config: &Config, encryption: &Op
         for_head: HEADER_TIMEOUT,
         between: BETWEEN_REQUESTS,
         to_finish: REFUSED_BODY_TIME,
-        // The largest body taken anywhere: who sends more would be refused wherever he sent it.
+        // The largest body accepted anywhere: a larger one would be refused at every address.
         left_bytes: config.body_limit_bytes,
         requests: LARGEST_REQUESTS,
         age: LARGEST_AGE,
@@ -162,7 +165,7 @@ fn manners(application: Router, bounds: Bounds, config: &Config, encryption: &Op
     Manners { application, connections: Connections::new(bounds), patience, encryption: encryption.clone() }
 }
 
-/// Lets callers in by both doors until the shutdown begins, and gives what ends their connections.
+/// Accepts connections on both listeners until the shutdown begins, and returns the handle that ends them.
 async fn open(front: (&Door, Manners), back: Option<(&Door, Manners)>, shutdown: &Shutdown) -> GracefulShutdown {
     let stopping = GracefulShutdown::new();
     let behind = async {
@@ -174,7 +177,7 @@ async fn open(front: (&Door, Manners), back: Option<(&Door, Manners)>, shutdown:
     stopping
 }
 
-/// Everything that answers.
+/// The listeners and the certificate of the server.
 struct Doors {
     front: (Door, Manners),
     back: Option<(Door, Manners)>,
@@ -201,7 +204,7 @@ impl Doors {
     }
 }
 
-/// As many as asked for, but never so many that the store finds no descriptor for its files.
+/// Returns the requested limit, or less if the store would otherwise find no descriptor for its files.
 fn connection_limit(asked: usize) -> usize {
     let others = OTHER_DESCRIPTORS + OPERATORS + 2 * PROBES;
     match descriptors() {
@@ -210,7 +213,7 @@ fn connection_limit(asked: usize) -> usize {
     }
 }
 
-/// Files and sockets this process may open, where the system tells (Linux).
+/// Returns how many files and sockets this process may open, if the system reports it (Linux).
 fn descriptors() -> Option<usize> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;

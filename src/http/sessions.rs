@@ -1,4 +1,4 @@
-//! Live investors: open, observe, act.
+//! Live investors: open a session, report, get advice.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -31,7 +31,7 @@ use crate::service::report::Correct;
 use crate::service::sessions::Start;
 use crate::store::{Labels, Relabel};
 
-/// Open a session.
+/// Opens a session.
 #[utoipa::path(post, path = "/sessions", tag = "sessions",
     request_body(content = wire::OpenSession, example = json!({
         "policy": "2c882522ef92e64d9ad1cb0dd2b4ff4e7c3b0c1e8f5d2a6b9c0d1e2f3a4b5c6d", "wealth": 2500.0
@@ -59,7 +59,7 @@ pub async fn open(
     Ok((StatusCode::CREATED, location, Json(session)).into_response())
 }
 
-/// A session: coming period, wealth, state.
+/// Returns a session: its coming period, wealth and state.
 #[utoipa::path(get, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 200, description = "The session.", body = wire::Session),
@@ -75,7 +75,8 @@ pub async fn get(
     bodies::written(&service, Large::from(wire::Session { renewal, labels, ..live.into() })).await
 }
 
-/// Where a session started and everything recorded of it: what was reported, what was told then, what would be told now.
+/// Returns the start of a session and everything recorded in it: what was reported, the answers at that time, and the
+/// answers that would be given now.
 #[utoipa::path(get, path = "/sessions/{id}/history", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 200, description = "The history.", body = History),
@@ -88,8 +89,8 @@ pub async fn history(
     bodies::written(&service, service.sessions.history(&caller.tenant, &id, &caller.turn).await?).await
 }
 
-/// Report a period anew, put in one that was skipped or take one out: exactly once, durable before it is answered. What was
-/// reported and told stays on record.
+/// Corrects a period: reports it anew, inserts one that was skipped, or removes one. Each correction is recorded
+/// exactly once, and is durable before it is answered. The original reports and answers stay on record.
 #[utoipa::path(post, path = "/sessions/{id}/corrections", tag = "sessions",
     params(("id" = String, Path, description = "The session.")),
     request_body(content = Correct, example = json!({
@@ -110,7 +111,8 @@ pub async fn correct(
     bodies::recorded(&service, corrected).await
 }
 
-/// Go on by another policy from the coming period: exactly once, durable before it is answered.
+/// Continues a session with another policy from the coming period. Each renewal is recorded exactly once, and is
+/// durable before it is answered.
 #[utoipa::path(post, path = "/sessions/{id}/renewals", tag = "sessions",
     params(("id" = String, Path, description = "The session.")),
     request_body(content = Renew, example = json!({
@@ -131,7 +133,7 @@ pub async fn renew(
     bodies::recorded(&service, service.sessions.renew(&caller.tenant, by, &id, &renewal, turn).await?).await
 }
 
-/// Delete a session and all that is recorded of it.
+/// Deletes a session and everything recorded in it.
 #[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 204, description = "Deleted."),
@@ -155,7 +157,7 @@ pub struct Ask {
     sensitivity: Option<Flag>,
 }
 
-/// A parameter is text, and so is what it says.
+/// A boolean query parameter, which arrives as text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Flag {
@@ -171,7 +173,7 @@ enum Mode {
 }
 
 impl access::Question for Ask {
-    /// Advice from the surrogate that turns out to need a solve becomes heavy then.
+    /// Returns the class. Advice from the surrogate that turns out to need a solve becomes heavy at that point.
     fn class(&self) -> Class {
         match (self.mode, self.explain) {
             (Some(Mode::Resolve), _) | (_, Some(Explain::WorstCase)) => Class::Heavy,
@@ -181,7 +183,7 @@ impl access::Question for Ask {
     }
 }
 
-/// The robust allocation for the coming period.
+/// Returns the robust allocation for the coming period.
 #[utoipa::path(get, path = "/action", tag = "sessions",
     params(("session" = String, Query, description = "The session."),
            ("mode" = inline(Option<Mode>), Query, description = "`surrogate` (default) or `resolve`."),

@@ -1,4 +1,4 @@
-//! One log line and two metrics a request; the metrics page.
+//! One log line and two metrics for each request; the metrics page.
 
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -19,7 +19,7 @@ use crate::service::keys::KeyFigures;
 use crate::service::{metrics as names, process, spans};
 use crate::store::JobCounts;
 
-/// The recorder is one per process, as the `metrics` crate has it.
+/// The recorder of the process; the `metrics` crate allows one.
 static RECORDER: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
 
 /// Installs the recorder; later calls change nothing.
@@ -37,10 +37,11 @@ pub fn install_recorder() {
     });
 }
 
-/// Histograms hold every sample until they are read: this bounds what gathers where nobody reads the page.
+/// Interval between upkeeps. Histograms hold every sample until they are read, so this bounds them if nobody reads the
+/// page.
 const UPKEEP: Duration = Duration::from_secs(5);
 
-/// Reads the histograms now and then, counts the connections, and tells of lines left out; without end.
+/// Runs for ever: reads the histograms, counts the connections, and reports how many log lines were left out.
 pub async fn keep_up(connections: Arc<Connections>) {
     metrics::counter!(names::CONNECTIONS_REFUSED).increment(0);
     loop {
@@ -58,17 +59,17 @@ pub async fn keep_up(connections: Arc<Connections>) {
     }
 }
 
-/// Lines a second about callers who show no key: no more than a disk bears for months, and enough to see what happens.
-/// So many may come at once, too.
+/// Log lines a second about callers without a key, also the largest burst. A disk can bear this for months, and it is
+/// enough to see what happens.
 const UNKNOWN_CALLERS_LINES: NonZeroU32 = NonZeroU32::new(20).expect("not zero");
-/// Longest path logged, in characters: names of things are shorter.
+/// Longest path logged, in characters; real identifiers are shorter.
 const LOGGED_PATH: usize = 200;
 
 static LINES: LazyLock<DefaultDirectRateLimiter> =
     LazyLock::new(|| RateLimiter::direct(Quota::per_second(UNKNOWN_CALLERS_LINES)));
 static LEFT_OUT: AtomicU64 = AtomicU64::new(0);
 
-/// Whether a line about somebody who shows no key may be written now.
+/// Returns true if a line about a caller without a key may be written now.
 pub fn may_log() -> bool {
     let may = LINES.check().is_ok();
     if !may {
@@ -77,7 +78,7 @@ pub fn may_log() -> bool {
     may
 }
 
-/// The metrics page, with the counts of the store as they are now.
+/// Returns the metrics page, with the current counts of the store.
 pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize); 3], keys: &[KeyFigures]) -> String {
     let by_state = [
         ("queued", jobs.queued),
@@ -97,14 +98,14 @@ pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize
     RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default() + &names::of_keys(keys)
 }
 
-/// Counts an answer that turns a tenant away.
+/// Counts an answer that refuses a tenant.
 pub fn count_refusal(status: u16, tenant: &str) {
     if matches!(status, 401 | 403 | 429) {
         metrics::counter!(names::REFUSALS, "tenant" => tenant.to_owned(), "status" => status.to_string()).increment(1);
     }
 }
 
-/// A request under way, to be recorded when it is answered.
+/// A request under way, recorded when it is answered.
 pub struct Recording {
     started: Instant,
     method: Method,
@@ -121,7 +122,7 @@ impl Recording {
         Recording { started: Instant::now(), method, path: shortened(request.uri().path(), LOGGED_PATH), route, span }
     }
 
-    /// What is done for the request is done in it.
+    /// Returns the span in which the work for the request runs.
     pub fn span(&self) -> Span {
         self.span.clone()
     }
@@ -129,7 +130,7 @@ impl Recording {
     pub fn end(self, response: &Response) {
         let Recording { started, method, path, route, span } = self;
         let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
-        // An unknown method would be a label of its own for every word a client can think of.
+        // Otherwise every unknown method that a client can invent would become a label of its own.
         let verb = match method {
             Method::GET => "GET",
             Method::POST => "POST",

@@ -1,8 +1,8 @@
-//! Encrypted connections: TLS 1.2 and 1.3, by a certificate that is read anew when its files change.
+//! Encrypted connections: TLS 1.2 and 1.3, with a certificate that is reloaded when its files change.
 //!
-//! The files are looked at every [`POLL`], whole: they are small, and neither a time stamp nor an event of the file system
-//! tells reliably of a link that was put elsewhere. What cannot be used is said in the log and counted, and the certificate
-//! before it stays; a pair caught half written is whole at the next look.
+//! The files are read every [`POLL`], in full. They are small, and neither a time stamp nor an event of the file system
+//! reliably shows that a link has a new target. Unusable files are logged and counted, and the previous certificate
+//! stays; a pair that was half written is complete at the next poll.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -23,10 +23,10 @@ use super::certificate_expiry::expiry;
 use crate::service::config::TlsFiles;
 use crate::service::metrics::{CERTIFICATE_EXPIRES, CERTIFICATE_LOADS};
 
-/// A certificate put in place counts within this time.
+/// Interval within which a new certificate takes effect.
 const POLL: Duration = Duration::from_secs(2);
 
-/// Why files are no certificate to serve by.
+/// The reason why files cannot be used as a certificate and its key.
 #[derive(Debug, Error)]
 pub enum TlsError {
     #[error("reading {}", path.display())]
@@ -43,7 +43,7 @@ pub enum TlsError {
     Version { source: rustls::Error },
 }
 
-/// The certificate in force.
+/// The certificate in use.
 pub struct Certificate {
     files: TlsFiles,
     provider: Arc<CryptoProvider>,
@@ -63,15 +63,17 @@ impl ResolvesServerCert for Certificate {
 }
 
 impl Certificate {
+    /// Loads the certificate.
+    ///
     /// # Errors
-    /// The files cannot be read, or are no certificate with its key.
+    /// The files cannot be read, or are not a certificate with its key.
     pub fn load(files: TlsFiles) -> Result<Arc<Self>, TlsError> {
         let provider = Arc::new(default_provider());
         let current = RwLock::new(Arc::new(Pair::read(&files)?.certified(&files, &provider)?));
         Ok(Arc::new(Certificate { files, provider, current }))
     }
 
-    /// What makes connections encrypted by it.
+    /// Returns an acceptor that encrypts connections with this certificate.
     ///
     /// # Errors
     /// Never with the provider built in.
@@ -84,7 +86,7 @@ impl Certificate {
         Ok(Arc::new(config).into())
     }
 
-    /// Looks at the files now and then, without end.
+    /// Checks the files at every poll, for ever.
     pub async fn keep_fresh(self: Arc<Self>) {
         let mut seen = None;
         loop {
@@ -95,7 +97,7 @@ impl Certificate {
         }
     }
 
-    /// Takes over what the files hold, where that is not what was `seen` last.
+    /// Loads the files if their content differs from what was `seen` last.
     fn look(&self, seen: Option<Pair>) -> Option<Pair> {
         let found = Pair::read(&self.files);
         if let (Ok(found), Some(seen)) = (&found, &seen)
@@ -127,7 +129,7 @@ impl Certificate {
     }
 }
 
-/// What the two files hold.
+/// The content of the two files.
 #[derive(Clone, PartialEq, Eq)]
 struct Pair {
     certificate: Vec<u8>,

@@ -1,4 +1,4 @@
-//! Questions that change nothing.
+//! Requests that change nothing.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -14,7 +14,7 @@ use crate::service::Service;
 use crate::service::metrics::ACTION_SECONDS;
 use crate::service::what_if::{WhatIf, WhatIfAnswer};
 
-/// The allocation were wealth, radius or the next return another; nothing is changed.
+/// Returns the allocation for another wealth, radius or next return; nothing is changed.
 #[utoipa::path(post, path = "/what-if", tag = "sessions",
     request_body(content = WhatIf, example = json!({
         "session": "session_0123456789abcdef0123456789abcdef",

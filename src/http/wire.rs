@@ -1,4 +1,4 @@
-//! Requests and answers as they travel.
+//! Requests and answers as they are sent.
 
 use std::collections::BTreeMap;
 
@@ -31,26 +31,26 @@ pub struct Job {
     pub job: String,
     pub kind: JobKind,
     pub state: JobState,
-    /// A cancel was asked for; the worker stops within a second.
+    /// True if a cancel was requested; the worker stops within a second.
     pub cancel_requested: bool,
     pub progress: JobProgress,
-    /// The policy of a succeeded training.
+    /// Policy of a succeeded training.
     pub policy: Option<String>,
-    /// Where the report of a succeeded evaluation or walk-forward is.
+    /// Address of the report of a succeeded evaluation, walk-forward backtest or frontier.
     pub report: Option<String>,
-    /// Why it failed.
+    /// Reason of the failure.
     pub error: Option<String>,
     pub created_ms: i64,
     pub started_ms: Option<i64>,
     pub finished_ms: Option<i64>,
 }
 
-/// How far a job is.
+/// The progress of a job.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct JobProgress {
     pub steps_done: usize,
     pub steps_total: usize,
-    /// The step being solved; steps are solved from the last to the first. Null in a simulation.
+    /// Step being solved; steps are solved from the last to the first. Null in a simulation.
     pub step: Option<usize>,
     pub phase: Option<Phase>,
     /// Design points solved, or paths simulated, in this step.
@@ -92,7 +92,7 @@ impl From<ServiceJob> for Job {
 pub struct AcceptedJob {
     #[serde(flatten)]
     pub job: Job,
-    /// What in the request may be a mistake.
+    /// Valid entries of the request that may be mistakes.
     pub warnings: Vec<Warning>,
 }
 
@@ -102,7 +102,7 @@ impl From<Accepted> for AcceptedJob {
     }
 }
 
-/// The report of a job: of an evaluation, of a walk-forward or of a frontier.
+/// The report of a job: of an evaluation, of a walk-forward backtest or of a frontier.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "reports travel as they are stored: this describes them")]
@@ -117,7 +117,7 @@ pub enum JobReport {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct JobPage {
     pub jobs: Vec<Job>,
-    /// Give it as `after` for the next page; null on the last.
+    /// Cursor to pass as `after` for the next page; null on the last page.
     pub next: Option<i64>,
 }
 
@@ -126,7 +126,7 @@ pub struct JobPage {
 pub struct PolicyEntry {
     pub policy: String,
     pub created_ms: i64,
-    /// Length of the exported document.
+    /// Length of the exported document, in bytes.
     pub bytes: u64,
     #[serde(flatten)]
     pub labels: Labels,
@@ -142,7 +142,7 @@ impl From<PolicySummary> for PolicyEntry {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct PolicyPage {
     pub policies: Vec<PolicyEntry>,
-    /// Give it as `after` for the next page; null on the last.
+    /// Cursor to pass as `after` for the next page; null on the last page.
     pub next: Option<i64>,
 }
 
@@ -156,10 +156,10 @@ pub struct PolicyDetail {
     pub framework: Framework,
     pub horizon: usize,
     pub specification: Specification,
-    /// Where `problem.periods_per_year` was given.
+    /// Annual figures; present if `problem.periods_per_year` was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,
-    /// What in the specification may be a mistake.
+    /// Valid entries of the specification that may be mistakes.
     pub warnings: Vec<Warning>,
     pub diagnostics: Vec<StepDiagnostics>,
 }
@@ -174,26 +174,28 @@ pub struct Imported {
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OpenSession {
-    /// The policy to live by.
+    /// The policy to use.
     pub policy: String,
-    /// Log-returns known at the start, of several assets date by date. Default: the policy's.
+    /// Log-returns known at the start; for several assets, date by date. Default: those of the policy.
     pub history: Option<KnownReturns>,
-    /// Default: the policy's initial wealth.
+    /// Wealth at the start. Default: the policy's initial wealth.
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset at the start. Default: 0.
     pub holding: Option<f64>,
     /// Share of wealth in each of several assets at the start, by their names. Default: 0.
     pub holdings: Option<BTreeMap<String, f64>>,
-    /// Train the next policy by itself, on the returns seen, and go on by it. Default: never.
+    /// Automatic renewal: the next policy is trained on the returns seen, and the session continues with it. Default:
+    /// never.
     pub renew: Option<Renewing>,
-    /// Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false.
+    /// If true, the first step of a policy with decaying learning advises every period, for up to 5200 periods.
+    /// Default: false.
     #[serde(default)]
     pub rolling: bool,
-    /// What the session is called, in at most 100 letters.
+    /// Name of the session, at most 100 letters.
     pub name: Option<String>,
-    /// At most 2,000 letters.
+    /// Notes, at most 2,000 letters.
     pub notes: Option<String>,
-    /// At most 20, each another, of 1 to 50 letters.
+    /// Tags: at most 20, all different, of 1 to 50 letters each.
     pub tags: Option<Vec<String>>,
 }
 
@@ -201,9 +203,9 @@ pub struct OpenSession {
 #[serde(rename_all = "snake_case")]
 pub enum SessionState {
     Active,
-    /// Its next policy is to be trained; until it is there the session goes on by the one it has.
+    /// The next policy is to be trained; until it is ready the session uses its present one.
     Waiting,
-    /// The horizon is reached, and no policy is to follow.
+    /// The horizon is reached, and no policy follows.
     Completed,
 }
 
@@ -213,38 +215,39 @@ pub struct Session {
     pub session: String,
     #[serde(flatten)]
     pub labels: Labels,
-    /// The one that advises the coming period.
+    /// The policy that advises the coming period.
     pub policy: String,
     /// The coming period, from 1; `horizon + 1` once completed.
     pub period: usize,
     /// The last period that the policy advises.
     pub horizon: usize,
     pub state: SessionState,
-    /// The last day of the last period: as reported, else the next one due after those before it. Null where no day is known.
+    /// Last day of the last period: as reported, and otherwise the next one due after the periods before it. Null if no
+    /// day is known.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
-    /// The last day of the coming period, by the policy's periods a year, else by the days reported; a report without a day
-    /// takes it. Null where that is not known, or it is completed.
+    /// Last day of the coming period, by the policy's periods a year, and otherwise by the days reported. A report
+    /// without a day gets this day. Null if this is not known, or the session is completed.
     #[schema(value_type = Option<String>, format = Date)]
     pub next: Option<Date>,
     pub wealth: f64,
-    /// Share of wealth in the risky asset, before trading; of several assets in all of them.
+    /// Share of wealth in the risky asset, before trading; for several assets, the share in all of them.
     pub holding: f64,
-    /// Of several assets, before the coming period.
+    /// Holdings of several assets, before the coming period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<Composed>,
     pub sample_size: usize,
-    /// Corrections of what periods reported; the next one is this and one more.
+    /// Number of corrections; the next one has this number plus one.
     pub corrections: usize,
-    /// Policies that followed the first; the next renewal is this and one more.
+    /// Number of policies that followed the first; the next renewal has this number plus one.
     pub renewals: usize,
-    /// How it is renewed by itself; null where it is not.
+    /// Automatic renewal; null if there is none.
     pub renew: Option<Renewing>,
-    /// Whether the first step of the policy advises every period.
+    /// True if the first step of the policy advises every period.
     pub rolling: bool,
-    /// Where the next renewal is; null where it is not due.
+    /// State of the next renewal; null if it is not due.
     pub renewal: Option<RenewalDue>,
-    /// Whether the returns still come as they came.
+    /// Evidence that the returns have changed.
     pub drift: Drift,
     pub created_ms: i64,
 }

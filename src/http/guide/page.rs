@@ -1,18 +1,18 @@
-//! A document as a page: its Markdown as HTML, the list of all pages beside it, and links that lead where they lead in the
-//! repository.
+//! Renders a document as a page: its Markdown as HTML, the list of all pages beside it, and links that lead where they
+//! lead in the repository.
 
 use pulldown_cmark::html::push_html;
 use pulldown_cmark::{CowStr, Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 
 use super::{Document, PARTS, documents};
 
-/// The whole page; it is made once and stays.
+/// Returns the whole page; it is made once and never freed.
 pub fn made(document: &Document) -> &'static [u8] {
     let mut events: Vec<Event> = Parser::new_ext(document.text, Options::ENABLE_TABLES).collect();
     let headings = named(&mut events);
     let mut body = String::new();
     push_html(&mut body, events.into_iter().filter_map(|event| led(event, document)));
-    // Wide tables scroll by themselves, also by the keyboard.
+    // Wide tables scroll by themselves, also with the keyboard.
     let body = body
         .replace("<table>", "<div class=\"wide\" tabindex=\"0\" role=\"group\" aria-label=\"Table\"><table>")
         .replace("</table>", "</table></div>")
@@ -33,13 +33,13 @@ pub fn made(document: &Document) -> &'static [u8] {
     page.leak().as_bytes()
 }
 
-/// A heading of the second level: its text, and the name by which it is linked to.
+/// A heading of the second level: its text and its anchor.
 struct Heading {
     text: String,
     anchor: String,
 }
 
-/// Gives every heading the name that repositories give it, and lists those of the second level.
+/// Gives every heading the anchor that repositories give it, and returns those of the second level.
 fn named(events: &mut [Event]) -> Vec<Heading> {
     let mut headings = Vec::new();
     for start in 0..events.len() {
@@ -67,8 +67,8 @@ fn anchor(heading: &str) -> String {
     kept.chars().filter(|letter| letter.is_alphanumeric() || matches!(letter, '-' | '_')).collect()
 }
 
-/// The event with links and pictures of the repository led to where they are served.
-/// Tags within a text are shown, not taken for markup.
+/// Rewrites links and pictures of the repository to the addresses at which they are served. Tags within a text are
+/// shown, not treated as markup.
 fn led<'a>(event: Event<'a>, document: &Document) -> Option<Event<'a>> {
     Some(match event {
         Event::Html(text) | Event::InlineHtml(text) => Event::Text(text),
@@ -84,7 +84,7 @@ fn led<'a>(event: Event<'a>, document: &Document) -> Option<Event<'a>> {
     })
 }
 
-/// Where a link in the document at `from` leads to; a link to what is no page stays as it is.
+/// Returns the address to which a link in the document at `from` leads; a link to anything but a page stays unchanged.
 ///
 /// Checked by: `every_link_of_every_page_leads_to_what_is_served`.
 fn address(link: &str, from: &str) -> String {
@@ -105,7 +105,7 @@ fn address(link: &str, from: &str) -> String {
     target.map_or_else(|| link.to_owned(), |document| format!("/guide/{}{at}", document.name))
 }
 
-/// All pages by part, and below the one that is shown its headings.
+/// Renders the list of all pages by part, with the headings below the current one.
 fn list(shown: &Document, headings: &[Heading]) -> String {
     let mut list = String::from("<nav class=\"pages\" aria-label=\"Pages of the guide\">\n");
     for (part, documents) in PARTS {
