@@ -1,4 +1,4 @@
-// The one advice of a session's page, in money and in percent. The step solved anew is a check of it, told behind a fold.
+// The advice on a session's page, in money and in percent. A newly solved step checks it, behind a fold.
 
 import { h, section } from "./dom.js";
 import { endWords } from "./flows.js";

@@ -1,4 +1,4 @@
-// The advice for many sessions: asked for a few at a time, and filled in as it comes.
+// The advice for many sessions: requested for a few at a time, and shown as it arrives.
 
 import { inMoney } from "./advice.js";
 import { get } from "./api.js";

@@ -1,4 +1,4 @@
-// The service's own interface, as /docs describes it.
+// Calls of the service's interface, as /docs describes it.
 
 import { minus } from "./format.js";
 import { held, refusedWords, shown } from "./key.js";

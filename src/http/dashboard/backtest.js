@@ -1,4 +1,4 @@
-// The report of one backtest: what strategies came to that were walked through a record, and one of them year by year.
+// The report of a backtest of one asset: what the strategies earned, and one of them year by year.
 
 import { heldOfAssets, ofAssets, quantOfAssets, resultsOfAssets, walkedAssets } from "./backtest_assets.js";
 import { estimate, ranges, results, START } from "./backtest_figures.js";

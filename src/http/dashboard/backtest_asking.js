@@ -1,4 +1,4 @@
-// The form that asks for a backtest of a record, on a page of its own.
+// The form that requests a backtest of a history, on a page of its own.
 
 import { post } from "./api.js";
 import { bankRate } from "./bank_rate.js";

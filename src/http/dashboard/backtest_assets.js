@@ -1,4 +1,4 @@
-// What the report of several assets walked forward says: who the strategies were, what each came to, and what it held.
+// The report of a backtest of several assets: its strategies, what each earned, and what it held.
 
 import { ranges, results, START } from "./backtest_figures.js";
 import { h, quantSection, table } from "./dom.js";

@@ -1,4 +1,4 @@
-// The figures of strategies walked through a record, of one asset or of several: what each came to, and within what ranges.
+// The figures of a backtest, of one asset or of several: what each strategy earned, and within what ranges.
 
 import { h, section, table } from "./dom.js";
 import { allocation, count, counted, percent, tick, wealth } from "./format.js";

@@ -1,4 +1,4 @@
-// What the bank pays, typed for a period or for a year, as whoever types knows it; the service counts by the period.
+// The bank's return, typed per period or per year; the service counts per period.
 
 import { input, select } from "./form.js";
 import { fraction, typed } from "./number_text.js";

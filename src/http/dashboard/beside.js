@@ -1,4 +1,4 @@
-// A table of two things side by side, with what differs.
+// A table that compares two things and marks their differences.
 
 import { h, table } from "./dom.js";
 import { titled } from "./naming.js";

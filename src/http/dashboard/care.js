@@ -1,5 +1,5 @@
-// Which sessions need care: those whose report is overdue, whose next policy fails to come, whose returns have changed, or that end. The service
-// tells of each, and how many there are.
+// The sessions that need care: their report is overdue, their next policy does not come, their returns have changed, or
+// they end. The service reports the reasons of each session, and how many sessions there are.
 
 import { counted, count } from "./format.js";
 import { daysLate, isoDay } from "./periods.js";

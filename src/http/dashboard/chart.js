@@ -1,4 +1,4 @@
-// Charts of a few hundred points, as SVG: drawn at the width they have, read by pointer, by keyboard and as a table.
+// Charts of a few hundred points, as SVG: drawn at their actual width, and read by pointer, by keyboard and as a table.
 
 import { disclosure, h, s, table } from "./dom.js";
 import { pictureButtons } from "./picture.js";

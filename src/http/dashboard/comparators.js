@@ -1,4 +1,5 @@
-// The same start, lived otherwise: what shares held through the same returns, rates and flows would have come to.
+// Comparators of a session: what fixed shares would have earned from the same start, with the same returns, rates and
+// flows.
 
 import { addedIn, rateIn, termsOf } from "./flows.js";
 import { belowHighest } from "./track.js";

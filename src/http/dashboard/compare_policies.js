@@ -1,4 +1,4 @@
-// Two policies: what they were asked, and what they hold at the same average return.
+// Two policies: what they were trained for, and what they hold at the same average return.
 
 import { get } from "./api.js";
 import { beside, LETTERS } from "./beside.js";

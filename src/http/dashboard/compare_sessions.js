@@ -1,4 +1,4 @@
-// Two sessions: what each is advised now, and how they went, by the calendar where both have one.
+// Two sessions: the present advice for each, and how they went, by the calendar if both have one.
 
 import { heldInAll, orders } from "./advised.js";
 import { get } from "./api.js";

@@ -1,4 +1,5 @@
-// A period that passed, put right: what was reported and told stays on record, and the advice rests on the new report.
+// The correction of a past period: the original report and advice stay on record, and new advice rests on the
+// correction.
 
 import { h } from "./dom.js";
 import { standing } from "./flows.js";

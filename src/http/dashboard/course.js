@@ -1,4 +1,4 @@
-// How a session went: wealth beside what the same start would have come to otherwise, the worst fall, what was held.
+// How a session went: its wealth beside that of the comparators, its worst fall, and what it held.
 
 import { lineChart } from "./chart.js";
 import { falls, mixed, risky, wealths } from "./comparators.js";

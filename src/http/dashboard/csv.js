@@ -1,4 +1,4 @@
-// Rows as a file for spreadsheets, numbers plain and shares in percent; and the rows of such a file.
+// Writes rows as a file for spreadsheets, with plain numbers and shares in percent; reads the rows of such a file.
 
 /** A share in percent, as it is written into a file. */
 export const hundred = (share) => (share === null || share === undefined ? null : 100 * share);

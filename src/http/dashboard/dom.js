@@ -1,4 +1,5 @@
-// Elements without markup strings: text is always text, so nothing a server or a file says can become an element.
+// Creates elements without markup strings: text is always text, so nothing from a server or a file can become an
+// element.
 
 const SVG = "http://www.w3.org/2000/svg";
 

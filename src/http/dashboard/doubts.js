@@ -1,4 +1,5 @@
-// What the service doubts in a report, as a question: each doubt in a sentence, and what can be done about all of them.
+// The service's doubts about a report, as a question: each doubt in a sentence, and what the user can do about all of
+// them.
 
 import { h } from "./dom.js";
 import { pressed } from "./form.js";

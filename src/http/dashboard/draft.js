@@ -1,4 +1,4 @@
-// What is half filled in, kept while the tab is open: a reload, Back or a click in the navigation takes none of it away.
+// Keeps a half-filled form while the tab is open: a reload, Back or a click in the navigation does not lose it.
 
 import { h } from "./dom.js";
 

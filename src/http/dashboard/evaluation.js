@@ -1,4 +1,5 @@
-// The report of one evaluation: what was compared and what came of it in sentences and in wealth, the rest for the quant.
+// The report of an evaluation: what was compared, and the results in sentences and in wealth. The rest is for the
+// quant.
 
 import { lineChart } from "./chart.js";
 import { disclosure, h, quantSection, section, table } from "./dom.js";

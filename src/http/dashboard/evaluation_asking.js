@@ -1,4 +1,4 @@
-// The form that asks for an out-of-sample comparison, on a page of its own.
+// The form that requests an out-of-sample comparison, on a page of its own.
 
 import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";

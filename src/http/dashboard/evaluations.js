@@ -1,4 +1,4 @@
-// Comparisons of strategies: through futures drawn, and through a record that was lived.
+// Comparisons of strategies: through simulated futures, and through a history that happened.
 
 import { h } from "./dom.js";
 import { jobList } from "./jobs.js";

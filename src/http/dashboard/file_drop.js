@@ -1,4 +1,4 @@
-// A file of text, chosen or dropped.
+// A text file, chosen or dropped.
 
 import { h } from "./dom.js";
 

@@ -1,4 +1,5 @@
-// Money that comes and goes: what is added in each period, what all of it is worth now, what the bank alone makes of a start.
+// Contributions and withdrawals: the amount of each period, the present value of all, and what a start earns in the
+// bank alone.
 
 import { wealth } from "./format.js";
 

@@ -1,4 +1,4 @@
-// Fields with their labels, notes and errors; refusals shown at the field they name.
+// Fields with their labels, notes and errors; refusals are shown at the field that they name.
 
 import { h } from "./dom.js";
 import { problemWords } from "./problem_words.js";

@@ -1,4 +1,4 @@
-// Numbers as people read them: a unit, and no more digits than mean something.
+// Numbers for people: with a unit, and no more digits than mean something.
 
 const NARROW = "\u202f";
 const MINUS = "\u2212";

@@ -1,4 +1,5 @@
-// What more or less caution would lose on records like the one at hand: asked for, and the report of it.
+// The frontier of caution: what more or less caution would lose on histories like this one. The request, and its
+// report.
 
 import { post } from "./api.js";
 import { extent } from "./chart.js";

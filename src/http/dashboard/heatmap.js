@@ -1,4 +1,4 @@
-// A field over a rectangle, as cells: read by pointer and arrow keys, with its scale beside it.
+// A function over a rectangle, drawn as cells: read by pointer and arrow keys, with its scale beside it.
 
 import { axes, figure, grain, plot, scale, ticks } from "./chart.js";
 import { h, s, table } from "./dom.js";

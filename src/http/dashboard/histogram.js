@@ -1,4 +1,4 @@
-// A histogram over wealth, drawn on scales that others share, with places that are marked in all of them.
+// A histogram of wealth, drawn on scales that several histograms share, with marks at the same values in all of them.
 
 import { axes, figure, plot, scale, ticks, walkable } from "./chart.js";
 import { h, s, table } from "./dom.js";

@@ -1,4 +1,4 @@
-// Who the key in use makes of the person before the page, in words.
+// What the key in use allows its holder to do, in words.
 
 import { get } from "./api.js";
 import { h } from "./dom.js";

@@ -1,4 +1,4 @@
-// The page of a job's report: the job until it is done, then what the report's own module draws of it.
+// The page of a job's report: the job until it is done, then the report as its own module draws it.
 
 import { download, get } from "./api.js";
 import * as backtest from "./backtest.js";

@@ -1,4 +1,4 @@
-// Jobs: what is being computed, how far it is, and how to stop it.
+// Jobs: what is being computed, its progress, and how to stop it.
 
 import { follow, get, isOver, post } from "./api.js";
 import { announce, h } from "./dom.js";

@@ -1,4 +1,5 @@
-// The key this page shows to the service. It lives in this tab's session storage: gone with the tab, seen by no other page.
+// The key that this page sends to the service. It is kept in this tab's session storage: it ends with the tab, and no
+// other page sees it.
 
 import { h } from "./dom.js";
 import { moment } from "./format.js";

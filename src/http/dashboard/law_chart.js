@@ -1,4 +1,4 @@
-// Two laws of the coming log-return, back to back: above the line the returns seen, below it the worst case.
+// Two laws of the coming log-return, back to back: the returns seen above the line, the worst case below it.
 
 import { axes, figure, grain, plot, scale, ticks, walkable } from "./chart.js";
 import { h, s, table } from "./dom.js";

@@ -1,7 +1,7 @@
-// Laws of one shape: a weighted sample of returns moved to any mean and stretched to any standard deviation.
+// Laws of one shape: a weighted sample of returns, shifted to any mean and scaled to any standard deviation.
 //
-// A shape moved and stretched keeps the order of its atoms and its standardised moments, so both are found once, however
-// many laws are drawn from it; what is left for a law is a search and, for a new standard deviation, one pass.
+// A shifted and scaled shape keeps the order of its atoms and its standardised moments, so both are computed once for
+// all laws drawn from it. Each law then needs a search and, for a new standard deviation, one pass.
 
 /** What of a return's weight is left one return later. */
 export const retention = (learning) => (learning.kind === "decay" ? 0.5 ** (1 / learning.half_life) : 1);

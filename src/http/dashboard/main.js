@@ -1,4 +1,4 @@
-// The frame: which view stands at which address, and what happens on the way from one to the next.
+// The frame: which view belongs to which address, and what happens on a change from one to the next.
 
 import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";

@@ -1,4 +1,4 @@
-// What things are called: by the name that somebody gave, else by the part of the identifier that tells it from others.
+// The labels of things: the name that somebody gave, and otherwise the distinctive part of the identifier.
 
 import { get, patch } from "./api.js";
 import { announce, h } from "./dom.js";

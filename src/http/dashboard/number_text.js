@@ -1,7 +1,8 @@
-// Numbers as people and programs write them: either decimal mark, thousands apart or not, a percent sign, any minus.
+// Numbers as people and programs write them: either decimal mark, with or without thousands separators, a percent sign,
+// any minus.
 //
-// No number here starts with a zero before another digit: 012 is what is left of 0,012 when a comma was taken for something
-// else, and -0 likewise.
+// No number may start with a zero before another digit: 012 remains of 0,012 if the comma was misread. The same holds
+// for -0.
 
 const WHOLE = "(?:0|[1-9]\\d*)";
 const pattern = (mark, apart) =>

@@ -1,4 +1,4 @@
-// The return of the coming period, reported once: what is sent again after a failure is the very same request.
+// The report of the coming period's return, recorded once: a retry after a failure sends the very same request.
 
 import { h } from "./dom.js";
 import { foretold, reportFields, sendReports } from "./report_fields.js";

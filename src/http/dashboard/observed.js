@@ -1,4 +1,4 @@
-// The periods of a session that passed: as a table, as a file, put right, and what was put right before.
+// The past periods of a session: as a table, as a file, to correct them, and with their earlier corrections.
 
 import { post } from "./api.js";
 import { falls, mixed, wealths } from "./comparators.js";

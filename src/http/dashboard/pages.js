@@ -1,4 +1,4 @@
-// Long lists: the newest first, more where asked for, and always a line that says whether this is all.
+// Long lists: newest first, more on request, and always a line that says if this is all.
 
 import { get } from "./api.js";
 import { announce, h } from "./dom.js";

@@ -1,4 +1,4 @@
-// What the periods of a session are called: by their dates where those are reported, by their number where not.
+// The names of a session's periods: their dates if those are reported, and otherwise their numbers.
 
 import { standing } from "./flows.js";
 

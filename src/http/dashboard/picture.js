@@ -1,4 +1,4 @@
-// A chart as a file of its own: its drawing with its title and legend, dark on white whatever the page looks like.
+// A chart as a file of its own: its drawing with title and legend, dark on white whatever the colours of the page.
 
 import { h, s } from "./dom.js";
 

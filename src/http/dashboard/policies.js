@@ -1,4 +1,4 @@
-// Policies: what trainings gave, and what came in from elsewhere.
+// Policies: those that were trained here, and those that were imported.
 
 import { get, post } from "./api.js";
 import { h, table } from "./dom.js";

@@ -1,4 +1,4 @@
-// One policy: what it was asked, what it does, and for the quant how well it was solved.
+// One policy: what it was trained for, what it does, and for the quant how well it was solved.
 
 import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";

@@ -1,4 +1,4 @@
-// A refusal in the words of the form: the field by its label, the value and its bounds in the unit of the field.
+// A refusal in the words of the form: the field by its label, its value and bounds in the unit of the field.
 
 import { wealth } from "./format.js";
 

@@ -1,4 +1,5 @@
-// Sessions that go on by another policy from their coming periods: one that is there, or the same trained anew on the returns seen.
+// Renewals: sessions go on with another policy from their coming periods. It already exists, or is trained on the
+// returns seen.
 
 import { follow, get, isOver, post } from "./api.js";
 import { announce, h, table } from "./dom.js";

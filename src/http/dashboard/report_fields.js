@@ -1,4 +1,4 @@
-// What is said of a period, in its report and in a correction of it: the return, and on demand how else it went.
+// The fields for a period, in its report and in its correction: the return, and further details on demand.
 
 import { get, post } from "./api.js";
 import { h } from "./dom.js";

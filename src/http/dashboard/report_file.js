@@ -1,4 +1,4 @@
-// A report in a file of its own: its page is drawn of the data that stand beside it.
+// A standalone report: its page is drawn from the data in the same file.
 
 import { h } from "./dom.js";
 

@@ -1,4 +1,4 @@
-// What is said of many sessions at once, line by line: a name and a return, or a table below a header, its columns in any order.
+// Reports for many sessions, line by line: a name and a return, or a table with a header, its columns in any order.
 
 import { csvRows } from "./csv.js";
 import { short } from "./format.js";

@@ -1,4 +1,5 @@
-// What a job and its report are called: by the policy, the assets and the record that they are about, or by their day.
+// The titles of a job and its report: from the policy, the assets and the history that they are about, or from their
+// day.
 
 import { get } from "./api.js";
 import { counted, moment } from "./format.js";

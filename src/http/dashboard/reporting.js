@@ -1,4 +1,5 @@
-// One return for many sessions at once: typed, pasted or out of a file, looked over, sent together, and told row by row.
+// One return for each of many sessions: typed, pasted or read from a file, reviewed, sent together, with a result for
+// each row.
 
 import { advised } from "./advised.js";
 import { get, post } from "./api.js";

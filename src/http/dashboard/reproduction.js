@@ -1,4 +1,4 @@
-// The paper's section 3 computed anew: what holds and what does not, then each of its tables and figures.
+// The paper's section 3 computed anew: which claims hold and which do not, then each of its tables and figures.
 
 import { lineChart } from "./chart.js";
 import { h, section, table } from "./dom.js";

@@ -1,5 +1,5 @@
-// The field that takes returns: typed, pasted or out of a file, all read by the service. What was read stands below it in a
-// sentence and a chart, what cannot be told from the text is asked there, and until it is answered the form has no returns.
+// The field for returns: typed, pasted or from a file, and always read by the service. Below it, a sentence and a chart
+// show what was read. The page asks what the text leaves open, and the form has no returns until that is answered.
 
 import { post, text } from "./api.js";
 import { lineChart } from "./chart.js";

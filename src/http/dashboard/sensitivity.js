@@ -1,4 +1,4 @@
-// How near the advice is to changing, in sentences; it takes some hundred robust steps, so it comes after the rest.
+// How close the advice is to changing, in sentences. It takes some hundred robust steps, so it comes after the rest.
 
 import { get } from "./api.js";
 import { h, section } from "./dom.js";

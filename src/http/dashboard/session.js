@@ -1,4 +1,4 @@
-// One session, as a client may be shown it: what to hold now and why, the return to report, how it went, and what it rests on.
+// One session, fit to show to a client: what to hold now and why, the return to report, how it went, and its basis.
 
 import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";

@@ -1,4 +1,4 @@
-// The form that opens a session: on a page of its own, so that whoever asks for it stands before it.
+// The form that opens a session, on a page of its own so that a link leads straight to it.
 
 import { get, post } from "./api.js";
 import { h } from "./dom.js";

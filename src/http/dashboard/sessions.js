@@ -1,4 +1,4 @@
-// Sessions, one investor a row: where each stands, when he reported last, what to do for him now, and what needs care.
+// Sessions, one investor a row: their state, their last report, what to do for them now, and what needs care.
 
 import { advised } from "./advised.js";
 import { get, remove } from "./api.js";

@@ -1,4 +1,4 @@
-// A session of several assets: what to hold of each, and what the worst market makes of each.
+// A session of several assets: what to hold of each, and what the worst market does to each.
 
 import { SOURCES, why } from "./advice.js";
 import { disclosure, h, section, table } from "./dom.js";

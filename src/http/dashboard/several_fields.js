@@ -1,4 +1,5 @@
-// What is said of a period of several assets, in its report and in a correction of it: a return of each, and how else it went.
+// The fields for a period of several assets, in its report and in its correction: the return of each, and further
+// details.
 
 import { h } from "./dom.js";
 import { standing } from "./flows.js";

@@ -1,4 +1,4 @@
-// Prices typed on the page, by which an advice is told in shares. Nothing of them is sent or kept.
+// Prices typed on the page, which express advice in shares. They are neither sent nor kept.
 
 import { h } from "./dom.js";
 import { input } from "./form.js";

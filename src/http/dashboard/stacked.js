@@ -1,4 +1,4 @@
-// What was held of each of several assets through time, one above the other; what is left to the whole is in the bank.
+// What was held of each of several assets through time, stacked; the rest of the whole is in the bank.
 
 import { axes, block, figure, plot, scale, ticks, walkable } from "./chart.js";
 import { h, s, table } from "./dom.js";

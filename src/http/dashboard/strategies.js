@@ -1,4 +1,4 @@
-// One colour and one dash a strategy, on every page: which of the tokens of the stylesheet, `.s0` to `.s19`, is whose.
+// One colour and one dash for each strategy, on every page: the tokens `.s0` to `.s19` of the stylesheet.
 
 /** By their kinds in reports, and those of several assets beside the one that they are like; two of one line never stand on a page together. */
 const TOKENS = [

@@ -1,8 +1,9 @@
-// A policy evaluated from its exported document, as docs/policy-format.md says.
+// Evaluates a policy from its exported document, as docs/policy-format.md says.
 //
-// A point of the surface is a real law, not a free choice of features: the policy's own history, moved to another mean
-// and stretched to another standard deviation. All features of it follow, the robust excess return among them; what the
-// history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
+// A point of the surface is a real law, not a free choice of features: the policy's own history, shifted to another
+// mean and scaled to another standard deviation. All its features follow, including the robust excess return. What the
+// history's shape does not determine (skewness, kurtosis, the level of the rest) stays at the centre of the step's
+// design.
 
 import { flowsAfter } from "./flows.js";
 import { effectiveSize, shareSeen } from "./laws.js";

@@ -1,4 +1,4 @@
-// What one view of a policy's surface shows: a single state, a line along one feature, or a field over two.
+// One view of a policy's surface: a single state, a line along one feature, or a field over two.
 
 import { stepSurface } from "./surface.js";
 

@@ -1,4 +1,4 @@
-// A policy's surface to look at: period and radius to choose, and the allocation over two of the features.
+// The view of a policy's surface: the user chooses a period and a radius, and sees the allocation over two features.
 
 import { lineChart } from "./chart.js";
 import { h } from "./dom.js";

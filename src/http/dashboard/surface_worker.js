@@ -1,7 +1,8 @@
-// A policy's document read, and its surface computed, off the thread that the page lives on.
+// Reads a policy's document and computes its surface, off the page's main thread.
 //
-// First message: `{address, headers}`, answered by `{ready}`, what is held now. Each one after it is a wish for a picture,
-// answered by `{picture}`, or with `means` for what is held at them, answered by `{curve}`. A failure of either is `{failed}`, in words.
+// The first message is `{address, headers}`, answered by `{ready}`, what is held now. Each later message requests a
+// picture, answered by `{picture}`, or with `means` the holdings at them, answered by `{curve}`. A failure of any is
+// `{failed}`, in words.
 
 import { Shape, retention } from "./laws.js";
 import { curve, heldNow, picture } from "./surface_picture.js";

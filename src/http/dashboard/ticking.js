@@ -1,4 +1,4 @@
-// Rows of a list ticked, and what can be done with them: two shown side by side, many taken together to a page, or deleted.
+// Selected rows of a list, and their actions: compare two, take many to one page, or delete them.
 
 import { h } from "./dom.js";
 import { pressed } from "./form.js";

@@ -1,4 +1,5 @@
-// A track record: how far wealth lay below its highest, the worst of those falls, and returns by the year, by the month and over years that roll.
+// A track record: how far wealth lay below its highest, the worst falls, and returns by year, by month and over rolling
+// years.
 
 /** How far each level lies below the highest so far, 0 or less. */
 export function belowHighest(levels) {

@@ -1,4 +1,4 @@
-// A training request, from a form, a file of returns or JSON; the three show the same request.
+// A training request, from a form, a file of returns or JSON; all three show the same request.
 
 import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";

@@ -1,4 +1,5 @@
-// The fields of a training: the investor and his caution in a manager's words and in percent, the paper's behind a fold.
+// The fields of a training: the investor and their caution in a manager's words and in percent, the paper's behind a
+// fold.
 
 import { bankRate } from "./bank_rate.js";
 import { h } from "./dom.js";

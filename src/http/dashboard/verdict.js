@@ -1,4 +1,4 @@
-// What comparisons of strategies say, in sentences: of futures drawn and of a record walked through alike.
+// The results of comparisons of strategies, in sentences: for simulated futures and for walk-forward backtests alike.
 
 import { percent, tick } from "./format.js";
 

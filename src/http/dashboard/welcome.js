@@ -1,4 +1,4 @@
-// What is said where nothing is yet.
+// The text of an empty page.
 
 import { h } from "./dom.js";
 

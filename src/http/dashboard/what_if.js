@@ -1,4 +1,4 @@
-// What the session's advice would be, were it guarded more or less.
+// What the session's advice would be with more or less caution.
 
 import { post } from "./api.js";
 import { lineChart } from "./chart.js";

@@ -1,4 +1,4 @@
-// The worst market that the advice guards against: what it assumes, in words, and the law itself.
+// The worst market that the advice guards against: its assumptions in words, and the law itself.
 
 import { get } from "./api.js";
 import { disclosure, h, section } from "./dom.js";
