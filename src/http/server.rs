@@ -36,7 +36,7 @@ const BETWEEN_REQUESTS: Duration = Duration::from_secs(75);
 const REFUSED_BODY_TIME: Duration = Duration::from_secs(10);
 /// Connections of the operator's listener: probes, a scrape, a person, and as many again.
 const OPERATORS: usize = 64;
-/// Extra connections for probes at the callers' listener, for when calls under way fill it.
+/// Extra connections for probes at each listener, for when calls under way fill it.
 const PROBES: usize = 16;
 /// Descriptors that are not connections: the store's files, the runtime, the standard streams.
 const OTHER_DESCRIPTORS: usize = 128;

@@ -38,7 +38,7 @@ pub struct Job {
     pub policy: Option<String>,
     /// Address of the report of a succeeded evaluation, walk-forward backtest or frontier.
     pub report: Option<String>,
-    /// Reason of the failure.
+    /// Reason for the failure.
     pub error: Option<String>,
     pub created_ms: i64,
     pub started_ms: Option<i64>,
