@@ -1,4 +1,4 @@
-//! What an operator may choose.
+//! The settings of an operator.
 
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -10,7 +10,7 @@ use super::bounded::WAITING_THREADS;
 use super::memory::MemoryLimit;
 use crate::store::{PostgresUrl, Quotas};
 
-/// Where the durable facts are.
+/// The location of the store.
 #[derive(Debug, Clone)]
 pub enum StoreLocation {
     /// SQLite in a folder, created if absent, for this process alone.
@@ -28,14 +28,14 @@ impl fmt::Display for StoreLocation {
     }
 }
 
-/// What one replica does.
+/// The work of one replica.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Answer requests and run jobs.
+    /// Answers requests and runs jobs.
     All,
-    /// Answer requests.
+    /// Answers requests.
     Api,
-    /// Run jobs; answers the operator's requests only.
+    /// Runs jobs; answers the operator's requests only.
     Worker,
 }
 
@@ -61,58 +61,59 @@ pub struct TlsFiles {
 pub struct Config {
     /// Port 0 picks a free one.
     pub listen: SocketAddr,
-    /// An address of its own for what an operator asks, so that no caller can keep him out.
+    /// A separate address for the operator's requests, so that no client can lock operators out.
     pub operations_listen: Option<SocketAddr>,
-    /// What connections are encrypted by.
+    /// The certificate that encrypts connections, if any.
     pub tls: Option<TlsFiles>,
-    /// Whether an address that others reach may be listened on without encryption.
+    /// If true, addresses that others can reach may be served without encryption.
     pub allow_plaintext: bool,
-    /// Names the service answers to beside its own, while it asks for no key.
+    /// Host names that the service accepts besides its own while it needs no key.
     pub hosts: Vec<String>,
-    /// Whether an address that others reach may be listened on while the store holds no key.
+    /// If true, addresses that others can reach may be served while the store holds no key.
     pub allow_anonymous: bool,
     /// If true, a store without a key is not served at all.
     pub require_keys: bool,
     pub limits: Limits,
     /// How long entries of the audit are kept.
     pub retain_audit: Duration,
-    /// What every tenant may keep.
+    /// The quotas of every tenant.
     pub quotas: Quotas,
-    /// Ended jobs are deleted after this time; never where there is none.
+    /// Ended jobs are deleted after this time; never if it is `None`.
     pub retain_jobs: Option<Duration>,
     pub store: StoreLocation,
     pub role: Role,
-    /// The most memory the process should take; what cannot fit is refused.
+    /// The most memory the process should take; work that cannot fit is rejected.
     pub memory_limit: MemoryLimit,
     /// Threads of the training pool.
     pub training_threads: usize,
-    /// Connections held at a time, as far as there are descriptors; past that, those give way that wait for their client.
+    /// Connections held at a time, as far as there are descriptors. Above that, connections that wait for their client
+    /// are closed.
     pub connection_limit: usize,
-    /// Those of one address, likewise; a quarter of all unless given.
+    /// Connections of one address held at a time; a quarter of all by default.
     pub connections_of_address: Option<usize>,
     /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
     pub body_limit_bytes: usize,
     pub request_timeout: Duration,
-    /// Robust steps begun at a time for `mode=resolve` and `explain`; more wait.
+    /// Robust steps begun at a time for `mode=resolve` and `explain`; further ones queue.
     pub resolve_limit: usize,
-    /// Allocations and observations begun at a time; more wait.
+    /// Allocations and observations begun at a time; further ones queue.
     pub advice_limit: usize,
-    /// Large bodies decoded at a time; more wait.
+    /// Large bodies decoded at a time; further ones queue.
     pub decode_limit: usize,
-    /// Any of these at a time of those that take long.
+    /// Long-running work of each of these kinds at a time.
     pub long_limit: usize,
-    /// A request that has waited this long for its turn is told to come back.
+    /// How long a request may wait for a permit before its caller is told to retry later.
     pub turn_wait: Duration,
-    /// Time given to open requests once the service is asked to stop.
+    /// Time for open requests to finish once shutdown begins.
     pub drain: Duration,
-    /// A job whose worker has been silent this long may be claimed by another.
+    /// A job may be claimed by another worker once its worker has been silent this long.
     pub lease: Duration,
 }
 
-/// A day, by the clock.
+/// A day of 24 hours.
 pub const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// Threads that block outside the turns of tenants: two that read policies, those for files, names of hosts and the trainer.
+/// Threads that block outside the fair queues: two that read policies, those for files, host names and the trainer.
 const OTHER_BLOCKING_THREADS: usize = 8;
 
 impl Config {
@@ -123,7 +124,7 @@ impl Config {
         begun + 2 * (2 * self.long_limit + WAITING_THREADS) + OTHER_BLOCKING_THREADS
     }
 
-    /// The defaults over a folder: loopback, every core for training.
+    /// Returns the defaults for a folder: loopback, and every core for training.
     pub fn new(data: impl Into<PathBuf>) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Config {
@@ -149,7 +150,7 @@ impl Config {
             resolve_limit: 2 * cores,
             advice_limit: 2 * cores,
             decode_limit: cores.div_ceil(2),
-            // The other processors are for what begins.
+            // The other processors are for new work.
             long_limit: cores.div_ceil(2),
             turn_wait: Duration::from_secs(2),
             drain: Duration::from_secs(25),

@@ -1,5 +1,6 @@
-//! Broken on purpose: the real binary is killed, starved, cut off and lied to, and then asked for everything it
-//! acknowledged. Prints a table; fails where anything is lost, doubled, stale or panicked, and where no row ran.
+//! Deliberate faults: the real binary is killed, starved, disconnected and given false data. Then everything that it
+//! acknowledged is requested from it. Prints a table; fails if anything is lost, doubled, stale or panicked, or if no
+//! row ran.
 //!
 //! `cargo test --test reliability` is the short form. `cargo test --test reliability -- --trials 100 kill` runs a hundred
 //! trials of every row whose name contains `kill`; `BALLAST_RELIABILITY_TRIALS` does the same for all rows, and
@@ -7,7 +8,8 @@
 //! root, a loop device, strace or PostgreSQL say so where they have to be left out; under `BALLAST_RELIABILITY=required`
 //! none may be.
 //!
-//! Not here: random lists of operations against a model of the store, which `tests/service/store_model.rs` runs on both engines.
+//! Not here: random lists of operations against a model of the store, which `tests/service/store_model.rs` runs on both
+//! engines.
 
 mod caller;
 mod damage;
@@ -39,15 +41,16 @@ use futures_util::future::BoxFuture;
 
 use crate::scene::{Outcome, Tally};
 
-/// Printed of a row; the first tells most.
+/// The most complaints printed for a row; the first is the most informative.
 const COMPLAINTS: usize = 10;
 
 struct Row {
     fault: &'static str,
-    /// Trials of the short form.
+    /// The number of trials in the short form.
     trials: usize,
     run: fn(usize) -> BoxFuture<'static, Outcome>,
-    /// A control loses what it is made to lose: were it to lose nothing, its neighbours' zeros would mean nothing.
+    /// True for a control, which must lose what it is made to lose. If it lost nothing, zeros in other rows would mean
+    /// nothing.
     control: bool,
 }
 
@@ -84,7 +87,7 @@ const ROWS: &[Row] = &[
     row!("database moved or replaced", 6, moved::moved),
 ];
 
-/// Trials asked for, and the parts of names to choose rows by.
+/// Returns the number of trials from the command line or the environment, and the parts of names that select rows.
 fn arguments() -> (Option<usize>, Vec<String>) {
     let mut trials = std::env::var("BALLAST_RELIABILITY_TRIALS").ok();
     let (mut given, mut names) = (std::env::args().skip(1), Vec::new());
@@ -120,7 +123,7 @@ async fn main() -> ExitCode {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
-    /// As it must be.
+    /// The outcome is as required.
     Sound,
     Unsound,
     LeftOut,
@@ -133,7 +136,7 @@ fn header() -> String {
     format!("{:<30}{trials:>7}{faults:>8}{counts}{ready:>11}", "fault")
 }
 
-/// Prints the row.
+/// Prints the row and returns its verdict.
 fn report(row: &Row, outcome: Outcome) -> Verdict {
     let tally = match outcome {
         Ok(Some(tally)) => tally,
