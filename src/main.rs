@@ -47,9 +47,9 @@ enum Command {
     Reproduce(reproduce::Reproduce),
     /// Manage the keys that allow callers to use a service.
     #[command(subcommand)]
-    Keys(keys::Keys),
+    Keys(keys::KeysCommand),
     /// Show who did what, newest first.
-    Audit(audit::Audit),
+    Audit(audit::AuditCommand),
     /// Verify every row of a store by its seal or hash. Only reads, and works while a service runs or without one.
     Check(check::Check),
     /// Copy the database of a data folder into one file, while the service runs, and verify the copy.
@@ -57,9 +57,9 @@ enum Command {
     /// Make a data folder from a backup and verify it.
     Restore(backup::Restore),
     /// Move a data folder into PostgreSQL and compare every row, while no service runs.
-    Move(backup::Move),
+    Move(backup::MoveCommand),
     /// Restore one damaged item of a data folder from a backup, while no service runs.
-    Repair(backup::Repair),
+    Repair(backup::RepairCommand),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Measure this machine's speed and accuracy.

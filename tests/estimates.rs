@@ -15,8 +15,8 @@ use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
-use ballast::control::evaluation::rolling::{Common, Decision, Period};
-use ballast::control::kept::Kept;
+use ballast::control::evaluation::rolling::{ActualPeriod, Decision, SharedWork};
+use ballast::control::kept::Cache;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::pool::{self, TrainingPool};
@@ -102,7 +102,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
         ("the horizon", specification(60, 12, 0, 80)),
     ] {
         let (taken, policy) = most_bytes(|| {
-            let kept = Kept::new(estimate::kept_by_training(&specification));
+            let kept = Cache::new(estimate::kept_by_training(&specification));
             let policy = pool.install(|| Training::with(&specification, kept).unwrap().run(&watch).unwrap());
             // As a worker stores it.
             let json = policy.to_json().unwrap();
@@ -119,7 +119,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
     ] {
         let request = evaluation(request);
         let (taken, _) = most_bytes(|| {
-            let kept = Kept::new(estimate::kept_by_evaluation(&request));
+            let kept = Cache::new(estimate::kept_by_evaluation(&request));
             let evaluation = Evaluation::new(request.clone()).unwrap().keeping(kept);
             pool.install(|| {
                 let followers: Vec<_> = evaluation
@@ -157,7 +157,7 @@ fn frontiers() {
     for (what, question) in [("a long record", question(1500, 100)), ("bridges of a record", question(24, 20_000))] {
         // On one thread, the record at hand counts most beside the drawn ones.
         let estimated = estimate::frontier(&question, 1).bytes();
-        let kept = Kept::new(estimate::kept_by_frontier(&question));
+        let kept = Cache::new(estimate::kept_by_frontier(&question));
         let stop = AtomicBool::new(false);
         let progress = |progress: StepProgress| stop.store(progress.done > 0, Ordering::Relaxed);
         let watch = Watch { stop: &stop, progress: &progress };
@@ -217,7 +217,7 @@ fn walk_forwards(pool: &TrainingPool) {
     let backtest = request(30, 700, 6);
     let (taken, _) = most_bytes(|| {
         let strategies = backtest.plain_strategies();
-        let common = Common::of(&strategies, Kept::new(estimate::kept_by_backtest(&backtest, THREADS)));
+        let common = SharedWork::of(&strategies, Cache::new(estimate::kept_by_backtest(&backtest, THREADS)));
         let watch = Watch::unwatched();
         let decide =
             |strategy| backtest.walk.decide_stretch(strategy, &backtest.periods, 0, &common, (&watch, &|| {})).unwrap();
@@ -227,7 +227,7 @@ fn walk_forwards(pool: &TrainingPool) {
     let backtest = request(4000, 10, 60);
     let estimated = estimate::backtest(&backtest, THREADS).bytes();
     let (taken, _) = most_bytes(|| {
-        let held = |period: &Period| {
+        let held = |period: &ActualPeriod| {
             let share = (40.0 * period.log_return).abs().min(1.0);
             Decision { band: Band::of(&[share]), radius: 0.1 * share, source: None }
         };
@@ -252,7 +252,7 @@ fn prepared(what: &str, policy: Policy) {
     let weighed = factor + 2 * bridges + numbers;
     let last = policy.specification().problem.horizon - 1;
     let before = NOW.load(Ordering::Relaxed);
-    let advisor = Advisor::with(policy, Kept::new(2 * weighed));
+    let advisor = Advisor::with(policy, Cache::new(2 * weighed));
     let state = advisor.initial_state(None, None).unwrap();
     advisor.prepare(last, &state);
     let taken = NOW.load(Ordering::Relaxed).saturating_sub(before);

@@ -52,7 +52,7 @@ use shuttle::future::{block_on, spawn, yield_now};
 use shuttle::rand::Rng;
 use shuttle::scheduler::{PctScheduler, RandomScheduler, Scheduler};
 use shuttle::{Config, FailurePersistence, Runner};
-use slots::{Generation, Held, Slots, Source};
+use slots::{Generation, SlotGuard, Slots, Source};
 use sync::{Arc, AsyncMutex, Mutex, OwnedMutexGuard};
 
 const PERIODS: usize = 3;
@@ -184,7 +184,7 @@ trait Holder: Send {
 type Owned = Slots<&'static str, Law>;
 
 impl Places for Owned {
-    type Holder = Held<&'static str, Law>;
+    type Holder = SlotGuard<&'static str, Law>;
 
     fn new() -> Arc<Self> {
         Arc::new(Slots::new(ROOM))
@@ -195,17 +195,17 @@ impl Places for Owned {
     }
 }
 
-impl Holder for Held<&'static str, Law> {
+impl Holder for SlotGuard<&'static str, Law> {
     async fn current<R: Source<Law, Error = Refused> + Sync>(&mut self, source: &R) -> Result<&mut Law, Refused> {
-        Held::current(self, source).await
+        SlotGuard::current(self, source).await
     }
 
     fn clear(&mut self) {
-        Held::clear(self);
+        SlotGuard::clear(self);
     }
 
     fn put(&mut self, law: Law) {
-        Held::put(self, law);
+        SlotGuard::put(self, law);
     }
 
     fn forget(&self) {}

@@ -6,21 +6,21 @@ use std::sync::{Arc, LazyLock, Mutex};
 use ballast::control::policy::Policy;
 use ballast::http::decode;
 use ballast::service::Service;
-use ballast::service::allowance::{Allowance, HeavyTurn, Limits};
+use ballast::service::allowance::{Allowance, HeavyPermit, Limits};
 use ballast::service::answer::Observed;
 use ballast::service::clock::Clock;
 use ballast::service::config::Config;
 use ballast::service::keys::Caller;
 use ballast::store::labels::Relabel;
 use ballast::service::report::Observe;
-use ballast::service::sessions::Start;
+use ballast::service::sessions::SessionStart;
 use ballast::service::shutdown::Shutdown;
 use libfuzzer_sys::fuzz_target;
 use tokio::runtime::Runtime;
 
 /// As a call of its own has it.
-fn turn() -> Arc<HeavyTurn> {
-    Arc::new(HeavyTurn::new(Arc::new(Allowance::new(&Limits::default()))))
+fn turn() -> Arc<HeavyPermit> {
+    Arc::new(HeavyPermit::new(Arc::new(Allowance::new(&Limits::default()))))
 }
 
 struct Live {
@@ -47,7 +47,7 @@ static LIVE: LazyLock<Live> = LazyLock::new(|| {
 });
 
 fn open(runtime: &Runtime, service: &Service, caller: &Caller, policy: &str) -> String {
-    let start = Start {
+    let start = SessionStart {
         policy: policy.to_owned(),
         history: None,
         wealth: None,

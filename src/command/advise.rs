@@ -15,7 +15,7 @@ use ballast::service::advise_assets::AdviseAssets;
 use clap::Args;
 
 use super::caution::{self, CautionArgs};
-use super::record::{Record, show};
+use super::record::{RecordArguments, show};
 use super::returns::{AnyReturns, Returns, SeveralReturns};
 
 mod words;
@@ -23,7 +23,7 @@ mod words;
 #[derive(Debug, Clone, Args)]
 pub struct AdviseArgs {
     #[command(flatten)]
-    record: Record,
+    record: RecordArguments,
     #[command(flatten)]
     caution: CautionArgs,
     /// Seed of the simulations
@@ -179,7 +179,7 @@ impl AdviseArgs {
 }
 
 /// Renames the field of an error about `count` returns to the option that the user knows.
-fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
+fn by_option(error: FieldError, count: usize, record: &RecordArguments) -> FieldError {
     if error.field == "problem.radius.paths" {
         // For one step: the returns and one more.
         let most = error.value.parse().map_or(0, |paths: usize| BRIDGE_NUMBERS / paths.max(1) - 1);

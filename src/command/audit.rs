@@ -12,7 +12,7 @@ use super::{keys, moments};
 const PAGE: usize = 1000;
 
 #[derive(Debug, Args)]
-pub struct Audit {
+pub struct AuditCommand {
     /// Show the entries of this tenant only.
     #[arg(long)]
     tenant: Option<Tenant>,
@@ -30,7 +30,7 @@ pub struct Audit {
 ///
 /// # Errors
 /// The store is not reached, or an entry is not what was written.
-pub async fn run(arguments: Audit) -> Result<(), Box<dyn std::error::Error>> {
+pub async fn run(arguments: AuditCommand) -> Result<(), Box<dyn std::error::Error>> {
     let ring = keys::open(arguments.store).await?;
     let filter = AuditFilter { tenant: arguments.tenant, object: arguments.object };
     let mut out = std::io::stdout().lock();

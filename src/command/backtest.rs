@@ -136,7 +136,7 @@ impl fmt::Display for Window {
 }
 
 /// Everything the page is made from.
-pub struct Shown {
+pub struct BacktestPage {
     pub walked: Walked,
     pub report: BacktestReport,
     /// The returns as they were read.
@@ -145,7 +145,7 @@ pub struct Shown {
 
 /// A report, and a sentence on the returns that were read for it.
 #[derive(Serialize)]
-pub struct Read<'a, R> {
+pub struct ReportOfRecord<'a, R> {
     #[serde(flatten)]
     pub report: &'a R,
     pub read: &'a str,
@@ -262,12 +262,12 @@ impl From<FieldError> for BacktestError {
     }
 }
 
-impl Shown {
+impl BacktestPage {
     /// Renders the report as a page.
     fn page(&self) -> Result<String, FileError> {
         let (report, read) = (&self.report, self.returns.sentence());
         let dates = report.dates.as_deref().unwrap_or_default();
-        page("backtest.js", "Backtest", dates, &Read { report, read: &read }, &report.sentences)
+        page("backtest.js", "Backtest", dates, &ReportOfRecord { report, read: &read }, &report.sentences)
     }
 
     /// Returns the periods that are decided, after the first window.
@@ -277,13 +277,13 @@ impl Shown {
 }
 
 /// Decides every period, and computes the accounts and the figures.
-fn walk(args: &BacktestArgs, returns: Returns) -> Result<Shown, BacktestError> {
+fn walk(args: &BacktestArgs, returns: Returns) -> Result<BacktestPage, BacktestError> {
     let backtest = args.backtest(&returns)?;
     let steps = Parts::new(backtest.steps(), "steps of trainings");
     let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| steps.one_more()))?;
     steps.finish();
     let report = BacktestReport::new(&walked);
-    Ok(Shown { walked, report, returns })
+    Ok(BacktestPage { walked, report, returns })
 }
 
 fn file(folder: &Path, name: &str, text: &str) -> Result<(), BacktestError> {

@@ -36,7 +36,7 @@ impl From<DamageArgs> for Damage {
 }
 
 #[derive(Debug, Args)]
-pub struct Repair {
+pub struct RepairCommand {
     /// A session, a policy or a key, as `check` and the log name it; or `totals`, which are recomputed.
     thing: String,
     /// A file made by `ballast backup` while the object was sound.
@@ -59,7 +59,7 @@ pub struct Restore {
 }
 
 #[derive(Debug, Args)]
-pub struct Move {
+pub struct MoveCommand {
     /// The folder of a stopped service; it is not changed.
     #[arg(long)]
     from: PathBuf,
@@ -72,7 +72,7 @@ pub struct Move {
 ///
 /// # Errors
 /// A process holds the folder, an object in it is damaged, or the database has rows or is not reached.
-pub async fn relocate(arguments: Move) -> Result<(), Box<dyn std::error::Error>> {
+pub async fn relocate(arguments: MoveCommand) -> Result<(), Box<dyn std::error::Error>> {
     store::relocate(&arguments.from, &arguments.store.url()?, &mut |line| println!("{line}")).await?;
     println!("moved, and sound; start the service with --store, and never again on {}", arguments.from.display());
     Ok(())
@@ -86,7 +86,7 @@ pub async fn run(arguments: Backup) -> Result<(), Box<dyn std::error::Error>> {
     let StoreLocation::Folder(folder) = arguments.store.location()? else {
         return Err("PostgreSQL is backed up by its own pg_dump --format=custom (docs/operating.md)".into());
     };
-    let mut report = Report::default();
+    let mut report = DamageReport::default();
     store::backup(&folder, &arguments.out, arguments.damage.into(), &mut |line| report.tell(&line)).await?;
     println!("{}, and on the disk as {}", report.verdict(), arguments.out.display());
     Ok(())
@@ -100,7 +100,7 @@ pub async fn restore(arguments: Restore) -> Result<(), Box<dyn std::error::Error
     let StoreLocation::Folder(folder) = arguments.store.location()? else {
         return Err("PostgreSQL is restored by its own pg_restore (docs/operating.md)".into());
     };
-    let mut report = Report::default();
+    let mut report = DamageReport::default();
     store::restore(&arguments.from, &folder, arguments.damage.into(), &mut |line| report.tell(&line)).await?;
     println!("{}, and on the disk in {}", report.verdict(), folder.display());
     Ok(())
@@ -110,7 +110,7 @@ pub async fn restore(arguments: Restore) -> Result<(), Box<dyn std::error::Error
 ///
 /// # Errors
 /// The store is PostgreSQL, a process holds the folder, or the backup lacks what would make the object sound.
-pub async fn repair(arguments: Repair) -> Result<(), Box<dyn std::error::Error>> {
+pub async fn repair(arguments: RepairCommand) -> Result<(), Box<dyn std::error::Error>> {
     let StoreLocation::Folder(folder) = arguments.store.location()? else {
         return Err("PostgreSQL is repaired by its own tools (docs/operating.md)".into());
     };
@@ -127,11 +127,11 @@ pub async fn repair(arguments: Repair) -> Result<(), Box<dyn std::error::Error>>
 
 /// Prints lines, and counts the damaged objects among them.
 #[derive(Default)]
-struct Report {
+struct DamageReport {
     damaged: usize,
 }
 
-impl Report {
+impl DamageReport {
     fn tell(&mut self, line: &str) {
         self.damaged += usize::from(line.starts_with("damaged: "));
         println!("{line}");

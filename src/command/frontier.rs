@@ -6,21 +6,21 @@ use std::fmt::Write;
 
 use ballast::control::error::FieldError;
 use ballast::control::evaluation::frontier::Frontier;
-use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, Resampled};
-use ballast::control::kept::Kept;
+use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, ResampledFrontier};
+use ballast::control::kept::Cache;
 use ballast::control::progress::Watch;
 use ballast::control::request::frontier::{FrontierProblem, FrontierRequest, default_scales};
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use clap::Args;
 
-use super::record::{Record, show};
+use super::record::{RecordArguments, show};
 use super::returns::AnyReturns;
 
 #[derive(Debug, Clone, Args)]
 pub struct FrontierArgs {
     #[command(flatten)]
-    record: Record,
+    record: RecordArguments,
     /// Probability that the ball of scale 1 misses the true law
     #[arg(long, default_value_t = 0.1)]
     alpha: f64,
@@ -48,7 +48,7 @@ pub fn run(arguments: &FrontierArgs) -> Result<(), Box<dyn Error>> {
     };
     let question = arguments.request(&returns).question();
     let question = question.map_err(|error| by_option(error, arguments.record.source()))?;
-    let report = Frontier::new(question, Kept::default()).run(&Watch::unwatched())?;
+    let report = Frontier::new(question, Cache::default()).run(&Watch::unwatched())?;
     Ok(show(&read, arguments.json, &report, || told(&report))?)
 }
 
@@ -92,7 +92,11 @@ fn told(report: &FrontierReport) -> String {
     text + &report.sentences.join("\n")
 }
 
-fn table(text: &mut String, report: &FrontierReport, Resampled { bootstrap, best, points }: &Resampled) {
+fn table(
+    text: &mut String,
+    report: &FrontierReport,
+    ResampledFrontier { bootstrap, best, points }: &ResampledFrontier,
+) {
     let per = if report.per_year { "a year" } else { "a period" };
     let records = match bootstrap {
         Bootstrap::Smoothed { .. } => "Records drawn from the smoothed returns".to_owned(),

@@ -3,7 +3,7 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
-use ballast::http::{Running, serve};
+use ballast::http::{RunningServer, serve};
 use ballast::service::config::Config;
 use ballast::service::shutdown::Shutdown;
 use thiserror::Error;
@@ -42,7 +42,7 @@ impl Drop for DataFolder {
 /// A running service.
 pub struct Host {
     pub address: SocketAddr,
-    running: Running,
+    running: RunningServer,
     // Declared last: the service releases the folder before it is removed.
     folder: DataFolder,
 }

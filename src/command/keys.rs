@@ -14,11 +14,11 @@ use super::moments;
 use super::store_location::StoreArgs;
 
 #[derive(Debug, Subcommand)]
-pub enum Keys {
+pub enum KeysCommand {
     /// Make a key and print it, once.
     Create(Create),
     /// Make a key that replaces another, which stays valid for a while, and print it, once.
-    Rotate(Rotate),
+    Rotate(RotateCommand),
     /// List keys: name, tenant, roles, creation, expiry, and whether revoked.
     List(List),
     /// Revoke a key for good, by its name.
@@ -32,7 +32,7 @@ pub struct Create {
     tenant: Tenant,
     /// Roles of the key; may be given several times.
     #[arg(long = "role", value_enum, required = true)]
-    roles: Vec<RoleName>,
+    roles: Vec<KeyRoleName>,
     #[command(flatten)]
     expiry: Expiry,
     #[command(flatten)]
@@ -66,7 +66,7 @@ impl Expiry {
 }
 
 #[derive(Debug, Args)]
-pub struct Rotate {
+pub struct RotateCommand {
     /// Name of the key, as `list` shows it: key_...
     key: String,
     /// The old key expires after this time.
@@ -95,7 +95,7 @@ pub struct Revoke {
 
 /// [`KeyRole`] as the command line names it.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum RoleName {
+enum KeyRoleName {
     /// Everything that changes nothing.
     Read,
     /// Open, advance and delete sessions.
@@ -106,13 +106,13 @@ enum RoleName {
     Admin,
 }
 
-impl From<RoleName> for KeyRole {
-    fn from(name: RoleName) -> Self {
+impl From<KeyRoleName> for KeyRole {
+    fn from(name: KeyRoleName) -> Self {
         match name {
-            RoleName::Read => KeyRole::Read,
-            RoleName::Operate => KeyRole::Operate,
-            RoleName::Train => KeyRole::Train,
-            RoleName::Admin => KeyRole::Admin,
+            KeyRoleName::Read => KeyRole::Read,
+            KeyRoleName::Operate => KeyRole::Operate,
+            KeyRoleName::Train => KeyRole::Train,
+            KeyRoleName::Admin => KeyRole::Admin,
         }
     }
 }
@@ -121,12 +121,12 @@ impl From<RoleName> for KeyRole {
 ///
 /// # Errors
 /// The store is not reached, or there is no such key.
-pub async fn run(keys: Keys) -> Result<(), Box<dyn std::error::Error>> {
+pub async fn run(keys: KeysCommand) -> Result<(), Box<dyn std::error::Error>> {
     match keys {
-        Keys::Create(arguments) => create(arguments).await,
-        Keys::Rotate(arguments) => replace(arguments).await,
-        Keys::List(arguments) => list(arguments).await,
-        Keys::Revoke(arguments) => revoke(arguments).await,
+        KeysCommand::Create(arguments) => create(arguments).await,
+        KeysCommand::Rotate(arguments) => replace(arguments).await,
+        KeysCommand::List(arguments) => list(arguments).await,
+        KeysCommand::Revoke(arguments) => revoke(arguments).await,
     }
 }
 
@@ -157,7 +157,7 @@ async fn create(arguments: Create) -> Result<(), Box<dyn std::error::Error>> {
     reveal(&secret)
 }
 
-async fn replace(arguments: Rotate) -> Result<(), Box<dyn std::error::Error>> {
+async fn replace(arguments: RotateCommand) -> Result<(), Box<dyn std::error::Error>> {
     let (ring, clock) = (open(arguments.store).await?, Clock::system());
     let expires_ms = arguments.expiry.milliseconds(clock.now_milliseconds())?;
     let rotated = rotate(&ring, &arguments.key, arguments.overlap, expires_ms, &clock).await?;

@@ -20,7 +20,7 @@ mod server;
 mod stored;
 mod tunnel;
 
-use figures::Report;
+use figures::LoadReport;
 use server::Server;
 
 #[derive(Debug, Args)]
@@ -117,12 +117,12 @@ pub fn run(arguments: &LoadTest) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-async fn measure(arguments: &LoadTest) -> Result<Report, Box<dyn Error>> {
+async fn measure(arguments: &LoadTest) -> Result<LoadReport, Box<dyn Error>> {
     let mut server = match &arguments.url {
         Some(url) => Server::at(url, arguments.ca.as_deref()).await?,
         None => Server::start(&arguments.folder, arguments.store.as_deref(), arguments.replicas.into()).await?,
     };
-    let mut report = Report::default();
+    let mut report = LoadReport::default();
     scenarios::run(arguments, &mut server, &mut report).await?;
     Ok(report)
 }

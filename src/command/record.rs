@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, SeveralReturns};
 
 #[derive(Debug, Clone, Args)]
-pub struct Record {
+pub struct RecordArguments {
     #[command(flatten)]
     file: ReturnsFile,
     /// Number of the latest returns to use; all of them unless given
@@ -24,7 +24,7 @@ pub struct Record {
     risk_aversion: f64,
 }
 
-impl Record {
+impl RecordArguments {
     /// Reads the returns of one asset.
     ///
     /// # Errors

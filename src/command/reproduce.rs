@@ -30,7 +30,7 @@ pub struct Reproduce {
 
 /// The sizes of the computation.
 #[derive(Debug, Clone, Serialize)]
-pub struct Plan {
+pub struct ReproductionPlan {
     pub horizon: usize,
     /// Design points of the learning framework; the others use as many, up to the paper's 200.
     pub count: usize,
@@ -49,9 +49,9 @@ pub struct Plan {
     pub study_paths: usize,
 }
 
-impl Plan {
+impl ReproductionPlan {
     fn full() -> Self {
-        Plan {
+        ReproductionPlan {
             horizon: 10,
             count: 1000,
             bridges: 2000,
@@ -68,7 +68,7 @@ impl Plan {
     }
 
     fn quick() -> Self {
-        Plan {
+        ReproductionPlan {
             count: 40,
             bridges: 200,
             histories: 10,
@@ -79,14 +79,15 @@ impl Plan {
             study_count: 30,
             study_ladder: 20,
             study_histories: 4,
-            ..Plan::full()
+            ..ReproductionPlan::full()
         }
     }
 
     /// Returns true if the run is large enough that differences from the paper exceed chance and the error of coarse
     /// designs.
     fn decides(&self) -> bool {
-        let Plan { count, bridges, histories, close_histories, study_histories, .. } = Plan::full();
+        let ReproductionPlan { count, bridges, histories, close_histories, study_histories, .. } =
+            ReproductionPlan::full();
         let least = [count, bridges, histories, close_histories, study_histories];
         let own = [self.count, self.bridges, self.histories, self.close_histories, self.study_histories];
         own.iter().zip(least).all(|(own, least)| *own >= least)
@@ -96,7 +97,7 @@ impl Plan {
 /// All results.
 #[derive(Debug, Serialize)]
 struct Reproduction {
-    plan: Plan,
+    plan: ReproductionPlan,
     seconds: f64,
     findings: Vec<findings::Finding>,
     section: runs::Section,
@@ -104,7 +105,7 @@ struct Reproduction {
 }
 
 pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
-    let plan = if arguments.quick { Plan::quick() } else { Plan::full() };
+    let plan = if arguments.quick { ReproductionPlan::quick() } else { ReproductionPlan::full() };
     std::fs::create_dir_all(&arguments.out)?;
     let workshop = Workshop::new()?;
     let section = runs::section(&plan, &workshop)?;
@@ -125,7 +126,7 @@ pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
 
 /// All results, and the additions of the page.
 #[derive(Serialize)]
-struct Shown<'a> {
+struct ReproductionPage<'a> {
     #[serde(flatten)]
     whole: &'a Reproduction,
     quick: bool,
@@ -134,7 +135,7 @@ struct Shown<'a> {
 }
 
 fn page(whole: &Reproduction, quick: bool) -> Result<String, report::FileError> {
-    let shown = Shown { whole, quick, sample_size: runs::SAMPLE_SIZE, printed: &printed::TABLES };
+    let shown = ReproductionPage { whole, quick, sample_size: runs::SAMPLE_SIZE, printed: &printed::TABLES };
     let sentences: Vec<String> = whole.findings.iter().map(ToString::to_string).collect();
     let title = "Nonparametric adaptive robust control: section 3 anew";
     report::html(dashboard::embedded, "reproduction.js", title, &shown, &sentences)

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::assets::AssetsRecord;
-use ballast::control::evaluation::rolling::Period;
+use ballast::control::evaluation::rolling::ActualPeriod;
 use ballast::control::request::annualised::compounded;
 pub use ballast::control::request::frequency::Frequency;
 use ballast::returns::{Choices, Holds, Kind, Question, Reading, Record, Series, Unit, decoded, read};
@@ -84,8 +84,8 @@ pub enum AnyReturns {
 }
 
 impl Row {
-    pub fn period(&self) -> Period {
-        Period { log_return: self.log_return, bank_return: self.risk_free_return }
+    pub fn period(&self) -> ActualPeriod {
+        ActualPeriod { log_return: self.log_return, bank_return: self.risk_free_return }
     }
 }
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 use ballast::http;
 use ballast::service::allowance::Limits;
 use ballast::service::config::{Config, DAY, Role, TlsFiles};
-use ballast::service::memory::{MemoryLimit, Size};
+use ballast::service::memory::{ByteSize, MemoryLimit};
 use ballast::service::shutdown::Shutdown;
 use ballast::store::Quotas;
 use clap::builder::FalseyValueParser;
@@ -42,8 +42,8 @@ pub struct Serve {
     #[arg(long, env = "BALLAST_REQUIRE_KEYS", value_parser = FalseyValueParser::new())]
     require_keys: bool,
     /// Role of this replica.
-    #[arg(long, env = "BALLAST_ROLE", value_enum, default_value_t = RoleName::All)]
-    role: RoleName,
+    #[arg(long, env = "BALLAST_ROLE", value_enum, default_value_t = ProcessRoleName::All)]
+    role: ProcessRoleName,
     /// Lease of a job: one whose worker has been silent this long is taken over by another.
     #[arg(long, env = "BALLAST_LEASE_SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=3600))]
     lease_seconds: u16,
@@ -56,8 +56,8 @@ pub struct Serve {
     training_threads: Option<u16>,
     /// The most memory to use, as in 4GB or 512MiB. Default: 80 % of the container's limit, of the address space's or
     /// of the machine's memory, whichever is least.
-    #[arg(long, env = "BALLAST_MEMORY_LIMIT", value_parser = str::parse::<Size>)]
-    memory_limit: Option<Size>,
+    #[arg(long, env = "BALLAST_MEMORY_LIMIT", value_parser = str::parse::<ByteSize>)]
+    memory_limit: Option<ByteSize>,
     #[command(flatten)]
     limits: LimitArgs,
     #[command(flatten)]
@@ -137,7 +137,7 @@ struct LimitArgs {
 
 /// [`Role`] as the command line names it.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum RoleName {
+enum ProcessRoleName {
     /// Answer requests and run jobs.
     All,
     /// Answer requests.
@@ -146,12 +146,12 @@ enum RoleName {
     Worker,
 }
 
-impl From<RoleName> for Role {
-    fn from(name: RoleName) -> Self {
+impl From<ProcessRoleName> for Role {
+    fn from(name: ProcessRoleName) -> Self {
         match name {
-            RoleName::All => Role::All,
-            RoleName::Api => Role::Api,
-            RoleName::Worker => Role::Worker,
+            ProcessRoleName::All => Role::All,
+            ProcessRoleName::Api => Role::Api,
+            ProcessRoleName::Worker => Role::Worker,
         }
     }
 }
@@ -187,7 +187,8 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);
-    config.memory_limit = arguments.memory_limit.map_or(config.memory_limit, |Size(bytes)| MemoryLimit::chosen(bytes));
+    config.memory_limit =
+        arguments.memory_limit.map_or(config.memory_limit, |ByteSize(bytes)| MemoryLimit::chosen(bytes));
     let shutdown = Shutdown::new();
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let (delay, signalled) = (Duration::from_secs(arguments.drain_delay.into()), shutdown.clone());

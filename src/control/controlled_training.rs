@@ -21,7 +21,7 @@ use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{Candidates, Counts, Learning};
+use crate::control::surrogate::learning::{Candidates, Counts, DesignFitting};
 use crate::control::surrogate::stored::Solution;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
@@ -76,14 +76,14 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         let (mut values, mut after): (Vec<ControlledValue>, Option<Solution>) = (Vec::new(), None);
         for step in (1..specification.problem.horizon).rev() {
             let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };
-            let states = Simulated { bellman, start, history: &history, law: &law };
+            let states = SimulatedStates { bellman, start, history: &history, law: &law };
             if names.is_empty() {
                 values.push(ControlledValue::Constant(states.solve(0, states.features_at(0))?.floor_gain));
                 continue;
             }
             let (specification, names, counts) = (&specification, &names, counts.clone());
             let learned =
-                Learning { specification, names, step, counts, aim: None, watch }.run(&states, after.as_ref())?;
+                DesignFitting { specification, names, step, counts, aim: None, watch }.run(&states, after.as_ref())?;
             if let Solution::Surrogates(stored) = &learned.solution {
                 let surrogate = ValueSurrogate::new(specification, step, stored);
                 values.push(ControlledValue::Surrogate(Box::new(surrogate)));
@@ -102,14 +102,14 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
 }
 
 /// States of one step under randomised actions and the sampling law.
-struct Simulated<'a, P: Controlled> {
+struct SimulatedStates<'a, P: Controlled> {
     bellman: ControlledStep<'a, P>,
     start: &'a P::State,
     history: &'a EmpiricalDistribution,
     law: &'a ContinuousLaw,
 }
 
-impl<P: Controlled> Simulated<'_, P> {
+impl<P: Controlled> SimulatedStates<'_, P> {
     /// Simulates a state and its law. Streams: ("controlled", t, index) for each step.
     fn state(&self, index: usize) -> (P::State, EmpiricalDistribution) {
         let (ControlledStep { problem, laws, .. }, mut state) = (&self.bellman, self.start.clone());
@@ -130,14 +130,14 @@ impl<P: Controlled> Simulated<'_, P> {
     }
 }
 
-impl<P: Controlled> Simulated<'_, P> {
+impl<P: Controlled> SimulatedStates<'_, P> {
     fn features_at(&self, index: usize) -> Features {
         let (state, law) = self.state(index);
         self.bellman.features(&state, &law)
     }
 }
 
-impl<P: Controlled> Candidates for Simulated<'_, P> {
+impl<P: Controlled> Candidates for SimulatedStates<'_, P> {
     fn features(&self, some: Range<usize>) -> Vec<Features> {
         some.map(|index| self.features_at(index)).collect()
     }

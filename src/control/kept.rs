@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
 
-use quick_cache::sync::{Cache, DefaultLifecycle, GuardResult};
+use quick_cache::sync::{Cache as QuickCache, DefaultLifecycle, GuardResult};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 
 /// Bytes shared by callers without a budget of their own: twice the factor of the largest design.
@@ -43,19 +43,19 @@ pub enum Key {
 
 impl Key {
     /// Returns the part of memory that the key counts towards.
-    fn part(&self) -> Part {
+    fn part(&self) -> CachePart {
         match self {
-            Key::Bridges { .. } => Part::Bridges,
-            Key::Factor(_) => Part::Factors,
-            Key::Levels(_) => Part::Levels,
-            Key::Policy(_) => Part::Policies,
+            Key::Bridges { .. } => CachePart::Bridges,
+            Key::Factor(_) => CachePart::Factors,
+            Key::Levels(_) => CachePart::Levels,
+            Key::Policy(_) => CachePart::Policies,
         }
     }
 }
 
 /// The parts of the cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum CachePart {
     /// Simulated paths.
     Bridges,
     /// Factors behind predicted deviations.
@@ -66,9 +66,9 @@ pub enum Part {
     Policies,
 }
 
-impl Part {
+impl CachePart {
     /// Every part.
-    pub const ALL: [Part; 4] = [Part::Bridges, Part::Factors, Part::Levels, Part::Policies];
+    pub const ALL: [CachePart; 4] = [CachePart::Bridges, CachePart::Factors, CachePart::Levels, CachePart::Policies];
 }
 
 /// An entry and its bytes.
@@ -90,24 +90,24 @@ impl Weighter<Key, Thing> for Bytes {
 
 /// A bounded cache; clones share it. The default is one for the process.
 #[derive(Clone)]
-pub struct Kept(Arc<Shelf>);
+pub struct Cache(Arc<CacheState>);
 
-struct Shelf {
-    things: Cache<Key, Thing, Bytes>,
+struct CacheState {
+    things: QuickCache<Key, Thing, Bytes>,
     heaviest: usize,
     /// Bytes being computed; `made` wakes callers that wait for them to fall.
     making: Mutex<usize>,
     made: Condvar,
 }
 
-impl Default for Kept {
+impl Default for Cache {
     fn default() -> Self {
-        static SHARED: LazyLock<Kept> = LazyLock::new(|| Kept::new(SHARED_BYTES));
+        static SHARED: LazyLock<Cache> = LazyLock::new(|| Cache::new(SHARED_BYTES));
         SHARED.clone()
     }
 }
 
-impl Kept {
+impl Cache {
     /// Creates a cache of at most `bytes`; computations use at most half of that at a time in addition.
     pub fn new(bytes: usize) -> Self {
         let options = OptionsBuilder::new()
@@ -119,13 +119,13 @@ impl Kept {
             .build();
         let things = match options {
             Ok(options) => {
-                Cache::with_options(options, Bytes, DefaultHashBuilder::default(), DefaultLifecycle::default())
+                QuickCache::with_options(options, Bytes, DefaultHashBuilder::default(), DefaultLifecycle::default())
             }
             // Cannot happen: every required option is set above.
-            Err(_) => Cache::with_weighter(THINGS, bytes as u64, Bytes),
+            Err(_) => QuickCache::with_weighter(THINGS, bytes as u64, Bytes),
         };
         let heaviest = (bytes as f64 * PROVEN_SHARE) as usize;
-        Kept(Arc::new(Shelf { things, heaviest, making: Mutex::new(0), made: Condvar::new() }))
+        Cache(Arc::new(CacheState { things, heaviest, making: Mutex::new(0), made: Condvar::new() }))
     }
 
     /// Returns the largest bytes of an entry that is kept. Anything heavier is computed on every request.
@@ -196,8 +196,8 @@ impl Kept {
     }
 
     /// Returns the bytes of each part.
-    pub fn bytes(&self) -> BTreeMap<Part, usize> {
-        let mut parts: BTreeMap<Part, usize> = Part::ALL.map(|part| (part, 0)).into();
+    pub fn bytes(&self) -> BTreeMap<CachePart, usize> {
+        let mut parts: BTreeMap<CachePart, usize> = CachePart::ALL.map(|part| (part, 0)).into();
         for (key, thing) in self.0.things.iter() {
             *parts.entry(key.part()).or_default() += thing.bytes;
         }
@@ -205,23 +205,23 @@ impl Kept {
     }
 
     /// Waits until computations in progress leave `bytes` free, or there are none.
-    fn room(&self, bytes: usize) -> Room<'_> {
+    fn room(&self, bytes: usize) -> Reservation<'_> {
         let shelf = &*self.0;
         let making = shelf.making.lock().unwrap_or_else(PoisonError::into_inner);
         let crowded = |making: &mut usize| *making > 0 && making.saturating_add(bytes) > shelf.heaviest;
         let mut making = shelf.made.wait_while(making, crowded).unwrap_or_else(PoisonError::into_inner);
         *making = making.saturating_add(bytes);
-        Room { shelf, bytes }
+        Reservation { shelf, bytes }
     }
 }
 
 /// Bytes of a computation in progress; released when dropped, also in a panic.
-struct Room<'a> {
-    shelf: &'a Shelf,
+struct Reservation<'a> {
+    shelf: &'a CacheState,
     bytes: usize,
 }
 
-impl Drop for Room<'_> {
+impl Drop for Reservation<'_> {
     fn drop(&mut self) {
         let mut making = self.shelf.making.lock().unwrap_or_else(PoisonError::into_inner);
         *making = making.saturating_sub(self.bytes);
@@ -240,13 +240,13 @@ mod tests {
         Key::Bridges { sample_size, paths: 1, seed: 1 }
     }
 
-    fn kept_bytes(kept: &Kept) -> usize {
+    fn kept_bytes(kept: &Cache) -> usize {
         kept.bytes().values().sum()
     }
 
     #[test]
     fn what_is_kept_stays_within_its_bytes_and_the_newest_is_among_it() {
-        let kept = Kept::new(1000);
+        let kept = Cache::new(1000);
         for size in 0..100 {
             assert_eq!(*kept.get_or_make(&key(size), 90, || size), size);
             assert!(kept_bytes(&kept) <= 1000);
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn what_is_too_heavy_is_made_each_time_and_drives_nothing_out() {
-        let kept = Kept::new(1000);
+        let kept = Cache::new(1000);
         kept.get_or_make(&key(0), 400, || 0);
         let made = AtomicUsize::new(0);
         for _ in 0..2 {
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn many_who_ask_at_once_make_it_once_and_what_is_being_made_is_bounded() {
-        let kept = Kept::new(1000);
+        let kept = Cache::new(1000);
         let (made, under_way, most) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(0));
         let make = |size: usize| {
             let now = under_way.fetch_add(200, Ordering::SeqCst) + 200;

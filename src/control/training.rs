@@ -12,7 +12,7 @@ use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
 use crate::control::bellman::{BellmanStep, DesignSolution};
 use crate::control::error::TrainError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::Policy;
 use crate::control::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW, Holdings};
 use crate::control::problem::state::State;
@@ -23,12 +23,12 @@ use crate::control::surrogate::accuracy::Aim;
 use crate::control::surrogate::design::Design;
 use crate::control::surrogate::features::{Features, LawSummary};
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{Candidates, Learning, diagnostics};
+use crate::control::surrogate::learning::{Candidates, DesignFitting, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
-use crate::control::uncertainty::measured::Measured;
+use crate::control::uncertainty::measured::SharedSummaries;
 
 /// Summaries of the laws of a design.
-pub type Summaries = Measured<LawSummary>;
+pub type Summaries = SharedSummaries<LawSummary>;
 
 /// Placeholder for a wealth that no feature uses.
 const NO_WEALTH: f64 = 1.0;
@@ -46,14 +46,14 @@ impl Training {
     /// # Errors
     /// A specification that breaks a rule.
     pub fn new(specification: &Specification) -> Result<Self, TrainError> {
-        Training::with(specification, Kept::default())
+        Training::with(specification, Cache::default())
     }
 
     /// Completes and checks the specification, with `kept` as the cache of recomputable results.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn with(specification: &Specification, kept: Kept) -> Result<Self, TrainError> {
+    pub fn with(specification: &Specification, kept: Cache) -> Result<Self, TrainError> {
         Training::among(specification, kept, Arc::default())
     }
 
@@ -62,7 +62,7 @@ impl Training {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn among(specification: &Specification, kept: Kept, measured: Arc<Summaries>) -> Result<Self, TrainError> {
+    pub fn among(specification: &Specification, kept: Cache, measured: Arc<Summaries>) -> Result<Self, TrainError> {
         let specification = specification.clone().completed()?.resolved(&kept);
         let design = Design::new(&specification);
         Ok(Training { design, problem: Problem::with(&specification, kept), measured })
@@ -101,7 +101,8 @@ impl Training {
         let asked = Some(&self.problem.specification.design).filter(|_| counts.chosen);
         let aim = asked.and_then(|design| Aim::of(design, step, erring, after.map(|after| &after.diagnostics)));
         let (specification, names) = (&self.problem.specification, &self.problem.selection.names());
-        Learning { specification, names, step, counts, aim, watch }.run(&solver, after.map(|after| &after.solution))
+        DesignFitting { specification, names, step, counts, aim, watch }
+            .run(&solver, after.map(|after| &after.solution))
     }
 
     /// Builds the policy from all steps, in ascending order of step.

@@ -27,11 +27,11 @@ use super::bodies::Bodies;
 use super::conversation::LocalAddress;
 use super::extract::{AfterBody, BodyLimit, LargeBody, Parameters};
 use super::hosts::{self, Hosts};
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use crate::service::Service;
-use crate::service::allowance::{Class, HeavyTurn, Refused};
+use crate::service::allowance::{Class, HeavyPermit, Refused};
 use crate::service::error::ServiceError;
-use crate::service::keys::{Caller, PREFIX, Turned};
+use crate::service::keys::{Caller, PREFIX, Rejected};
 use crate::store::{KeyRole, Tenant};
 
 /// The key that an operation needs.
@@ -148,7 +148,7 @@ fn answered(call: Option<Call>, response: Response) -> Response {
 }
 
 /// Rejects a request whose headers say that it is not meant for this service.
-fn addressed(gate: &Gate, request: &Request) -> Result<(), Problem> {
+fn addressed(gate: &Gate, request: &Request) -> Result<(), ProblemDocument> {
     hosts::refuse_ambiguous(request.headers())?;
     if !gate.service.keys.are_absent() {
         return Ok(());
@@ -157,12 +157,16 @@ fn addressed(gate: &Gate, request: &Request) -> Result<(), Problem> {
     gate.hosts.refuse_foreign(request.headers(), request.uri(), local)
 }
 
-fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, Box<(Asker, Problem)>> {
+fn admitted(
+    service: &Service,
+    access: Access,
+    headers: &HeaderMap,
+) -> Result<Arc<Caller>, Box<(Asker, ProblemDocument)>> {
     let caller = service.keys.admit(bearer(headers)).map_err(|turned| {
         let tenant = match &turned {
-            Turned::WrongKey { of } => of.clone(),
-            Turned::Expired { of, .. } => Some(of.clone()),
-            Turned::NoKey => None,
+            Rejected::WrongKey { of } => of.clone(),
+            Rejected::Expired { of, .. } => Some(of.clone()),
+            Rejected::NoKey => None,
         };
         Box::new((Asker { tenant, key: "".into() }, unauthenticated(turned)))
     })?;
@@ -171,7 +175,7 @@ fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Ar
             let (role, detail) = (role.as_str(), format!("the call needs the role {}", role.as_str()));
             let rule = format!("must be a key with the role {role}");
             let shown = format!("a key with {}", caller.roles());
-            let problem = Problem::new(ProblemKind::Forbidden, detail).naming("Authorization", shown, rule);
+            let problem = ProblemDocument::new(ProblemKind::Forbidden, detail).naming("Authorization", shown, rule);
             Err(Box::new((Asker { tenant: Some(caller.tenant.clone()), key: caller.key().clone() }, problem)))
         }
         _ => Ok(caller),
@@ -185,29 +189,29 @@ fn bearer(headers: &HeaderMap) -> Option<&str> {
 }
 
 /// Returns the problem without the key shown, because that may be a valid key with one letter wrong.
-fn unauthenticated(turned: Turned) -> Problem {
+fn unauthenticated(turned: Rejected) -> ProblemDocument {
     let (detail, value) = match turned {
-        Turned::NoKey => ("the call needs a key".to_owned(), "no key".to_owned()),
-        Turned::WrongKey { .. } => ("the key is not one in force".to_owned(), "another key".to_owned()),
-        Turned::Expired { expires_ms, .. } => {
+        Rejected::NoKey => ("the call needs a key".to_owned(), "no key".to_owned()),
+        Rejected::WrongKey { .. } => ("the key is not one in force".to_owned(), "another key".to_owned()),
+        Rejected::Expired { expires_ms, .. } => {
             let at = jiff::Timestamp::from_millisecond(expires_ms).map_or(String::new(), |at| format!(" at {at:.0}"));
             (format!("the key expired{at}"), format!("a key that expired{at}"))
         }
     };
     let rule = format!("must be `Bearer {PREFIX}...`, with a key that was made here, not revoked and not expired");
-    Problem::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)
+    ProblemDocument::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)
 }
 
 /// A call let through by the gate: its caller, and the permits that it needs before heavy work.
 #[derive(Debug, Clone)]
 pub struct Call {
     pub caller: Arc<Caller>,
-    pub turn: Arc<HeavyTurn>,
+    pub turn: Arc<HeavyPermit>,
 }
 
 impl Call {
     fn new(caller: Arc<Caller>) -> Self {
-        let turn = Arc::new(HeavyTurn::new(caller.allowance.clone()));
+        let turn = Arc::new(HeavyPermit::new(caller.allowance.clone()));
         Call { caller, turn }
     }
 
@@ -220,10 +224,10 @@ impl Call {
         Ok(self)
     }
 
-    fn of(parts: &Parts) -> Result<Self, Problem> {
+    fn of(parts: &Parts) -> Result<Self, ProblemDocument> {
         // If the table says that an operation is open, its handler cannot get a caller.
         let call = parts.extensions.get::<Call>().cloned();
-        call.ok_or_else(|| Problem::new(ProblemKind::Internal, "the call has no caller"))
+        call.ok_or_else(|| ProblemDocument::new(ProblemKind::Internal, "the call has no caller"))
     }
 }
 
@@ -235,51 +239,51 @@ impl Deref for Call {
     }
 }
 
-/// A class of calls as a type, for [`By`].
+/// A class of calls as a type, for [`CallerOf`].
 pub trait Classed {
     const CLASS: Class;
 }
 
 /// See [`Class::Live`].
-pub struct Live;
+pub struct LiveCalls;
 /// See [`Class::Heavy`].
-pub struct Heavy;
+pub struct HeavyCalls;
 /// See [`Class::Read`].
-pub struct Read;
+pub struct ReadCalls;
 
-impl Classed for Live {
+impl Classed for LiveCalls {
     const CLASS: Class = Class::Live;
 }
 
-impl Classed for Heavy {
+impl Classed for HeavyCalls {
     const CLASS: Class = Class::Heavy;
 }
 
-impl Classed for Read {
+impl Classed for ReadCalls {
     const CLASS: Class = Class::Read;
 }
 
 /// The caller, once the call is counted against the rate limit of its class. A handler can get its caller only through
-/// this or [`Asked`], so every handler is rate-limited. Heavy calls take their permits after the body has arrived, so
+/// this or [`CallerAsking`], so every handler is rate-limited. Heavy calls take their permits after the body has arrived, so
 /// clients that send slowly hold none.
-pub struct By<C>(pub Call, pub PhantomData<C>);
+pub struct CallerOf<C>(pub Call, pub PhantomData<C>);
 
-impl<C: Classed, S: Send + Sync> FromRequestParts<S> for By<C> {
-    type Rejection = Problem;
+impl<C: Classed, S: Send + Sync> FromRequestParts<S> for CallerOf<C> {
+    type Rejection = ProblemDocument;
 
-    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, ProblemDocument> {
         let call = Call::of(parts)?.counted(C::CLASS).map_err(ServiceError::from)?;
         if C::CLASS == Class::Heavy {
             parts.extensions.insert(AfterBody(call.turn.clone()));
         }
-        Ok(By(call, PhantomData))
+        Ok(CallerOf(call, PhantomData))
     }
 }
 
-impl<C: Classed, S: Send + Sync> OptionalFromRequestParts<S> for By<C> {
-    type Rejection = Problem;
+impl<C: Classed, S: Send + Sync> OptionalFromRequestParts<S> for CallerOf<C> {
+    type Rejection = ProblemDocument;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Option<Self>, Problem> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Option<Self>, ProblemDocument> {
         if parts.extensions.get::<Call>().is_none() {
             return Ok(None);
         }
@@ -288,23 +292,23 @@ impl<C: Classed, S: Send + Sync> OptionalFromRequestParts<S> for By<C> {
 }
 
 /// Query parameters that decide the class of their call.
-pub trait Question {
+pub trait ClassedQuery {
     fn class(&self) -> Class;
 }
 
 /// The caller and the parsed query, once the call is counted against the rate limit of the query's class. A query that
 /// cannot be parsed also counts as a call.
-pub struct Asked<Q>(pub Call, pub Q);
+pub struct CallerAsking<Q>(pub Call, pub Q);
 
-impl<Q: Question + DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Asked<Q> {
-    type Rejection = Problem;
+impl<Q: ClassedQuery + DeserializeOwned, S: Send + Sync> FromRequestParts<S> for CallerAsking<Q> {
+    type Rejection = ProblemDocument;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ProblemDocument> {
         let call = Call::of(parts)?;
         let question = Parameters::<Q>::from_request_parts(parts, state).await;
         let class = question.as_ref().map_or(Class::Read, |Parameters(question)| question.class());
         let call = call.counted(class).map_err(ServiceError::from)?;
-        question.map(|Parameters(question)| Asked(call, question))
+        question.map(|Parameters(question)| CallerAsking(call, question))
     }
 }
 

@@ -7,20 +7,20 @@ use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
-use crate::service::action::Action as ServiceAction;
+use crate::service::action::PeriodAdvice as ServiceAction;
 use crate::service::fund_advice::FundAdvice;
 
 /// The robust allocation for the coming period.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum ActionAnswer {
-    Asset(Box<Action>),
+    Asset(Box<AssetAction>),
     Assets(Box<AssetsAction>),
 }
 
 /// The robust allocation of one asset for the coming period.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Action {
+pub struct AssetAction {
     pub session: String,
     pub period: usize,
     #[serde(flatten)]
@@ -55,7 +55,9 @@ impl ActionAnswer {
         let mut caution = cautions(&advice, sensitivity.as_ref());
         caution.extend(waiting.map(|horizon| Caution::waiting(period, horizon)));
         match assets {
-            None => ActionAnswer::Asset(Box::new(Action { session, period, advice, worst_case, caution, sensitivity })),
+            None => {
+                ActionAnswer::Asset(Box::new(AssetAction { session, period, advice, worst_case, caution, sensitivity }))
+            }
             Some(assets) => {
                 let advice = FundAdvice::new(&advice, &assets);
                 ActionAnswer::Assets(Box::new(AssetsAction { session, period, advice, worst_case, caution }))

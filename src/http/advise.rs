@@ -9,11 +9,11 @@ use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::access::{By, Heavy};
+use super::access::{CallerOf, HeavyCalls};
 use super::bodies;
 use super::decode;
 use super::extract::JsonBytes;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use crate::service::Service;
 use crate::service::advise::{Advise, Advised};
 use crate::service::advise_assets::{AdviseAssets, AssetsAdvised};
@@ -46,12 +46,12 @@ pub enum AdviseAnswer {
     })),
     responses(
         (status = 200, description = "The allocation and its worst-case law.", body = AdviseAnswer),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn advise(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     body: JsonBytes,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let started = Instant::now();
     let (sessions, tenant) = (&service.sessions, &caller.tenant);
     let (answer, mode) = match body.decoded(question).await? {
@@ -68,7 +68,7 @@ pub async fn advise(
 
 /// The parts of a request that show if it gives a horizon and if it names assets.
 #[derive(Deserialize)]
-struct Said {
+struct AdviseShape {
     problem: SaidOfProblem,
 }
 
@@ -80,11 +80,11 @@ pub(super) struct SaidOfProblem {
 
 /// Reads the shape of `problem`; `None` if there is no readable problem.
 pub(super) fn said(bytes: &[u8]) -> Option<SaidOfProblem> {
-    decode::object(bytes).ok().map(|Said { problem }| problem)
+    decode::object(bytes).ok().map(|AdviseShape { problem }| problem)
 }
 
 /// Decodes the request; the horizon defaults to 1.
-fn question(bytes: &[u8]) -> Result<AdviseQuestion, Problem> {
+fn question(bytes: &[u8]) -> Result<AdviseQuestion, ProblemDocument> {
     let Some(problem) = said(bytes) else { return Ok(AdviseQuestion::Asset(decode::object(bytes)?)) };
     if problem.assets.is_some() {
         return Ok(AdviseQuestion::Assets(decode::object(bytes)?));

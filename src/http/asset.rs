@@ -6,7 +6,7 @@ use axum::response::{AppendHeaders, IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
 use super::bodies::Embedded;
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 
 pub const HTML: &str = "text/html; charset=utf-8";
 pub const SCRIPT: &str = "text/javascript; charset=utf-8";
@@ -44,9 +44,9 @@ impl Asset {
     ///
     /// # Errors
     /// There is no such file.
-    pub fn find(files: &'static [Asset], name: &str, page: &str) -> Result<&'static Asset, Problem> {
+    pub fn find(files: &'static [Asset], name: &str, page: &str) -> Result<&'static Asset, ProblemDocument> {
         files.iter().find(|asset| asset.name == name).ok_or_else(|| {
-            let problem = Problem::new(ProblemKind::NotFound, format!("{page} has no file {name}"));
+            let problem = ProblemDocument::new(ProblemKind::NotFound, format!("{page} has no file {name}"));
             problem.naming("file", name, format!("must be a file of {page}"))
         })
     }

@@ -7,11 +7,11 @@ use axum::response::Response;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::access::{By, Read};
+use super::access::{CallerOf, ReadCalls};
 use super::bodies;
 use super::extract::Parameters;
 use super::page::{self, Page};
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use crate::service::Service;
 use crate::service::memory::Large;
 use crate::store::{AuditFilter, AuditRow};
@@ -19,7 +19,7 @@ use crate::store::{AuditFilter, AuditRow};
 /// Query parameters, as text.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ask {
+pub struct AuditQuery {
     limit: Option<String>,
     after: Option<String>,
     tenant: Option<String>,
@@ -84,16 +84,16 @@ impl From<AuditRow> for AuditEntry {
            ("object" = Option<String>, Query, description = "What was done to this session, job, policy or key alone; a session's observations are shown among it on the first page.")),
     responses(
         (status = 200, description = "A page of the audit.", body = AuditPage),
-        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(_admin, _): By<Read>,
-    Parameters(ask): Parameters<Ask>,
-) -> Result<Response, Problem> {
+    CallerOf(_admin, _): CallerOf<ReadCalls>,
+    Parameters(ask): Parameters<AuditQuery>,
+) -> Result<Response, ProblemDocument> {
     let (limit, after) = Page::new(ask.limit, ask.after).bounds()?;
     let room = service.room_for(page::bytes(limit)).await?;
     let tenant = ask.tenant.map(|name| name.parse()).transpose();
-    let tenant = tenant.map_err(|error| Problem::of_field(ProblemKind::InvalidQuery, error))?;
+    let tenant = tenant.map_err(|error| ProblemDocument::of_field(ProblemKind::InvalidQuery, error))?;
     let rows = service.audit.list(&AuditFilter { tenant, object: ask.object }, limit, after).await?;
     let mut entries = rows.iter().filter(|row| row.sequence > 0);
     let next = page::next(entries.clone().count(), limit, entries.next_back().map(|row| row.sequence));

@@ -8,11 +8,11 @@ use axum::response::Response;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use super::access::{By, Heavy};
+use super::access::{CallerOf, HeavyCalls};
 use super::decode;
 use super::extract::JsonBytes;
 use super::jobs::{Queueing, accepted, idempotency_key};
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use crate::control::request::backtest_assets::BacktestQuestion;
 use crate::service::Service;
 
@@ -29,24 +29,24 @@ use crate::service::Service;
     responses(Queueing))]
 pub async fn backtest(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     headers: HeaderMap,
     body: JsonBytes,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let asked = body.decoded(question).await?;
     Ok(accepted(service.jobs.backtest(&caller, asked, idempotency_key(&headers)?).await?))
 }
 
 /// The part of a request that shows if it names assets.
 #[derive(Deserialize)]
-struct Said {
+struct BacktestShape {
     assets: Option<IgnoredAny>,
 }
 
 /// Decodes the request by its shape, so that an error names the right field.
-fn question(bytes: &[u8]) -> Result<BacktestQuestion, Problem> {
+fn question(bytes: &[u8]) -> Result<BacktestQuestion, ProblemDocument> {
     match decode::object(bytes) {
-        Ok(Said { assets: Some(_) }) => decode::object(bytes).map(BacktestQuestion::Assets),
+        Ok(BacktestShape { assets: Some(_) }) => decode::object(bytes).map(BacktestQuestion::Assets),
         _ => decode::object(bytes).map(BacktestQuestion::Asset),
     }
 }

@@ -16,7 +16,7 @@ use futures_util::stream;
 use serde::Serialize;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use crate::service::Service;
 use crate::service::error::ServiceError;
 use crate::service::memory::{Large, UNIT};
@@ -44,7 +44,7 @@ impl Bodies {
     ///
     /// # Errors
     /// The bodies under way leave too little.
-    pub fn admit(&self, request: &Request, limit: usize) -> Result<Option<OwnedSemaphorePermit>, Problem> {
+    pub fn admit(&self, request: &Request, limit: usize) -> Result<Option<OwnedSemaphorePermit>, ProblemDocument> {
         let header = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
         let declared = header(header::CONTENT_LENGTH.as_str()).and_then(|length| length.parse::<usize>().ok());
         let is_stream = header(header::TRANSFER_ENCODING.as_str()).is_some();
@@ -56,7 +56,7 @@ impl Bodies {
         self.room.clone().try_acquire_many_owned(units).map(Some).map_err(|_| {
             let detail = format!("bodies under way leave no room for {bytes} more bytes");
             let rule = format!("must fit, with those of other calls under way, into {} bytes", self.bytes);
-            Problem::new(ProblemKind::Overloaded, detail).naming("body", bytes, rule)
+            ProblemDocument::new(ProblemKind::Overloaded, detail).naming("body", bytes, rule)
         })
     }
 }
@@ -69,11 +69,11 @@ impl Bodies {
 pub async fn written<T: Serialize + Send + 'static>(
     service: &Service,
     Large { value, room }: Large<T>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let room = match room {
         Some(room) => room,
         None => {
-            let mut start = Start { bytes: Vec::new(), length: 0 };
+            let mut start = CountingWriter { bytes: Vec::new(), length: 0 };
             serde_json::to_writer(&mut start, &value).map_err(ServiceError::internal)?;
             match service.room_for(start.length).await? {
                 Some(room) => room,
@@ -91,7 +91,7 @@ pub async fn written<T: Serialize + Send + 'static>(
 ///
 /// # Errors
 /// Other large answers leave too little memory.
-pub async fn recorded(service: &Service, json: String) -> Result<Response, Problem> {
+pub async fn recorded(service: &Service, json: String) -> Result<Response, ProblemDocument> {
     Ok(match service.room_for(json.len()).await? {
         Some(room) => sent(Large { value: json.into_bytes(), room: Some(room) }),
         None => as_json(json.into_bytes()),
@@ -103,12 +103,12 @@ fn as_json(bytes: Vec<u8>) -> Response {
 }
 
 /// A writer that keeps the bytes as long as they are few, and counts all of them.
-struct Start {
+struct CountingWriter {
     bytes: Vec<u8>,
     length: usize,
 }
 
-impl io::Write for Start {
+impl io::Write for CountingWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.length += bytes.len();
         if self.length <= UNIT {
@@ -141,7 +141,7 @@ pub async fn budgeted(service: &Service, response: Response) -> Response {
     let made = async {
         let room = service.room_for(bytes).await?;
         let value = to_bytes(body, bytes).await.map_err(ServiceError::internal)?.to_vec();
-        Ok::<_, Problem>(sent(Large { value, room }))
+        Ok::<_, ProblemDocument>(sent(Large { value, room }))
     };
     match made.await {
         Ok(late) => Response::from_parts(head, late.into_body()),

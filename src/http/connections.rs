@@ -20,7 +20,7 @@ use tokio::sync::Notify;
 
 /// Limits on the number of connections.
 #[derive(Debug, Clone, Copy)]
-pub struct Bounds {
+pub struct ConnectionLimits {
     pub all: usize,
     /// Most connections of one address.
     pub of_address: usize,
@@ -30,7 +30,7 @@ pub struct Bounds {
 
 /// The activity of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
+pub enum ConnectionPhase {
     /// Waits for a request, or for the client to take the end of an answer.
     Waiting,
     /// Has a request whose body has not fully arrived.
@@ -43,28 +43,34 @@ pub enum Phase {
     Closed,
 }
 
-impl Phase {
+impl ConnectionPhase {
     /// All phases, in the order in which they are closed to make room; the last two never are.
-    pub const ALL: [Phase; 5] = [Phase::Waiting, Phase::Receiving, Phase::Streaming, Phase::Working, Phase::Closed];
+    pub const ALL: [ConnectionPhase; 5] = [
+        ConnectionPhase::Waiting,
+        ConnectionPhase::Receiving,
+        ConnectionPhase::Streaming,
+        ConnectionPhase::Working,
+        ConnectionPhase::Closed,
+    ];
 
     pub fn name(self) -> &'static str {
         match self {
-            Phase::Waiting => "waiting",
-            Phase::Receiving => "receiving",
-            Phase::Streaming => "streaming",
-            Phase::Working => "working",
-            Phase::Closed => "closed",
+            ConnectionPhase::Waiting => "waiting",
+            ConnectionPhase::Receiving => "receiving",
+            ConnectionPhase::Streaming => "streaming",
+            ConnectionPhase::Working => "working",
+            ConnectionPhase::Closed => "closed",
         }
     }
 
     fn gives_way(self) -> bool {
-        matches!(self, Phase::Waiting | Phase::Receiving | Phase::Streaming)
+        matches!(self, ConnectionPhase::Waiting | ConnectionPhase::Receiving | ConnectionPhase::Streaming)
     }
 }
 
 /// The requests that a connection may make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum AllowedRequests {
     Any,
     /// One request to a probe.
     Probes,
@@ -73,8 +79,8 @@ pub enum Place {
 /// One connection. Its phase and the time of its last change are packed in one number, so that closing it to make room
 /// and beginning a request on it cannot both succeed.
 #[derive(Debug)]
-pub struct Connection {
-    pub place: Place,
+pub struct TrackedConnection {
+    pub place: AllowedRequests,
     number: u64,
     opened: Instant,
     /// Milliseconds since `opened`, shifted by [`PHASE_BITS`], and the phase.
@@ -86,10 +92,10 @@ pub struct Connection {
 
 const PHASE_BITS: u32 = 3;
 
-impl Connection {
-    fn new(number: u64, place: Place) -> Arc<Self> {
-        let (state, requests) = (AtomicU64::new(Phase::Waiting as u64), AtomicU64::new(0));
-        Arc::new(Connection {
+impl TrackedConnection {
+    fn new(number: u64, place: AllowedRequests) -> Arc<Self> {
+        let (state, requests) = (AtomicU64::new(ConnectionPhase::Waiting as u64), AtomicU64::new(0));
+        Arc::new(TrackedConnection {
             place,
             number,
             opened: Instant::now(),
@@ -100,18 +106,18 @@ impl Connection {
         })
     }
 
-    fn packed(&self, phase: Phase) -> u64 {
+    fn packed(&self, phase: ConnectionPhase) -> u64 {
         let milliseconds = u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX >> PHASE_BITS);
         milliseconds << PHASE_BITS | phase as u64
     }
 
-    fn unpacked(&self) -> (u64, Phase, Instant) {
+    fn unpacked(&self) -> (u64, ConnectionPhase, Instant) {
         let state = self.state.load(Ordering::Acquire);
-        let phase = Phase::ALL[(state & ((1 << PHASE_BITS) - 1)) as usize];
+        let phase = ConnectionPhase::ALL[(state & ((1 << PHASE_BITS) - 1)) as usize];
         (state, phase, self.opened + Duration::from_millis(state >> PHASE_BITS))
     }
 
-    pub fn phase(&self) -> Phase {
+    pub fn phase(&self) -> ConnectionPhase {
         self.unpacked().1
     }
 
@@ -131,24 +137,24 @@ impl Connection {
 
     /// Begins a request, in the phase `to`; returns true if the connection is still open.
     #[must_use]
-    pub fn begin(&self, to: Phase) -> bool {
+    pub fn begin(&self, to: ConnectionPhase) -> bool {
         self.requests.fetch_add(1, Ordering::Relaxed);
-        self.change(|phase| (phase != Phase::Closed).then_some(to))
+        self.change(|phase| (phase != ConnectionPhase::Closed).then_some(to))
     }
 
     /// Records that the body of the request is complete.
     pub fn received(&self) {
-        self.change(|phase| (phase == Phase::Receiving).then_some(Phase::Working));
+        self.change(|phase| (phase == ConnectionPhase::Receiving).then_some(ConnectionPhase::Working));
     }
 
     /// Records that the answer is a stream of events.
     pub fn stream(&self) {
-        self.change(|phase| (phase != Phase::Closed).then_some(Phase::Streaming));
+        self.change(|phase| (phase != ConnectionPhase::Closed).then_some(ConnectionPhase::Streaming));
     }
 
     /// Records that the answer was sent.
     pub fn rest(&self) {
-        self.change(|phase| (phase != Phase::Closed).then_some(Phase::Waiting));
+        self.change(|phase| (phase != ConnectionPhase::Closed).then_some(ConnectionPhase::Waiting));
     }
 
     /// Records that the answer came before the request was fully read.
@@ -162,10 +168,10 @@ impl Connection {
 
     /// Records that the client read something.
     pub fn taken(&self) {
-        self.change(|phase| (phase == Phase::Waiting).then_some(Phase::Waiting));
+        self.change(|phase| (phase == ConnectionPhase::Waiting).then_some(ConnectionPhase::Waiting));
     }
 
-    fn change(&self, next: impl Fn(Phase) -> Option<Phase>) -> bool {
+    fn change(&self, next: impl Fn(ConnectionPhase) -> Option<ConnectionPhase>) -> bool {
         loop {
             let (state, phase, _) = self.unpacked();
             let Some(next) = next(phase) else { return false };
@@ -179,7 +185,7 @@ impl Connection {
 
     /// Closes the connection to make room, unless its state has changed since `looked_at`.
     fn give_way(&self, looked_at: u64) -> bool {
-        let closed = self.packed(Phase::Closed);
+        let closed = self.packed(ConnectionPhase::Closed);
         let gives = self.state.compare_exchange(looked_at, closed, Ordering::AcqRel, Ordering::Acquire).is_ok();
         if gives {
             self.gave_way.notify_one();
@@ -195,64 +201,64 @@ impl Connection {
 
 /// All connections of a listener.
 pub struct Connections {
-    bounds: Bounds,
-    table: Mutex<Table>,
+    bounds: ConnectionLimits,
+    table: Mutex<ConnectionTable>,
 }
 
 #[derive(Default)]
-struct Table {
+struct ConnectionTable {
     next: u64,
     count: usize,
-    by_address: HashMap<IpAddr, Vec<Arc<Connection>>>,
-    probing: Vec<Arc<Connection>>,
+    by_address: HashMap<IpAddr, Vec<Arc<TrackedConnection>>>,
+    probing: Vec<Arc<TrackedConnection>>,
 }
 
 /// A connection's slot in the table, released when dropped.
-pub struct Held {
-    pub connection: Arc<Connection>,
+pub struct ConnectionGuard {
+    pub connection: Arc<TrackedConnection>,
     address: IpAddr,
     connections: Arc<Connections>,
 }
 
-impl Drop for Held {
+impl Drop for ConnectionGuard {
     fn drop(&mut self) {
         self.connections.lock().remove(self.address, &self.connection);
     }
 }
 
 impl Connections {
-    pub fn new(bounds: Bounds) -> Arc<Self> {
+    pub fn new(bounds: ConnectionLimits) -> Arc<Self> {
         Arc::new(Connections { bounds, table: Mutex::default() })
     }
 
     /// Adds a connection from `address`; `None` if every slot is busy with a call, including those for probes.
-    pub fn place(self: &Arc<Self>, address: IpAddr) -> Option<Held> {
+    pub fn place(self: &Arc<Self>, address: IpAddr) -> Option<ConnectionGuard> {
         let address = subscriber(address);
         let connection = self.lock().placed(address, &self.bounds)?;
-        Some(Held { connection, address, connections: self.clone() })
+        Some(ConnectionGuard { connection, address, connections: self.clone() })
     }
 
     /// Counts the connections in each phase.
-    pub fn count(&self) -> [(Phase, usize); 5] {
+    pub fn count(&self) -> [(ConnectionPhase, usize); 5] {
         let table = self.lock();
         let all = || table.by_address.values().flatten().chain(&table.probing);
-        Phase::ALL.map(|phase| (phase, all().filter(|connection| connection.phase() == phase).count()))
+        ConnectionPhase::ALL.map(|phase| (phase, all().filter(|connection| connection.phase() == phase).count()))
     }
 
-    fn lock(&self) -> MutexGuard<'_, Table> {
+    fn lock(&self) -> MutexGuard<'_, ConnectionTable> {
         // No code panics while holding the lock.
         self.table.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Table {
-    fn placed(&mut self, address: IpAddr, bounds: &Bounds) -> Option<Arc<Connection>> {
+impl ConnectionTable {
+    fn placed(&mut self, address: IpAddr, bounds: &ConnectionLimits) -> Option<Arc<TrackedConnection>> {
         let own = self.by_address.get(&address).map_or(0, Vec::len);
         let has_room =
             (own < bounds.of_address || self.make_room_at(address)) && (self.count < bounds.all || self.make_room());
         self.next += 1;
         if has_room {
-            let connection = Connection::new(self.next, Place::Any);
+            let connection = TrackedConnection::new(self.next, AllowedRequests::Any);
             self.by_address.entry(address).or_default().push(connection.clone());
             self.count += 1;
             return Some(connection);
@@ -261,7 +267,7 @@ impl Table {
             let oldest = longest_waiting(self.probing.iter())?;
             self.probing.retain(|other| other.number != oldest.number);
         }
-        let connection = Connection::new(self.next, Place::Probes);
+        let connection = TrackedConnection::new(self.next, AllowedRequests::Probes);
         self.probing.push(connection.clone());
         Some(connection)
     }
@@ -282,8 +288,8 @@ impl Table {
         addresses.into_iter().any(|address| self.make_room_at(address))
     }
 
-    fn remove(&mut self, address: IpAddr, connection: &Connection) -> bool {
-        if connection.place == Place::Probes {
+    fn remove(&mut self, address: IpAddr, connection: &TrackedConnection) -> bool {
+        if connection.place == AllowedRequests::Probes {
             self.probing.retain(|other| other.number != connection.number);
             return true;
         }
@@ -299,7 +305,9 @@ impl Table {
 }
 
 /// Closes one of the connections and returns it: the first in the order of phases, then of time.
-fn longest_waiting<'a>(among: impl Iterator<Item = &'a Arc<Connection>> + Clone) -> Option<Arc<Connection>> {
+fn longest_waiting<'a>(
+    among: impl Iterator<Item = &'a Arc<TrackedConnection>> + Clone,
+) -> Option<Arc<TrackedConnection>> {
     // The chosen connection may begin a request at the same moment; then another is chosen.
     const TRIES: usize = 8;
     (0..TRIES).find_map(|_| {
@@ -326,7 +334,7 @@ mod tests {
     }
 
     fn table(all: usize, of_address: usize, for_probes: usize) -> Arc<Connections> {
-        Connections::new(Bounds { all, of_address, for_probes })
+        Connections::new(ConnectionLimits { all, of_address, for_probes })
     }
 
     fn later() {
@@ -343,12 +351,15 @@ mod tests {
         let second = table.place(address(1)).unwrap();
         later();
         // The first was used again, so now the second has waited longest.
-        assert!(first.connection.begin(Phase::Working));
+        assert!(first.connection.begin(ConnectionPhase::Working));
         first.connection.rest();
         let third = table.place(address(1)).unwrap();
         let phases = [&stranger, &first, &second, &third].map(|held| held.connection.phase());
-        assert_eq!(phases, [Phase::Waiting, Phase::Waiting, Phase::Closed, Phase::Waiting]);
-        assert!(!second.connection.begin(Phase::Working), "what gave way answers nothing more");
+        assert_eq!(
+            phases,
+            [ConnectionPhase::Waiting, ConnectionPhase::Waiting, ConnectionPhase::Closed, ConnectionPhase::Waiting]
+        );
+        assert!(!second.connection.begin(ConnectionPhase::Working), "what gave way answers nothing more");
     }
 
     #[test]
@@ -356,10 +367,10 @@ mod tests {
         let table = table(4, 4, 0);
         let rare = table.place(address(1)).unwrap();
         later();
-        let crowd: Vec<Held> = (0..3).map(|_| table.place(address(2)).unwrap()).collect();
+        let crowd: Vec<ConnectionGuard> = (0..3).map(|_| table.place(address(2)).unwrap()).collect();
         let _new = table.place(address(3)).unwrap();
-        assert_eq!(rare.connection.phase(), Phase::Waiting);
-        assert_eq!(crowd.iter().filter(|held| held.connection.phase() == Phase::Closed).count(), 1);
+        assert_eq!(rare.connection.phase(), ConnectionPhase::Waiting);
+        assert_eq!(crowd.iter().filter(|held| held.connection.phase() == ConnectionPhase::Closed).count(), 1);
         drop(crowd);
         assert_eq!(table.lock().count, 2, "each place is given up once");
     }
@@ -367,22 +378,25 @@ mod tests {
     #[test]
     fn bodies_to_come_give_way_before_streams_and_work_never_does() {
         let table = table(3, 3, 1);
-        let held: Vec<Held> = (0..3).map(|_| table.place(address(1)).unwrap()).collect();
-        assert!(held[0].connection.begin(Phase::Working));
+        let held: Vec<ConnectionGuard> = (0..3).map(|_| table.place(address(1)).unwrap()).collect();
+        assert!(held[0].connection.begin(ConnectionPhase::Working));
         held[0].connection.stream();
-        assert!(held[1].connection.begin(Phase::Receiving));
-        assert!(held[2].connection.begin(Phase::Working));
+        assert!(held[1].connection.begin(ConnectionPhase::Receiving));
+        assert!(held[2].connection.begin(ConnectionPhase::Working));
         let fourth = table.place(address(1)).unwrap();
-        assert!(fourth.connection.begin(Phase::Working));
+        assert!(fourth.connection.begin(ConnectionPhase::Working));
         let fifth = table.place(address(1)).unwrap();
-        assert!(fifth.connection.begin(Phase::Working));
-        let phases: Vec<Phase> = held.iter().map(|held| held.connection.phase()).collect();
-        assert_eq!(phases, [Phase::Closed, Phase::Closed, Phase::Working]);
+        assert!(fifth.connection.begin(ConnectionPhase::Working));
+        let phases: Vec<ConnectionPhase> = held.iter().map(|held| held.connection.phase()).collect();
+        assert_eq!(phases, [ConnectionPhase::Closed, ConnectionPhase::Closed, ConnectionPhase::Working]);
         let probe = table.place(address(1)).unwrap();
-        assert_eq!((fifth.connection.place, probe.connection.place), (Place::Any, Place::Probes));
+        assert_eq!((fifth.connection.place, probe.connection.place), (AllowedRequests::Any, AllowedRequests::Probes));
         let next = table.place(address(1)).unwrap();
-        assert_eq!((probe.connection.phase(), next.connection.place), (Phase::Closed, Place::Probes));
-        assert!(next.connection.begin(Phase::Working));
+        assert_eq!(
+            (probe.connection.phase(), next.connection.place),
+            (ConnectionPhase::Closed, AllowedRequests::Probes)
+        );
+        assert!(next.connection.begin(ConnectionPhase::Working));
         assert!(table.place(address(1)).is_none(), "every place is worked on");
     }
 

@@ -22,9 +22,9 @@ use thiserror::Error;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tower::Service;
 
-use super::connections::{Connection, Held, Phase, Place};
+use super::connections::{AllowedRequests, ConnectionGuard, ConnectionPhase, TrackedConnection};
 use super::patient::{Patience, Patient};
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use crate::service::shutdown::Shutdown;
 
 /// Size limit of a request head: it is refused if it is incomplete after so many bytes plus one read of as many. hyper
@@ -56,7 +56,7 @@ struct GaveWay;
 /// Serves `stream` until it ends, must close to make room, or the service stops.
 pub async fn hold<S>(
     stream: S,
-    held: &Held,
+    held: &ConnectionGuard,
     local: SocketAddr,
     patience: Patience,
     application: Router,
@@ -89,7 +89,7 @@ pub async fn hold<S>(
 }
 
 /// Resolves at the shutdown if there was no request: hyper waits for a first request before it ends a connection.
-async fn unused_at_the_end(shutdown: &Shutdown, connection: &Connection) {
+async fn unused_at_the_end(shutdown: &Shutdown, connection: &TrackedConnection) {
     shutdown.begun().await;
     if connection.requests() > 0 {
         std::future::pending().await
@@ -97,14 +97,14 @@ async fn unused_at_the_end(shutdown: &Shutdown, connection: &Connection) {
 }
 
 async fn answer(
-    (connection, shutdown): (Arc<Connection>, Shutdown),
+    (connection, shutdown): (Arc<TrackedConnection>, Shutdown),
     local: SocketAddr,
     patience: Patience,
     mut application: Router,
     request: hyper::Request<Incoming>,
 ) -> Result<Response, GaveWay> {
     let receives = !request.body().is_end_stream();
-    if !connection.begin(if receives { Phase::Receiving } else { Phase::Working }) {
+    if !connection.begin(if receives { ConnectionPhase::Receiving } else { ConnectionPhase::Working }) {
         return Err(GaveWay);
     }
     let small = is_small(request.headers(), request.body());
@@ -112,11 +112,12 @@ async fn answer(
     let inbox = Arc::new(Mutex::new(body));
     let path = parts.uri.path().to_owned();
     let mut request =
-        Request::from_parts(parts, Body::new(Reading { inbox: inbox.clone(), connection: connection.clone() }));
+        Request::from_parts(parts, Body::new(BodyReading { inbox: inbox.clone(), connection: connection.clone() }));
     request.extensions_mut().insert(LocalAddress(local));
     let mut response = match connection.place {
-        Place::Probes if !PROBES.contains(&path.as_str()) => {
-            Problem::new(ProblemKind::Overloaded, "as many calls are under way as may be at a time").into_response()
+        AllowedRequests::Probes if !PROBES.contains(&path.as_str()) => {
+            ProblemDocument::new(ProblemKind::Overloaded, "as many calls are under way as may be at a time")
+                .into_response()
         }
         _ => application.call(request).await.unwrap_or_else(|never: Infallible| match never {}),
     };
@@ -125,7 +126,7 @@ async fn answer(
         connection.leave();
     }
     let is_old = connection.requests() >= patience.requests || connection.age() >= patience.age;
-    if !is_whole || is_old || shutdown.is_announced() || connection.place == Place::Probes {
+    if !is_whole || is_old || shutdown.is_announced() || connection.place == AllowedRequests::Probes {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     } else {
         let keep_alive = HeaderValue::from_str(&format!("timeout={}", patience.between.as_secs()));
@@ -171,13 +172,13 @@ impl hyper::body::Body for Rest {
     }
 }
 
-/// The body of a request as the application reads it; its end ends the phase [`Phase::Receiving`].
-struct Reading {
+/// The body of a request as the application reads it; its end ends the phase [`ConnectionPhase::Receiving`].
+struct BodyReading {
     inbox: Arc<Mutex<Incoming>>,
-    connection: Arc<Connection>,
+    connection: Arc<TrackedConnection>,
 }
 
-impl hyper::body::Body for Reading {
+impl hyper::body::Body for BodyReading {
     type Data = Bytes;
     type Error = hyper::Error;
 
@@ -202,7 +203,7 @@ impl hyper::body::Body for Reading {
 /// The body of an answer; its connection returns to waiting when it is dropped.
 struct Writing {
     body: Body,
-    connection: Arc<Connection>,
+    connection: Arc<TrackedConnection>,
 }
 
 impl Drop for Writing {
@@ -239,7 +240,7 @@ mod tests {
     use hyper_util::server::graceful::GracefulShutdown;
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
-    use super::super::connections::{Bounds, Connections};
+    use super::super::connections::{ConnectionLimits, Connections};
     use super::*;
 
     const LONG: Duration = Duration::from_secs(60);
@@ -250,7 +251,7 @@ mod tests {
         let patience =
             Patience { to_read: LONG, for_head: LONG, between: LONG, to_finish: LONG, left_bytes: 64, requests, age };
         tokio::spawn(async move {
-            let connections = Connections::new(Bounds { all: 1, of_address: 1, for_probes: 0 });
+            let connections = Connections::new(ConnectionLimits { all: 1, of_address: 1, for_probes: 0 });
             let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
             let graceful = GracefulShutdown::new();
             let stopping = Stopping { shutdown: Shutdown::new(), watcher: graceful.watcher() };

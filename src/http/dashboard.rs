@@ -14,7 +14,7 @@ use super::asset::{Asset, HTML, SCRIPT, STYLE, TEXT};
 use super::documentation::Published;
 use super::extract::Id;
 use super::operations;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
     font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
@@ -155,7 +155,7 @@ fn wants_json(headers: &HeaderMap) -> bool {
     responses(
         (status = 200, description = "The file.", body = String, content_type = "text/javascript"),
         (status = 304, description = "The file is the one that `If-None-Match` names."),
-        (status = 404, description = "There is no such file.", body = Problem, content_type = "application/problem+json")))]
-pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
+        (status = 404, description = "There is no such file.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
     Ok(Asset::find(&ASSETS, &name, "the dashboard")?.served(CONTENT_SECURITY_POLICY, &headers))
 }

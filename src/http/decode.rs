@@ -9,7 +9,7 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 use serde_path_to_error::{Path, Segment};
 
-use super::problem::{Problem, ProblemKind, SHOWN_VALUE, shortened};
+use super::problem::{ProblemDocument, ProblemKind, SHOWN_VALUE, shortened};
 use crate::control::error::FieldError;
 
 /// Explanations of required fields for which no default is right for everybody.
@@ -20,7 +20,7 @@ const MEANT: [(&str, &str); 1] = [(
 
 /// Parses a JSON body. Refuses NaN, infinities, numbers beyond double precision, unknown fields (if the type does),
 /// trailing bytes and nesting deeper than 128.
-pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ProblemDocument> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     match serde_path_to_error::deserialize(&mut reader) {
         Err(error) if error.inner().is_data() => {
@@ -38,22 +38,22 @@ pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
 }
 
 /// Parses a JSON body as [`json`] does, but rejects a list, which serde would read as the fields in their order.
-pub fn object<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+pub fn object<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ProblemDocument> {
     if bytes.trim_ascii_start().starts_with(b"[") {
         json::<IgnoredAny>(bytes)?;
         let error = FieldError::new("body", at(bytes, "").unwrap_or_default(), "must be an object");
-        return Err(Problem::of_field(ProblemKind::InvalidField, error));
+        return Err(ProblemDocument::of_field(ProblemKind::InvalidField, error));
     }
     json(bytes)
 }
 
 /// Reads the parameters of a query string; all of them are text.
-pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T, Problem> {
+pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T, ProblemDocument> {
     let mut object = serde_json::Map::new();
     for (name, value) in pairs {
         if object.contains_key(&name) {
             let error = FieldError::new(name, value, "must be given once");
-            return Err(Problem::of_field(ProblemKind::InvalidQuery, error));
+            return Err(ProblemDocument::of_field(ProblemKind::InvalidQuery, error));
         }
         object.insert(name, Value::String(value));
     }
@@ -61,7 +61,7 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
     serde_path_to_error::deserialize(Value::Object(object)).map_err(|error| {
         let (path, message) = (dotted(error.path()), error.into_inner().to_string());
         let value_of = |field: &str| given.get(field).map(Value::to_string);
-        Problem::of_field(ProblemKind::InvalidQuery, located(value_of, path, &message))
+        ProblemDocument::of_field(ProblemKind::InvalidQuery, located(value_of, path, &message))
     })
 }
 
@@ -103,14 +103,14 @@ fn whole(number: &[u8]) -> &[u8] {
 }
 
 /// Returns the problem of valid JSON of the wrong shape.
-fn mismatch(bytes: &[u8], path: String, cause: &serde_json::Error) -> Problem {
+fn mismatch(bytes: &[u8], path: String, cause: &serde_json::Error) -> ProblemDocument {
     let value_of = |field: &str| at(bytes, field);
-    Problem::of_field(ProblemKind::InvalidField, located(value_of, path, &without_position(cause)))
+    ProblemDocument::of_field(ProblemKind::InvalidField, located(value_of, path, &without_position(cause)))
 }
 
 /// Returns the problem if the body is valid JSON after all. The parser reports an extra element like an extra byte, and
 /// a list instead of a word, as a syntax error.
-fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Problem> {
+fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<ProblemDocument> {
     const ELEMENT_TOO_MANY: &str = "trailing characters";
     const NO_NUMBER: &str = "number out of range";
     let message = without_position(cause);
@@ -125,7 +125,7 @@ fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Prob
         expected => format!("must have another type: {expected}"),
     };
     let field = if path.is_empty() { "body" } else { path };
-    Some(Problem::of_field(ProblemKind::InvalidField, FieldError::new(field, value, rule)))
+    Some(ProblemDocument::of_field(ProblemKind::InvalidField, FieldError::new(field, value, rule)))
 }
 
 /// Names the field that a serde message is about: unknown and missing fields appear in the message, not in the path.
@@ -151,10 +151,10 @@ fn located(value_of: impl Fn(&str) -> Option<String>, path: String, message: &st
 }
 
 /// Returns the problem of text that is not JSON; it shows the token at which the parser stopped.
-fn syntax(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Problem {
+fn syntax(bytes: &[u8], path: &str, cause: &serde_json::Error) -> ProblemDocument {
     let field = if path.is_empty() { "body" } else { path };
     let rule = format!("must be JSON: {} at line {}, column {}", without_position(cause), cause.line(), cause.column());
-    Problem::of_field(ProblemKind::MalformedJson, FieldError::new(field, token(bytes, cause), rule))
+    ProblemDocument::of_field(ProblemKind::MalformedJson, FieldError::new(field, token(bytes, cause), rule))
 }
 
 fn token(bytes: &[u8], cause: &serde_json::Error) -> String {

@@ -11,7 +11,7 @@ use axum::response::Response;
 
 use super::asset::{Asset, HTML, SCRIPT, STYLE};
 use super::extract::Id;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 
 /// The OpenAPI description, as checked in under `api/openapi.json`, for the handlers that publish it. It is made once,
 /// because anybody may request it at any rate.
@@ -56,7 +56,7 @@ pub async fn docs(headers: HeaderMap) -> Response {
     responses(
         (status = 200, description = "The file.", body = String, content_type = "text/javascript"),
         (status = 304, description = "The file is the one that `If-None-Match` names."),
-        (status = 404, description = "There is no such file.", body = Problem, content_type = "application/problem+json")))]
-pub async fn docs_file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
+        (status = 404, description = "There is no such file.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn docs_file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
     Ok(Asset::find(&ASSETS, &name, "the page /docs")?.served(CONTENT_SECURITY_POLICY, &headers))
 }

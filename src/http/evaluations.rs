@@ -6,11 +6,11 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 
-use super::access::{By, Heavy, Read};
+use super::access::{CallerOf, HeavyCalls, ReadCalls};
 use super::bodies;
 use super::extract::{Id, JsonBody};
 use super::jobs::{Queueing, accepted, idempotency_key};
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use super::wire;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::service::Service;
@@ -34,10 +34,10 @@ use crate::service::Service;
     responses(Queueing))]
 pub async fn evaluate(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     headers: HeaderMap,
     JsonBody(request): JsonBody<EvaluationRequest>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     Ok(accepted(service.evaluate(&caller, request, idempotency_key(&headers)?).await?))
 }
 
@@ -45,11 +45,11 @@ pub async fn evaluate(
 #[utoipa::path(get, path = "/jobs/{id}/report", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 200, description = "The report.", body = wire::JobReport),
-        (status = 404, description = "There is no such job, or it has no report.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such job, or it has no report.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn report(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     Ok(bodies::sent(service.jobs.report(&caller.tenant, &id).await?))
 }

@@ -21,9 +21,9 @@ use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use tokio::sync::watch;
 
-use super::access::{By, Read};
+use super::access::{CallerOf, ReadCalls};
 use super::extract::Id;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use super::wire;
 use crate::service::Service;
 use crate::service::allowance::StreamPlace;
@@ -54,13 +54,13 @@ struct JobStream {
     responses(
         (status = 200, description = "Server-sent events, each with the job as JSON; a stream ends after some minutes, to be resumed.", body = String, content_type = "text/event-stream"),
         (status = 204, description = "The terminal state was seen already."),
-        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such job.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn follow(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(job): Id,
     headers: HeaderMap,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     // First of all, because a refused stream must cost the store nothing.
     let place = caller.allowance.stream().map_err(ServiceError::from)?;
     let changes = service.jobs.changes();

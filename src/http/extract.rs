@@ -9,9 +9,9 @@ use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 
 use super::decode;
-use super::problem::{Problem, ProblemKind};
-use crate::service::allowance::HeavyTurn;
-use crate::service::bounded::Bounded;
+use super::problem::{ProblemDocument, ProblemKind};
+use crate::service::allowance::HeavyPermit;
+use crate::service::bounded::FairQueue;
 use crate::service::error::ServiceError;
 use crate::store::Tenant;
 
@@ -19,9 +19,9 @@ use crate::store::Tenant;
 pub struct JsonBody<T>(pub T);
 
 impl<S: Send + Sync, T: DeserializeOwned + Send + 'static> FromRequest<S> for JsonBody<T> {
-    type Rejection = Problem;
+    type Rejection = ProblemDocument;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+    async fn from_request(request: Request, state: &S) -> Result<Self, ProblemDocument> {
         JsonBytes::from_request(request, state).await?.decoded(decode::object).await.map(JsonBody)
     }
 }
@@ -35,7 +35,7 @@ pub struct JsonBytes {
 /// The queue in which a large body is decoded, and its tenant, as the gate passes them to the extractors.
 #[derive(Clone)]
 pub struct LargeBody {
-    pub decoding: Bounded,
+    pub decoding: FairQueue,
     pub tenant: Tenant,
 }
 
@@ -52,8 +52,8 @@ impl JsonBytes {
     /// Those of `decode`, or if no permit came in time.
     pub async fn decoded<T: Send + 'static>(
         self,
-        decode: impl FnOnce(&[u8]) -> Result<T, Problem> + Send + 'static,
-    ) -> Result<T, Problem> {
+        decode: impl FnOnce(&[u8]) -> Result<T, ProblemDocument> + Send + 'static,
+    ) -> Result<T, ProblemDocument> {
         let JsonBytes { bytes, large } = self;
         match large {
             None => decode(&bytes),
@@ -64,16 +64,16 @@ impl JsonBytes {
 
 /// The permits of a heavy call, to be taken once its body is read.
 #[derive(Clone)]
-pub struct AfterBody(pub Arc<HeavyTurn>);
+pub struct AfterBody(pub Arc<HeavyPermit>);
 
 /// Largest body allowed, in bytes, as the gate passes it to the extractors.
 #[derive(Debug, Clone, Copy)]
 pub struct BodyLimit(pub usize);
 
 impl<S: Send + Sync> FromRequest<S> for JsonBytes {
-    type Rejection = Problem;
+    type Rejection = ProblemDocument;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+    async fn from_request(request: Request, state: &S) -> Result<Self, ProblemDocument> {
         refuse_other_media(request.headers())?;
         refuse_encoded(request.headers())?;
         let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
@@ -86,9 +86,9 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
             match rejection.status() {
                 StatusCode::PAYLOAD_TOO_LARGE => {
                     let rule = format!("must hold at most {limit} bytes");
-                    Problem::new(ProblemKind::BodyTooLarge, rejection.body_text()).naming("body", size, rule)
+                    ProblemDocument::new(ProblemKind::BodyTooLarge, rejection.body_text()).naming("body", size, rule)
                 }
-                _ => Problem::new(ProblemKind::MalformedJson, rejection.body_text()).naming(
+                _ => ProblemDocument::new(ProblemKind::MalformedJson, rejection.body_text()).naming(
                     "body",
                     size,
                     "must arrive complete",
@@ -102,22 +102,23 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
     }
 }
 
-fn refuse_other_media(headers: &HeaderMap) -> Result<(), Problem> {
+fn refuse_other_media(headers: &HeaderMap) -> Result<(), ProblemDocument> {
     let declared = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or("");
     let media = declared.split(';').next().unwrap_or("").trim().to_ascii_lowercase();
     if media == "application/json" || (media.starts_with("application/") && media.ends_with("+json")) {
         return Ok(());
     }
     let detail = format!("the content-type is '{declared}'; it must be application/json");
-    let problem = Problem::new(ProblemKind::UnsupportedMediaType, detail);
+    let problem = ProblemDocument::new(ProblemKind::UnsupportedMediaType, detail);
     Err(problem.naming("content-type", declared, "must be application/json"))
 }
 
 /// Rejects an encoded body, because nothing here decodes one: it would be misread.
-fn refuse_encoded(headers: &HeaderMap) -> Result<(), Problem> {
+fn refuse_encoded(headers: &HeaderMap) -> Result<(), ProblemDocument> {
     let mut encodings = headers.get_all(header::CONTENT_ENCODING).iter().map(|value| value.to_str().unwrap_or("?"));
     let Some(encoding) = encodings.find(|encoding| !encoding.eq_ignore_ascii_case("identity")) else { return Ok(()) };
-    let problem = Problem::new(ProblemKind::UnsupportedMediaType, "the body is encoded, and is taken as it is only");
+    let problem =
+        ProblemDocument::new(ProblemKind::UnsupportedMediaType, "the body is encoded, and is taken as it is only");
     Err(problem.naming("content-encoding", encoding, "must be absent"))
 }
 
@@ -125,13 +126,13 @@ fn refuse_encoded(headers: &HeaderMap) -> Result<(), Problem> {
 pub struct Parameters<T>(pub T);
 
 impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Parameters<T> {
-    type Rejection = Problem;
+    type Rejection = ProblemDocument;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ProblemDocument> {
         let query = parts.uri.query().unwrap_or_default().to_owned();
         let Query(pairs) =
             Query::<Vec<(String, String)>>::from_request_parts(parts, state).await.map_err(|rejection| {
-                let problem = Problem::new(ProblemKind::InvalidQuery, rejection.body_text());
+                let problem = ProblemDocument::new(ProblemKind::InvalidQuery, rejection.body_text());
                 problem.naming("query", query, "must be a query string")
             })?;
         decode::parameters(pairs).map(Parameters)
@@ -142,12 +143,12 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Parameters<T> 
 pub struct Id(pub String);
 
 impl<S: Send + Sync> FromRequestParts<S> for Id {
-    type Rejection = Problem;
+    type Rejection = ProblemDocument;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ProblemDocument> {
         let path = parts.uri.path().to_owned();
         let Path(id) = Path::<String>::from_request_parts(parts, state).await.map_err(|rejection| {
-            Problem::new(ProblemKind::NotFound, rejection.body_text()).naming(
+            ProblemDocument::new(ProblemKind::NotFound, rejection.body_text()).naming(
                 "id",
                 path,
                 "must be percent-encoded UTF-8",
@@ -165,11 +166,11 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::service::bounded::Size;
+    use crate::service::bounded::QueueSize;
 
     /// Decodes a large or a small body while no decoding permit is free.
-    async fn decoded(is_large: bool) -> Result<Value, Problem> {
-        let decoding = Bounded::new("decode", Size { first: 0, long: 0 }, Duration::from_millis(1));
+    async fn decoded(is_large: bool) -> Result<Value, ProblemDocument> {
+        let decoding = FairQueue::new("decode", QueueSize { first: 0, long: 0 }, Duration::from_millis(1));
         let request = Request::builder().header(header::CONTENT_TYPE, "application/json");
         let mut request = request.body(Body::from(r#"{"problem": 1}"#)).unwrap();
         if is_large {

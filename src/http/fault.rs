@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::time::Duration;
 
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use super::telemetry;
 use crate::service::allowance::{Refused, TooMany};
 use crate::service::error::ServiceError;
@@ -14,13 +14,13 @@ use crate::store::{OverQuota, Quota, StoreError};
 /// Wait before a tenant whose own work is in the way may call again.
 const OWN_WORK: Duration = Duration::from_secs(1);
 
-impl From<ServiceError> for Problem {
+impl From<ServiceError> for ProblemDocument {
     fn from(error: ServiceError) -> Self {
         use ProblemKind as Kind;
         let detail = error.to_string();
-        let problem = |kind| Problem::new(kind, detail);
+        let problem = |kind| ProblemDocument::new(kind, detail);
         match error {
-            ServiceError::Field(field) => Problem::of_field(Kind::InvalidField, field),
+            ServiceError::Field(field) => ProblemDocument::of_field(Kind::InvalidField, field),
             ServiceError::Unknown { what, id } => {
                 problem(Kind::NotFound).naming(what, id, format!("must name a {what}"))
             }
@@ -49,7 +49,7 @@ impl From<ServiceError> for Problem {
                 let problem = problem(Kind::Unconfirmed);
                 let Some(first) = doubts.first() else { return problem };
                 let named = problem.naming(first.field.clone(), first.value.clone(), first.rule());
-                Problem { doubts: Some(Box::new(Doubts(doubts))), ..named }
+                ProblemDocument { doubts: Some(Box::new(Doubts(doubts))), ..named }
             }
             ServiceError::PastHorizon { given, horizon } => {
                 problem(Kind::SessionCompleted).naming("period", given, format!("must be at most {horizon}"))
@@ -71,7 +71,7 @@ impl From<ServiceError> for Problem {
             }
             // These errors occur at the start, before there are any callers.
             error @ (ServiceError::NobodyAsked { .. } | ServiceError::KeysLost { .. } | ServiceError::KeysRequired) => {
-                Problem::new(Kind::Internal, error.to_string())
+                ProblemDocument::new(Kind::Internal, error.to_string())
             }
             ServiceError::JobNotEnded { job } => {
                 problem(Kind::JobNotEnded).naming("job", job, "must name a job that has ended")
@@ -80,13 +80,13 @@ impl From<ServiceError> for Problem {
             ServiceError::Store(error) => of_store(&error),
             ServiceError::Internal(reason) => {
                 tracing::error!(reason, "a request failed");
-                Problem::new(Kind::Internal, "the cause is in the log")
+                ProblemDocument::new(Kind::Internal, "the cause is in the log")
             }
         }
     }
 }
 
-fn of_store(error: &StoreError) -> Problem {
+fn of_store(error: &StoreError) -> ProblemDocument {
     // A probe needs no key, and each failed probe would log a line.
     if telemetry::may_log() {
         tracing::error!(error = error as &dyn Error, "the store failed");
@@ -97,10 +97,10 @@ fn of_store(error: &StoreError) -> Problem {
         StoreError::Unavailable { .. } => ProblemKind::Overloaded,
         _ => ProblemKind::Internal,
     };
-    Problem::new(kind, error.to_string())
+    ProblemDocument::new(kind, error.to_string())
 }
 
-fn of_quota(over: OverQuota) -> Problem {
+fn of_quota(over: OverQuota) -> ProblemDocument {
     let (kind, remedy) = match over.quota {
         Quota::QueuedJobs => (ProblemKind::QueueFull, "wait for queued jobs, or cancel some"),
         Quota::Sessions => (ProblemKind::QuotaExceeded, "delete sessions"),
@@ -112,5 +112,5 @@ fn of_quota(over: OverQuota) -> Problem {
     let option = over.quota.option();
     let of = if over.quota == Quota::AuditEntries { "of this key" } else { "over all keys of the tenant" };
     let rule = format!("must be at most {}, {of}: {remedy}, or raise --{option}", over.limit);
-    Problem::new(kind, format!("{over}: {remedy}")).naming(option, over.kept + over.wanted, rule)
+    ProblemDocument::new(kind, format!("{over}: {remedy}")).naming(option, over.kept + over.wanted, rule)
 }

@@ -8,12 +8,12 @@ use axum::response::Response;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::access::{By, Heavy};
+use super::access::{CallerOf, HeavyCalls};
 use super::advise::{SaidOfProblem, said};
 use super::decode;
 use super::extract::JsonBytes;
 use super::jobs::{Queueing, accepted, idempotency_key};
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::ProblemSpecification;
@@ -30,10 +30,10 @@ use crate::service::Service;
     responses(Queueing))]
 pub async fn frontier(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     headers: HeaderMap,
     body: JsonBytes,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let request = body.decoded(request).await?;
     Ok(accepted(service.jobs.frontier(&caller, request, idempotency_key(&headers)?).await?))
 }
@@ -45,7 +45,7 @@ struct Only<P> {
 }
 
 /// Decodes the request. Its problem is decoded by itself first, so that an error names the right field.
-fn request(bytes: &[u8]) -> Result<FrontierRequest, Problem> {
+fn request(bytes: &[u8]) -> Result<FrontierRequest, ProblemDocument> {
     match said(bytes) {
         Some(SaidOfProblem { assets: Some(_), .. }) => reads::<AssetsProblem>(bytes)?,
         Some(_) => reads::<ProblemSpecification>(bytes)?,
@@ -54,6 +54,6 @@ fn request(bytes: &[u8]) -> Result<FrontierRequest, Problem> {
     decode::object(bytes)
 }
 
-fn reads<P: DeserializeOwned>(bytes: &[u8]) -> Result<(), Problem> {
+fn reads<P: DeserializeOwned>(bytes: &[u8]) -> Result<(), ProblemDocument> {
     decode::object::<Only<P>>(bytes).map(|Only { problem }| drop(problem))
 }

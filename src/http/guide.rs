@@ -10,7 +10,7 @@ use axum::response::Response;
 
 use super::asset::{Asset, HTML, STYLE};
 use super::extract::Id;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 
 mod page;
 
@@ -19,7 +19,7 @@ const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; style-src 'self'; img
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// One page: its name in the address, its title in the list of pages, its path in the repository, and its text.
-struct Document {
+struct GuidePage {
     name: &'static str,
     title: &'static str,
     path: &'static str,
@@ -28,7 +28,7 @@ struct Document {
 
 macro_rules! documents {
     ($($part:literal: [$($name:literal $title:literal $path:literal),+ $(,)?]),+ $(,)?) => {
-        &[$(($part, &[$(Document {
+        &[$(($part, &[$(GuidePage {
             name: $name,
             title: $title,
             path: $path,
@@ -38,7 +38,7 @@ macro_rules! documents {
 }
 
 /// The pages by part, in the order of the list; the first is the start page.
-const PARTS: &[(&str, &[Document])] = documents! {
+const PARTS: &[(&str, &[GuidePage])] = documents! {
     "Start": [
         "start" "What it is" "README.md",
         "first-advice" "First advice on your own data" "docs/first-advice.md",
@@ -71,7 +71,7 @@ const PARTS: &[(&str, &[Document])] = documents! {
     ],
 };
 
-fn documents() -> impl Iterator<Item = &'static Document> {
+fn documents() -> impl Iterator<Item = &'static GuidePage> {
     PARTS.iter().flat_map(|(_, documents)| documents.iter())
 }
 
@@ -109,8 +109,8 @@ pub async fn start(headers: HeaderMap) -> Response {
     responses(
         (status = 200, description = "The page or the picture.", body = String, content_type = "text/html"),
         (status = 304, description = "It is the one that `If-None-Match` names."),
-        (status = 404, description = "There is no such page.", body = Problem, content_type = "application/problem+json")))]
-pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
+        (status = 404, description = "There is no such page.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
     let files: &[Asset] = if name.contains('.') { &FILES } else { &PAGES };
     let policy = if name.ends_with(".svg") { DRAWING_SECURITY_POLICY } else { CONTENT_SECURITY_POLICY };
     Ok(Asset::find(files, &name, "the guide")?.served(policy, &headers))

@@ -4,7 +4,7 @@ use axum::Json;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::access::{By, Read};
+use super::access::{CallerOf, ReadCalls};
 use crate::store::KeyRole;
 
 /// The caller that the key belongs to.
@@ -24,7 +24,7 @@ pub struct KeyHolder {
 /// Returns the holder of the key in use.
 #[utoipa::path(get, path = "/key", tag = "operations",
     responses((status = 200, description = "Who is answered, and what he may do.", body = KeyHolder)))]
-pub async fn get(By(caller, _): By<Read>) -> Json<KeyHolder> {
+pub async fn get(CallerOf(caller, _): CallerOf<ReadCalls>) -> Json<KeyHolder> {
     Json(KeyHolder {
         key: Some(caller.key().to_string()).filter(|key| !key.is_empty()),
         tenant: caller.tenant.to_string(),

@@ -9,7 +9,7 @@ use std::net::IpAddr;
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, Uri, header};
 
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 
 const RULE: &str = "must be localhost, a loopback address, the address connected to, or a name given by --host";
 
@@ -26,7 +26,7 @@ impl Hosts {
     ///
     /// # Errors
     /// The request names a host that is not this service.
-    pub fn refuse_foreign(&self, headers: &HeaderMap, uri: &Uri, local: Option<IpAddr>) -> Result<(), Problem> {
+    pub fn refuse_foreign(&self, headers: &HeaderMap, uri: &Uri, local: Option<IpAddr>) -> Result<(), ProblemDocument> {
         let named = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
         let own = |host: &str| host.parse::<Authority>().is_ok_and(|host| self.is_own(host.host(), local));
         let foreign = match uri.authority() {
@@ -34,7 +34,8 @@ impl Hosts {
             Some(authority) if !own(authority.as_str()) => authority.as_str(),
             _ => return Ok(()),
         };
-        let problem = Problem::new(ProblemKind::Misdirected, "a service without keys answers to its own names only");
+        let problem =
+            ProblemDocument::new(ProblemKind::Misdirected, "a service without keys answers to its own names only");
         Err(problem.naming("Host", foreign, RULE))
     }
 
@@ -53,10 +54,11 @@ impl Hosts {
 ///
 /// # Errors
 /// There is not exactly one `Host`, or there is more than one `Authorization`.
-pub fn refuse_ambiguous(headers: &HeaderMap) -> Result<(), Problem> {
+pub fn refuse_ambiguous(headers: &HeaderMap) -> Result<(), ProblemDocument> {
     let count = |name| headers.get_all(name).iter().count();
     let refused = |name: &str, given: usize, rule: &str| {
-        let problem = Problem::new(ProblemKind::InvalidHeader, format!("{name} is there {given} times: it {rule}"));
+        let problem =
+            ProblemDocument::new(ProblemKind::InvalidHeader, format!("{name} is there {given} times: it {rule}"));
         Err(problem.naming(name, given, rule))
     };
     match (count(header::HOST), count(header::AUTHORIZATION)) {

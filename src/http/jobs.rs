@@ -9,13 +9,13 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoResponses, ToSchema};
 
-use super::access::{By, Heavy, Live, Read};
+use super::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
 use super::advise::{SaidOfProblem, said};
 use super::bodies;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use super::wire;
 use crate::control::error::FieldError;
 use crate::control::request::assets::AssetsProblem;
@@ -72,10 +72,10 @@ pub struct Train {
     responses(Queueing))]
 pub async fn train(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     headers: HeaderMap,
     body: JsonBytes,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let key = idempotency_key(&headers)?;
     let (specification, labels) = match body.decoded(question).await? {
         TrainQuestion::Assets(asked) => asked.specified(&service.sessions, &caller.tenant).await?,
@@ -93,7 +93,7 @@ pub enum TrainQuestion {
 }
 
 /// Decodes the request by its shape, so that an error names the right field.
-fn question(bytes: &[u8]) -> Result<TrainQuestion, Problem> {
+fn question(bytes: &[u8]) -> Result<TrainQuestion, ProblemDocument> {
     match said(bytes) {
         Some(SaidOfProblem { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
         _ => decode::object(bytes).map(TrainQuestion::Asset),
@@ -131,7 +131,11 @@ impl Train {
 }
 
 impl TrainAssets {
-    async fn specified(self, sessions: &Sessions, tenant: &Tenant) -> Result<(Specification, Relabel), Problem> {
+    async fn specified(
+        self,
+        sessions: &Sessions,
+        tenant: &Tenant,
+    ) -> Result<(Specification, Relabel), ProblemDocument> {
         let TrainAssets { problem, design, surrogate, seed, name, notes, tags } = self;
         let trained = sessions.training(tenant, problem, (design, surrogate, seed)).await?;
         Ok((trained, Relabel { name, notes, tags }))
@@ -149,13 +153,13 @@ pub enum Queueing {
     Queued(wire::AcceptedJob),
     /// The body is not JSON.
     #[response(status = 400, content_type = "application/problem+json")]
-    NotJson(Problem),
+    NotJson(ProblemDocument),
     /// The key was used with another body.
     #[response(status = 409, content_type = "application/problem+json")]
-    KeyConflict(Problem),
+    KeyConflict(ProblemDocument),
     /// A field breaks a rule.
     #[response(status = 422, content_type = "application/problem+json")]
-    BrokenRule(Problem),
+    BrokenRule(ProblemDocument),
 }
 
 /// Returns the answer for a queued job.
@@ -165,11 +169,11 @@ pub fn accepted(accepted: Accepted) -> Response {
     (StatusCode::ACCEPTED, location, Json(accepted)).into_response()
 }
 
-pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ProblemDocument> {
     let Some(value) = headers.get("idempotency-key") else { return Ok(None) };
     value.to_str().map(|key| Some(key.to_owned())).map_err(|_| {
         let error = FieldError::new("Idempotency-Key", "not ASCII", "must be visible ASCII");
-        Problem::of_field(ProblemKind::InvalidField, error)
+        ProblemDocument::of_field(ProblemKind::InvalidField, error)
     })
 }
 
@@ -179,12 +183,12 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
     responses(
         (status = 200, description = "A page of jobs.", body = wire::JobPage),
-        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Parameters(page): Parameters<Page>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let (limit, after) = page.bounds()?;
     let room = service.room_for(page::bytes(limit)).await?;
     let jobs = service.jobs.list(&caller.tenant, limit, after).await?;
@@ -197,12 +201,12 @@ pub async fn list(
 #[utoipa::path(get, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 200, description = "The job.", body = wire::Job),
-        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such job.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn get(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     bodies::written(&service, Large::from(wire::Job::from(service.jobs.get(&caller.tenant, &id).await?))).await
 }
 
@@ -210,12 +214,12 @@ pub async fn get(
 #[utoipa::path(post, path = "/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 202, description = "The job as it is now.", body = wire::Job),
-        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such job.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn cancel(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let job = wire::Job::from(service.jobs.cancel(&caller, &id).await?);
     Ok((StatusCode::ACCEPTED, Json(job)).into_response())
 }
@@ -224,13 +228,13 @@ pub async fn cancel(
 #[utoipa::path(delete, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 204, description = "Deleted."),
-        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "It is queued or runs: cancel it first.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such job.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "It is queued or runs: cancel it first.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn delete(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
-) -> Result<StatusCode, Problem> {
+) -> Result<StatusCode, ProblemDocument> {
     service.jobs.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::State;
 
-use super::access::{By, Live};
+use super::access::{CallerOf, LiveCalls};
 use super::extract::{Id, JsonBody};
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use crate::service::Service;
 use crate::store::{Labelled, Labels, Relabel};
 
@@ -16,14 +16,14 @@ use crate::store::{Labelled, Labels, Relabel};
     request_body(content = Relabel, example = json!({ "name": "World, monthly", "tags": ["equity"] })),
     responses(
         (status = 200, description = "As it is called now.", body = Labels),
-        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn of_policy(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
     JsonBody(change): JsonBody<Relabel>,
-) -> Result<Json<Labels>, Problem> {
+) -> Result<Json<Labels>, ProblemDocument> {
     Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change).await?))
 }
 
@@ -32,13 +32,13 @@ pub async fn of_policy(
     request_body(content = Relabel, example = json!({ "name": "Ada", "notes": "Reports by post.", "tags": ["monthly"] })),
     responses(
         (status = 200, description = "As it is called now.", body = Labels),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn of_session(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
     JsonBody(change): JsonBody<Relabel>,
-) -> Result<Json<Labels>, Problem> {
+) -> Result<Json<Labels>, ProblemDocument> {
     Ok(Json(service.names.change(&caller, Labelled::Session, &id, change).await?))
 }

@@ -12,7 +12,7 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
-use super::connections::{Connections, Held};
+use super::connections::{ConnectionGuard, Connections};
 use super::conversation::{self, Stopping};
 use super::patient::Patience;
 use crate::service::metrics::CONNECTIONS_REFUSED;
@@ -77,7 +77,7 @@ impl Door {
     }
 }
 
-async fn let_in(stream: TcpStream, held: Held, manners: Manners, stopping: Stopping) {
+async fn let_in(stream: TcpStream, held: ConnectionGuard, manners: Manners, stopping: Stopping) {
     let Manners { application, patience, encryption, .. } = manners;
     let Ok(local) = stream.local_addr() else { return };
     let Some(acceptor) = encryption else {

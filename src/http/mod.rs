@@ -45,4 +45,4 @@ mod what_if;
 mod wire;
 
 pub use router::description_json;
-pub use server::{Running, ServeError, serve};
+pub use server::{RunningServer, ServeError, serve};

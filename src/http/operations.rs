@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use super::bodies::{self, Embedded};
 use super::documentation::Published;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use super::telemetry;
 use crate::service::Service;
 use crate::service::memory::Large;
@@ -37,8 +37,8 @@ pub async fn livez() -> &'static str {
 #[utoipa::path(get, path = "/readyz", tag = "operations",
     responses(
         (status = 200, description = "It does. If the clock of its machine is wrong, that is said too.", body = String, content_type = "text/plain"),
-        (status = 503, description = "Draining, or the store does not answer.", body = Problem, content_type = "application/problem+json")))]
-pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, Problem> {
+        (status = 503, description = "Draining, or the store does not answer.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, ProblemDocument> {
     service.ready().await?;
     Ok(match service.clock_skew_seconds() {
         0 => "ok".to_owned(),
@@ -50,8 +50,8 @@ pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, Probl
 #[utoipa::path(get, path = "/health", tag = "operations",
     responses(
         (status = 200, description = "Alive and ready.", body = Health),
-        (status = 503, description = "Draining, or the store does not answer.", body = Problem, content_type = "application/problem+json")))]
-pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>, Problem> {
+        (status = 503, description = "Draining, or the store does not answer.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>, ProblemDocument> {
     service.ready().await?;
     let (jobs, sessions) = service.counts().await?;
     Ok(Json(Health {
@@ -66,7 +66,7 @@ pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>,
 /// Returns metrics for Prometheus.
 #[utoipa::path(get, path = "/metrics", tag = "operations",
     responses((status = 200, description = "Text exposition format.", body = String, content_type = "text/plain")))]
-pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Problem> {
+pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, ProblemDocument> {
     service.record_store().await?;
     let (jobs, sessions) = service.counts().await?;
     service.record_memory();

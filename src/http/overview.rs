@@ -8,12 +8,12 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::access::{By, Read};
+use super::access::{CallerOf, ReadCalls};
 use super::bodies;
 use super::extract::Parameters;
 use super::page::{self, Page};
-use super::problem::{Problem, ProblemKind};
-use super::wire::{SessionState, session_state};
+use super::problem::{ProblemDocument, ProblemKind};
+use super::wire::{SessionStatus, session_state};
 use crate::control::error::FieldError;
 use crate::service::Service;
 use crate::service::drift::DriftLevel;
@@ -30,7 +30,7 @@ const LONGEST_SEARCH: usize = 100;
 /// Query parameters of the list, as text.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Asked {
+pub struct SessionListQuery {
     search: Option<String>,
     tag: Option<String>,
     state: Option<Is>,
@@ -76,7 +76,7 @@ pub struct SessionEntry {
     pub period: usize,
     /// The last period that the policy advises.
     pub horizon: usize,
-    pub state: SessionState,
+    pub state: SessionStatus,
     pub initial_wealth: f64,
     pub wealth: f64,
     /// Share of wealth in the risky asset, before trading.
@@ -204,12 +204,12 @@ pub struct SessionPage {
            ("count" = inline(Option<Count>), Query, description = "`total`: how many match; `care`: that, and how many need care. Each reads every session that matches, so ask for it once, with the first page.")),
     responses(
         (status = 200, description = "A page of sessions.", body = SessionPage),
-        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
-    Parameters(asked): Parameters<Asked>,
-) -> Result<Response, Problem> {
+    CallerOf(caller, _): CallerOf<ReadCalls>,
+    Parameters(asked): Parameters<SessionListQuery>,
+) -> Result<Response, ProblemDocument> {
     let asked = asked.read()?;
     let room = service.room_for(page::bytes(asked.limit)).await?;
     let found = service.sessions.list(&caller, asked.clone()).await?;
@@ -220,12 +220,12 @@ pub async fn list(
     bodies::written(&service, Large { value, room }).await
 }
 
-fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {
-    Problem::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
+fn refused(field: &str, value: &str, rule: impl Into<String>) -> ProblemDocument {
+    ProblemDocument::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
 }
 
-impl Asked {
-    fn read(self) -> Result<SessionQuery, Problem> {
+impl SessionListQuery {
+    fn read(self) -> Result<SessionQuery, ProblemDocument> {
         let (limit, _) = Page::new(self.limit, None).bounds()?;
         for (field, given, most) in [("search", &self.search, LONGEST_SEARCH), ("tag", &self.tag, LONGEST_TAG)] {
             if let Some(text) = given.as_ref().filter(|text| text.chars().count() > most) {

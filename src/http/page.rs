@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use crate::control::error::FieldError;
 
 const DEFAULT_LIMIT: usize = 50;
@@ -30,9 +30,9 @@ impl Page {
     }
 
     /// Returns the limit and the cursor.
-    pub fn bounds(&self) -> Result<(usize, Option<i64>), Problem> {
+    pub fn bounds(&self) -> Result<(usize, Option<i64>), ProblemDocument> {
         let refused = |field, value: &str, rule| {
-            Problem::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
+            ProblemDocument::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
         };
         let limit = match &self.limit {
             None => DEFAULT_LIMIT,

@@ -15,7 +15,7 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep};
 
-use super::connections::{Connection, Phase};
+use super::connections::{ConnectionPhase, TrackedConnection};
 
 /// The time limits for a client.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,7 @@ pub struct Patience {
 pub struct Patient<S> {
     stream: S,
     patience: Patience,
-    connection: Arc<Connection>,
+    connection: Arc<TrackedConnection>,
     /// Timer that runs while a write waits.
     stalled: Option<Pin<Box<Sleep>>>,
     /// The number of the request whose head is under way, and when the head began.
@@ -52,7 +52,7 @@ pub struct Patient<S> {
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
-    pub fn new(stream: S, patience: Patience, connection: Arc<Connection>) -> Self {
+    pub fn new(stream: S, patience: Patience, connection: Arc<TrackedConnection>) -> Self {
         Patient { stream, patience, connection, stalled: None, head: None, silent: None, end: None }
     }
 
@@ -150,7 +150,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for Patient<S> {
         let read = Pin::new(&mut self.stream).poll_read(context, buffer);
         let asked = self.connection.requests();
         self.head = self.head.filter(|(of, _)| *of == asked);
-        if self.connection.phase() != Phase::Waiting {
+        if self.connection.phase() != ConnectionPhase::Waiting {
             return read;
         }
         match read {
@@ -175,13 +175,13 @@ mod tests {
 
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
-    use super::super::connections::{Bounds, Connections, Held};
+    use super::super::connections::{ConnectionGuard, ConnectionLimits, Connections};
     use super::*;
 
     const LIMIT: Duration = Duration::from_millis(200);
 
-    fn patient(stream: DuplexStream) -> (Held, Patient<DuplexStream>) {
-        let connections = Connections::new(Bounds { all: 1, of_address: 1, for_probes: 0 });
+    fn patient(stream: DuplexStream) -> (ConnectionGuard, Patient<DuplexStream>) {
+        let connections = Connections::new(ConnectionLimits { all: 1, of_address: 1, for_probes: 0 });
         let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
         let between = 3 * LIMIT;
         let (requests, age) = (u64::MAX, Duration::MAX);
@@ -239,7 +239,7 @@ mod tests {
             there.write_all(b"head").await.unwrap();
             let mut head = [0; 4];
             patient.read_exact(&mut head).await.unwrap();
-            assert!(held.connection.begin(Phase::Working));
+            assert!(held.connection.begin(ConnectionPhase::Working));
             held.connection.rest();
             tokio::time::sleep(LIMIT / 3).await;
         }

@@ -7,12 +7,12 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
-use super::access::{By, Heavy, Live, Read};
+use super::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
 use super::bodies;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use super::wire;
 use crate::control::policy::Policy;
 use crate::service::Service;
@@ -24,12 +24,12 @@ use crate::service::memory::Large;
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
     responses(
         (status = 200, description = "A page of policies.", body = wire::PolicyPage),
-        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Parameters(page): Parameters<Page>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let (limit, after) = page.bounds()?;
     let room = service.room_for(page::bytes(limit)).await?;
     let rows = service.policies.list(&caller.tenant, limit, after).await?;
@@ -42,12 +42,12 @@ pub async fn list(
 #[utoipa::path(get, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     responses(
         (status = 200, description = "The policy.", body = wire::PolicyDetail),
-        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn get(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let created_ms = service.policies.created_ms(&caller.tenant, &id).await?;
     let advisor = service.policies.advisor(&caller.tenant, &id).await?;
     let specification = advisor.specification().clone();
@@ -69,12 +69,12 @@ pub async fn get(
 #[utoipa::path(get, path = "/policies/{id}/export", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     responses(
         (status = 200, description = "The document.", body = serde_json::Value),
-        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn export(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     Ok(bodies::sent(service.policies.document(&caller.tenant, &id).await?))
 }
 
@@ -83,12 +83,12 @@ pub async fn export(
     responses(
         (status = 201, description = "Stored, or known already.", body = wire::Imported,
             headers(("Location" = String, description = "The policy."))),
-        (status = 422, description = "The document is not a usable policy.", body = Problem, content_type = "application/problem+json")))]
+        (status = 422, description = "The document is not a usable policy.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn import(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     body: JsonBytes,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let policy = service.policies.import(&caller, body.decoded(decode::object::<Policy>).await?).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
@@ -98,13 +98,13 @@ pub async fn import(
 #[utoipa::path(delete, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     responses(
         (status = 204, description = "Deleted."),
-        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Sessions live by it.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "Sessions live by it.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn delete(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
-) -> Result<StatusCode, Problem> {
+) -> Result<StatusCode, ProblemDocument> {
     service.policies.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

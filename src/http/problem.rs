@@ -115,7 +115,7 @@ impl ProblemKind {
 
 /// A problem document (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Problem {
+pub struct ProblemDocument {
     /// Stable reference of the kind of problem: `/problems/<slug>`.
     #[serde(rename = "type")]
     #[schema(value_type = String, example = "/problems/invalid-field")]
@@ -162,10 +162,10 @@ pub fn shortened(text: &str, limit: usize) -> String {
     }
 }
 
-impl Problem {
+impl ProblemDocument {
     pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         let (slug, status, title) = kind.entry();
-        Problem {
+        ProblemDocument {
             kind: format!("/problems/{slug}").into(),
             title,
             status: status.as_u16(),
@@ -187,7 +187,7 @@ impl Problem {
         };
         let detail = error.to_string();
         let value = serde_json::from_str(&error.value).unwrap_or(Value::String(error.value));
-        Problem::new(kind, detail).naming(error.field, value, error.rule)
+        ProblemDocument::new(kind, detail).naming(error.field, value, error.rule)
     }
 
     /// Adds the field, its value and the rule that it must satisfy.
@@ -197,16 +197,16 @@ impl Problem {
             value => value,
         };
         let (field, rule) = (shortened(&field.into(), SHOWN_FIELD), shortened(&rule.into(), SHOWN_SENTENCE));
-        Problem { field: Some(field.into()), value: Some(Box::new(value)), rule: Some(rule.into()), ..self }
+        ProblemDocument { field: Some(field.into()), value: Some(Box::new(value)), rule: Some(rule.into()), ..self }
     }
 
     /// Adds the time after which a retry may succeed.
     pub fn to_be_asked_again_in(self, wait: Duration) -> Self {
-        Problem { retry_after: Some(wait), ..self }
+        ProblemDocument { retry_after: Some(wait), ..self }
     }
 }
 
-impl Problem {
+impl ProblemDocument {
     fn slug(&self) -> &str {
         self.kind.trim_start_matches("/problems/")
     }
@@ -224,7 +224,7 @@ pub fn count_from_zero() {
     }
 }
 
-impl IntoResponse for Problem {
+impl IntoResponse for ProblemDocument {
     fn into_response(self) -> Response {
         let wait = self.retry_after.map(|wait| wait.as_secs_f64().ceil().max(1.0) as u64);
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);

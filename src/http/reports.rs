@@ -11,11 +11,11 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
 
-use super::access::{By, Live};
+use super::access::{CallerOf, LiveCalls};
 use super::bodies;
 use super::decode;
 use super::extract::JsonBytes;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use super::telemetry;
 use crate::service::Service;
 use crate::service::answer::Observed;
@@ -90,7 +90,7 @@ pub struct ElementAnswered {
     pub answer: Option<Observed>,
     /// The problem, if the status is not 200.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub problem: Option<Problem>,
+    pub problem: Option<ProblemDocument>,
 }
 
 /// Records the return of a period, or of one period of each of up to 1000 sessions. Each is recorded exactly once, and
@@ -101,14 +101,14 @@ pub struct ElementAnswered {
     })),
     responses(
         (status = 200, description = "Recorded; the same period and content again give the same answer. Of a list, the answer to each element with a status of its own.", body = ReportsAnswered),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, a gap, past the horizon, or most likely a slip that nobody confirms.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule, or a list names a session twice.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, a gap, past the horizon, or most likely a slip that nobody confirms.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule, or a list names a session twice.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn observe(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     body: JsonBytes,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let length = body.length();
     match body.decoded(decode::json).await? {
         Reports::One(report) => {
@@ -127,7 +127,7 @@ pub async fn observe(
 /// Formats the answer for one element, around the answer as it is stored.
 fn answered(Reported { session, period, outcome }: Reported, tenant: &str) -> String {
     let session = json!(session);
-    match outcome.map_err(Problem::from) {
+    match outcome.map_err(ProblemDocument::from) {
         Ok(answer) => format!(r#"{{"session":{session},"period":{period},"status":200,"answer":{answer}}}"#),
         Err(problem) => {
             problem.count();

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use axum::extract::State;
 use axum::response::Response;
 
-use super::access::{By, Heavy};
+use super::access::{CallerOf, HeavyCalls};
 use super::bodies;
 use super::extract::JsonBody;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use crate::returns::Reading;
 use crate::service::Service;
 use crate::service::memory::Large;
@@ -27,9 +27,9 @@ const ANSWERED_A_BYTE: usize = 16;
     responses((status = 200, description = "The reading.", body = Reading)))]
 pub async fn read(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     JsonBody(question): JsonBody<ReadReturns>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let room = service.room_for(ANSWERED_A_BYTE * question.text.len()).await?;
     let value = service.sessions.read_returns(&caller.tenant, question).await?;
     bodies::written(&service, Large { value, room }).await

@@ -16,11 +16,11 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::access::{By, Gate, Read};
+use super::access::{CallerOf, Gate, ReadCalls};
 use super::bodies::{self, Bodies};
 use super::documentation::Published;
 use super::hosts::Hosts;
-use super::problem::{Problem, ProblemKind};
+use super::problem::{ProblemDocument, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
     frontiers, guide, holder, jobs, labels, operations, overview, policies, reports, returns, sessions, telemetry,
@@ -132,7 +132,7 @@ pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
 /// gets one answer.
 pub fn starting() -> Router {
     let not_yet = || async {
-        let problem = Problem::new(ProblemKind::Overloaded, "the service is starting");
+        let problem = ProblemDocument::new(ProblemKind::Overloaded, "the service is starting");
         ([(header::CONNECTION, "close")], problem)
     };
     let alive = || async { ([(header::CONNECTION, "close")], operations::livez().await) };
@@ -180,7 +180,7 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
     };
     let response = match AssertUnwindSafe(answering.instrument(recording.span())).catch_unwind().await {
         Ok(response) => response,
-        Err(_) => Problem::new(ProblemKind::Internal, "the cause is in the log").into_response(),
+        Err(_) => ProblemDocument::new(ProblemKind::Internal, "the cause is in the log").into_response(),
     };
     recording.end(&response);
     response
@@ -188,22 +188,22 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
 
 /// Redirects a browser that requests a page by its address without the `#`; the page itself asks for a key.
 async fn unknown_route(
-    caller: Result<By<Read>, Problem>,
+    caller: Result<CallerOf<ReadCalls>, ProblemDocument>,
     method: Method,
     headers: HeaderMap,
     uri: Uri,
-) -> Result<Redirect, Problem> {
+) -> Result<Redirect, ProblemDocument> {
     let wants = headers.get(header::ACCEPT).and_then(|accept| accept.to_str().ok());
     if method == Method::GET && wants.is_some_and(|accept| accept.contains("text/html")) {
         return Ok(Redirect::to(&format!("/#{}", uri.path())));
     }
     caller?;
-    let problem = Problem::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()));
+    let problem = ProblemDocument::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()));
     Err(problem.naming("path", uri.path(), "must be a path of /openapi.json"))
 }
 
-async fn wrong_method(_: Option<By<Read>>, method: Method, uri: Uri) -> Problem {
-    let problem = Problem::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()));
+async fn wrong_method(_: Option<CallerOf<ReadCalls>>, method: Method, uri: Uri) -> ProblemDocument {
+    let problem = ProblemDocument::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()));
     problem.naming("method", method.as_str(), "must be one that the Allow header names")
 }
 
@@ -213,7 +213,7 @@ async fn within_time(limit: Duration, answering: impl Future<Output = Response>)
         Ok(response) => response,
         Err(_) => {
             let detail = format!("no answer within {} s", limit.as_secs());
-            Problem::new(ProblemKind::Overloaded, detail).into_response()
+            ProblemDocument::new(ProblemKind::Overloaded, detail).into_response()
         }
     }
 }

@@ -12,7 +12,7 @@ use thiserror::Error;
 use tokio::task::JoinHandle;
 use tokio_rustls::TlsAcceptor;
 
-use super::connections::{Bounds, Connections};
+use super::connections::{ConnectionLimits, Connections};
 use super::listener::{Door, Manners};
 use super::patient::Patience;
 use super::tls::{Certificate, TlsError};
@@ -58,7 +58,7 @@ pub enum ServeError {
 }
 
 /// A running server.
-pub struct Running {
+pub struct RunningServer {
     /// The bound address.
     pub address: SocketAddr,
     /// The bound address of the operator's own listener, if there is one.
@@ -69,7 +69,7 @@ pub struct Running {
     task: JoinHandle<()>,
 }
 
-impl Running {
+impl RunningServer {
     /// Waits until the server has ended by its own shutdown signal: connections drained, job requeued, store closed.
     ///
     /// # Errors
@@ -101,13 +101,13 @@ impl Running {
 ///
 /// # Errors
 /// An address is in use, or is public without encryption; the certificate cannot be used; the service cannot start.
-pub fn serve(config: Config, shutdown: Shutdown) -> LocalBoxFuture<'static, Result<Running, ServeError>> {
+pub fn serve(config: Config, shutdown: Shutdown) -> LocalBoxFuture<'static, Result<RunningServer, ServeError>> {
     // Boxed, so that the whole application is compiled once in the library and not again in every program that serves
     // it.
     Box::pin(start(config, shutdown))
 }
 
-async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError> {
+async fn start(config: Config, shutdown: Shutdown) -> Result<RunningServer, ServeError> {
     telemetry::install_recorder();
     let exposed = std::iter::once(config.listen).chain(config.operations_listen).find(|at| !at.ip().is_loopback());
     if let (Some(address), None, false) = (exposed, &config.tls, config.allow_plaintext) {
@@ -136,22 +136,28 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError
     let back = manners(router::for_operators(service.clone(), &config), OPERATORS_BOUNDS, &config, &encryption);
     let doors = Doors { front: (door, front), back: back_door.map(|door| (door, back)), certificate };
     let task = tokio::spawn(doors.run(service.clone(), config.drain));
-    Ok(Running { address, operations, scheme, service, task })
+    Ok(RunningServer { address, operations, scheme, service, task })
 }
 
 /// Number of requests and age after which a connection closes with the next answer. Load balancers can then distribute
 /// its client anew, and nothing accumulates with a connection for ever.
 const LARGEST_REQUESTS: u64 = 100_000;
 const LARGEST_AGE: Duration = Duration::from_secs(60 * 60);
-const OPERATORS_BOUNDS: Bounds = Bounds { all: OPERATORS, of_address: OPERATORS, for_probes: PROBES };
+const OPERATORS_BOUNDS: ConnectionLimits =
+    ConnectionLimits { all: OPERATORS, of_address: OPERATORS, for_probes: PROBES };
 
-fn bounds(config: &Config) -> Bounds {
+fn bounds(config: &Config) -> ConnectionLimits {
     let all = connection_limit(config.connection_limit);
     let of_address = config.connections_of_address.unwrap_or(all.div_ceil(4)).clamp(1, all);
-    Bounds { all, of_address, for_probes: PROBES }
+    ConnectionLimits { all, of_address, for_probes: PROBES }
 }
 
-fn manners(application: Router, bounds: Bounds, config: &Config, encryption: &Option<TlsAcceptor>) -> Manners {
+fn manners(
+    application: Router,
+    bounds: ConnectionLimits,
+    config: &Config,
+    encryption: &Option<TlsAcceptor>,
+) -> Manners {
     let patience = Patience {
         to_read: READER_TIMEOUT,
         for_head: HEADER_TIMEOUT,

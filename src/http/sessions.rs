@@ -10,16 +10,16 @@ use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::access::{self, Asked, By, Live, Read};
+use super::access::{self, CallerAsking, CallerOf, LiveCalls, ReadCalls};
 use super::action::ActionAnswer;
 use super::bodies;
 use super::extract::{Id, JsonBody};
 use super::jobs::idempotency_key;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use super::wire;
 use crate::control::policy::advisor::AdviceMode;
 use crate::service::Service;
-use crate::service::action::Question;
+use crate::service::action::AdviceOptions;
 use crate::service::allowance::Class;
 use crate::service::answer::Corrected;
 use crate::service::explain::Explain;
@@ -28,7 +28,7 @@ use crate::service::memory::Large;
 use crate::service::metrics::ACTION_SECONDS;
 use crate::service::plan::{Renew, Renewed};
 use crate::service::report::Correct;
-use crate::service::sessions::Start;
+use crate::service::sessions::SessionStart;
 use crate::store::{Labels, Relabel};
 
 /// Opens a session.
@@ -40,19 +40,19 @@ use crate::store::{Labels, Relabel};
             description = "The same key and body again give the same session and answer, until it is deleted.")),
     responses(
         (status = 201, description = "Opened.", body = wire::Session, headers(("Location" = String, description = "The session."))),
-        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "The key was used with another body.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn open(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let wire::OpenSession { policy, history, wealth, holding, holdings, renew, rolling, name, notes, tags } = request;
     let labels = Relabel { name, notes, tags };
     let called = Labels::default().after(&labels);
-    let start = Start { policy, history, wealth, holding, holdings, renew, rolling, labels };
+    let start = SessionStart { policy, history, wealth, holding, holdings, renew, rolling, labels };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?, &caller.turn).await?;
     let session = wire::Session { labels: called, ..live.into() };
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
@@ -63,12 +63,12 @@ pub async fn open(
 #[utoipa::path(get, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 200, description = "The session.", body = wire::Session),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn get(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let live = service.sessions.get(&caller.tenant, &id).await?;
     let renewal = service.sessions.renewal(&live).await?;
     let labels = service.names.of(&caller.tenant, &id).await?;
@@ -80,12 +80,12 @@ pub async fn get(
 #[utoipa::path(get, path = "/sessions/{id}/history", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 200, description = "The history.", body = History),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn history(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
+    CallerOf(caller, _): CallerOf<ReadCalls>,
     Id(id): Id,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     bodies::written(&service, service.sessions.history(&caller.tenant, &id, &caller.turn).await?).await
 }
 
@@ -98,15 +98,15 @@ pub async fn history(
     })),
     responses(
         (status = 200, description = "Recorded; the same correction and content again give the same answer.", body = Corrected),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, not the next correction, or most likely a slip that nobody confirms.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, not the next correction, or most likely a slip that nobody confirms.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn correct(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
     JsonBody(correction): JsonBody<Correct>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let corrected = service.sessions.correct(&caller, &id, &correction, &caller.turn).await?;
     bodies::recorded(&service, corrected).await
 }
@@ -120,15 +120,15 @@ pub async fn correct(
     })),
     responses(
         (status = 200, description = "Recorded; the same renewal and content again give the same answer.", body = Renewed),
-        (status = 404, description = "There is no such session or policy.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, or not the next renewal.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session or policy.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, or not the next renewal.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn renew(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
     JsonBody(renewal): JsonBody<Renew>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let (by, turn) = (caller.actor(), Some(&*caller.turn));
     bodies::recorded(&service, service.sessions.renew(&caller.tenant, by, &id, &renewal, turn).await?).await
 }
@@ -137,12 +137,12 @@ pub async fn renew(
 #[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 204, description = "Deleted."),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn delete(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
+    CallerOf(caller, _): CallerOf<LiveCalls>,
     Id(id): Id,
-) -> Result<StatusCode, Problem> {
+) -> Result<StatusCode, ProblemDocument> {
     service.sessions.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -150,7 +150,7 @@ pub async fn delete(
 /// Query of `/action`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ask {
+pub struct ActionQuery {
     session: String,
     mode: Option<Mode>,
     explain: Option<Explain>,
@@ -172,7 +172,7 @@ enum Mode {
     Resolve,
 }
 
-impl access::Question for Ask {
+impl access::ClassedQuery for ActionQuery {
     /// Returns the class. Advice from the surrogate that turns out to need a solve becomes heavy at that point.
     fn class(&self) -> Class {
         match (self.mode, self.explain) {
@@ -191,11 +191,14 @@ impl access::Question for Ask {
            ("sensitivity" = Option<bool>, Query, description = "`true`: say how near the advice is to changing.")),
     responses(
         (status = 200, description = "The allocation.", body = ActionAnswer),
-        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "The sensitivity of this session is not told.", body = Problem, content_type = "application/problem+json")))]
-pub async fn action(State(service): State<Arc<Service>>, Asked(caller, ask): Asked<Ask>) -> Result<Response, Problem> {
+        (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "The session has reached its horizon.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "The sensitivity of this session is not told.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn action(
+    State(service): State<Arc<Service>>,
+    CallerAsking(caller, ask): CallerAsking<ActionQuery>,
+) -> Result<Response, ProblemDocument> {
     let (mode, label) = match (ask.explain, ask.mode) {
         (Some(Explain::WorstCase), _) => (AdviceMode::Resolve, "explain"),
         (None, Some(Mode::Resolve)) => (AdviceMode::Resolve, "resolve"),
@@ -203,7 +206,7 @@ pub async fn action(State(service): State<Arc<Service>>, Asked(caller, ask): Ask
     };
     let sensitivity = ask.sensitivity == Some(Flag::True);
     let label = if sensitivity { "sensitivity" } else { label };
-    let question = Question { mode, explain: ask.explain.is_some(), sensitivity };
+    let question = AdviceOptions { mode, explain: ask.explain.is_some(), sensitivity };
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());

@@ -6,10 +6,10 @@ use std::time::Instant;
 use axum::extract::State;
 use axum::response::Response;
 
-use super::access::{By, Heavy};
+use super::access::{CallerOf, HeavyCalls};
 use super::bodies;
 use super::extract::JsonBody;
-use super::problem::Problem;
+use super::problem::ProblemDocument;
 use crate::service::Service;
 use crate::service::metrics::ACTION_SECONDS;
 use crate::service::what_if::{WhatIf, WhatIfAnswer};
@@ -22,14 +22,14 @@ use crate::service::what_if::{WhatIf, WhatIfAnswer};
     })),
     responses(
         (status = 200, description = "One point, or the points of a sweep.", body = WhatIfAnswer),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "The session has reached its horizon.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn what_if(
     State(service): State<Arc<Service>>,
-    By(caller, _): By<Heavy>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
     JsonBody(request): JsonBody<WhatIf>,
-) -> Result<Response, Problem> {
+) -> Result<Response, ProblemDocument> {
     let started = Instant::now();
     let answer = service.sessions.what_if(&caller.tenant, request).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => "what_if").record(started.elapsed().as_secs_f64());

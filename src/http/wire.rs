@@ -18,9 +18,9 @@ use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
 use crate::service::assets::Composed;
 use crate::service::drift::Drift;
-use crate::service::jobs::{Accepted, Job as ServiceJob};
-use crate::service::known::KnownReturns;
-use crate::service::live::Live;
+use crate::service::jobs::{Accepted, TrackedJob as ServiceJob};
+use crate::service::known::InitialHistory;
+use crate::service::live::LiveSession;
 use crate::service::plan::Renewing;
 use crate::service::renewer::RenewalDue;
 use crate::store::{JobKind, JobState, Labels, PolicySummary};
@@ -177,7 +177,7 @@ pub struct OpenSession {
     /// The policy to use.
     pub policy: String,
     /// Log-returns known at the start; for several assets, date by date. Default: those of the policy.
-    pub history: Option<KnownReturns>,
+    pub history: Option<InitialHistory>,
     /// Wealth at the start. Default: the policy's initial wealth.
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset at the start. Default: 0.
@@ -201,7 +201,7 @@ pub struct OpenSession {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum SessionState {
+pub enum SessionStatus {
     Active,
     /// The next policy is to be trained; until it is ready the session uses its present one.
     Waiting,
@@ -221,7 +221,7 @@ pub struct Session {
     pub period: usize,
     /// The last period that the policy advises.
     pub horizon: usize,
-    pub state: SessionState,
+    pub state: SessionStatus,
     /// Last day of the last period: as reported, and otherwise the next one due after the periods before it. Null if no
     /// day is known.
     #[schema(value_type = Option<String>, format = Date)]
@@ -252,16 +252,16 @@ pub struct Session {
     pub created_ms: i64,
 }
 
-pub fn session_state(observed: usize, horizon: usize, is_due: bool) -> SessionState {
+pub fn session_state(observed: usize, horizon: usize, is_due: bool) -> SessionStatus {
     match observed < horizon {
-        _ if is_due => SessionState::Waiting,
-        true => SessionState::Active,
-        false => SessionState::Completed,
+        _ if is_due => SessionStatus::Waiting,
+        true => SessionStatus::Active,
+        false => SessionStatus::Completed,
     }
 }
 
-impl From<Live> for Session {
-    fn from(live: Live) -> Self {
+impl From<LiveSession> for Session {
+    fn from(live: LiveSession) -> Self {
         Session {
             period: live.observed + 1,
             state: session_state(live.observed, live.horizon(), live.is_due()),

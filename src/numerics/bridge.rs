@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 use super::bridge_paths::{AbsoluteBridges, PATHS, Share, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
-use super::gap_places::{Places, Statistic};
+use super::gap_places::{SizedGaps, Statistic};
 use super::scale_mixture::LastQuantile;
 
 /// A simulated quantile and the standard error of its simulation.
@@ -63,7 +63,7 @@ impl AbsoluteBridges {
 
     /// Returns the weights of every gap of each law. With equal weights, the gaps of all laws of one size count at the
     /// same times.
-    fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Waiting> {
+    fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<GapWeights> {
         let mut weights = Weights::new(self);
         let of_these = OnceLock::new();
         let of_all = match self.times {
@@ -83,7 +83,7 @@ impl AbsoluteBridges {
 
     /// Returns the times and weights of each gap of a law.
     fn shares_of(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<[Share; 4]> {
-        let (mut places, mut below) = (Places::of_laws_like(self, law, which), 0.0);
+        let (mut places, mut below) = (SizedGaps::of_laws_like(self, law, which), 0.0);
         let gap = |weight: &f64| {
             below += weight;
             places.of(below)
@@ -133,7 +133,7 @@ impl AbsoluteBridges {
     ) -> Vec<f64> {
         let (atoms, count, retention) = (law.atoms(), law.sample_size(), law.retention());
         let total = law.total_weight() * retention + 1.0;
-        let (mut places, mut weights) = (Places::new(self, count + 1, total, retention, which), Weights::new(self));
+        let (mut places, mut weights) = (SizedGaps::new(self, count + 1, total, retention, which), Weights::new(self));
         let mut place = |weights: &mut Weights, below: f64, length: f64| weights.place(&places.of(below), length);
         // Gap j is between atoms j - 1 and j. If it is below the new value, the first j atoms lie below it; if it is
         // above, so does the value.
@@ -166,7 +166,7 @@ impl AbsoluteBridges {
             }
             [carried, weights.take()]
         };
-        let entered: Vec<[Waiting; 2]> = values.iter().map(enter).collect();
+        let entered: Vec<[GapWeights; 2]> = values.iter().map(enter).collect();
         let mut carried = vec![0.0; self.paths];
         let mut last = LastQuantile::default();
         let mut quantiles = Vec::with_capacity(values.len());
@@ -182,7 +182,7 @@ impl AbsoluteBridges {
 
     /// Returns the sums of each entry: sums carried from entry to entry, plus the entry's own. Results are ordered by
     /// entry, but computed by block of paths, so that data that entries share is read from memory once.
-    fn carry_on(&self, carried: &mut [f64], entered: &[[Waiting; 2]]) -> Vec<f64> {
+    fn carry_on(&self, carried: &mut [f64], entered: &[[GapWeights; 2]]) -> Vec<f64> {
         let mut all = vec![0.0; entered.len() * self.paths];
         for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
             let mut on_the_way = [0.0; PATHS];
@@ -232,22 +232,22 @@ impl Weights {
     }
 
     /// Returns the collected weights and resets them.
-    fn take(&mut self) -> Waiting {
+    fn take(&mut self) -> GapWeights {
         let touched = std::mem::take(&mut self.touched);
         let weights = &mut self.weights[touched.clone()];
-        let taken = Waiting { first: touched.start, weights: weights.iter().map(|weight| *weight as f32).collect() };
+        let taken = GapWeights { first: touched.start, weights: weights.iter().map(|weight| *weight as f32).collect() };
         weights.fill(0.0);
         taken
     }
 }
 
 /// Weights of some times, in the units of their values.
-struct Waiting {
+struct GapWeights {
     first: usize,
     weights: Vec<f32>,
 }
 
-impl Waiting {
+impl GapWeights {
     /// Adds the weighted values to the statistics of a block of paths.
     fn pour(&self, block: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
         dispatched!(add_nodes(&self.weights, &block[self.first..], sums));

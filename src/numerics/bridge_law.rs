@@ -37,7 +37,7 @@ const HALVINGS: usize = 50;
 
 /// Complex numbers, one for each term.
 #[derive(Clone)]
-struct Terms {
+struct ComplexTerms {
     real: [f64; TERMS],
     imaginary: [f64; TERMS],
 }
@@ -80,7 +80,7 @@ impl BridgeLaw {
         let spread = |correlation: &f64| (1.0 - correlation * correlation).sqrt();
         let distance = correlations.iter().map(spread).fold(WIDEST, f64::min);
         let points = (REACH / distance).ceil() as usize + 1;
-        let mut values = vec![Terms { real: [1.0; TERMS], imaginary: [0.0; TERMS] }; points];
+        let mut values = vec![ComplexTerms { real: [1.0; TERMS], imaginary: [0.0; TERMS] }; points];
         let mut stepped = values.clone();
         let mut steps = correlations.iter().rev();
         for scaled in scaled.iter().rev() {
@@ -134,10 +134,10 @@ fn variance_of_sum(nodes: &[(f64, f64)]) -> f64 {
 }
 
 /// Multiplies the values at each point j by `e^(i k rate j distance)` and by the weight of the trapezoidal rule.
-fn turn(values: &mut [Terms], rate: f64, distance: f64) {
+fn turn(values: &mut [ComplexTerms], rate: f64, distance: f64) {
     let once: [(f64, f64); TERMS] = std::array::from_fn(|term| (term as f64 * rate * distance).sin_cos());
     let (mut cosines, mut sines) = ([distance; TERMS], [0.0; TERMS]);
-    for Terms { real, imaginary } in values.iter_mut() {
+    for ComplexTerms { real, imaginary } in values.iter_mut() {
         for term in 0..TERMS {
             let (cosine, sine) = (cosines[term], sines[term]);
             (real[term], imaginary[term]) =
@@ -148,7 +148,7 @@ fn turn(values: &mut [Terms], rate: f64, distance: f64) {
         }
     }
     // The integrand is even, with the slope i k rate at 0.
-    let Terms { real, imaginary } = &mut values[0];
+    let ComplexTerms { real, imaginary } = &mut values[0];
     for term in 0..TERMS {
         let slope = distance * term as f64 * rate / 12.0;
         (real[term], imaginary[term]) =
@@ -158,7 +158,7 @@ fn turn(values: &mut [Terms], rate: f64, distance: f64) {
 
 /// Computes the mean of `values`, which are even, one step before.
 #[inline(always)]
-fn step(values: &[Terms], before: &mut [Terms], correlation: f64, distance: f64) {
+fn step(values: &[ComplexTerms], before: &mut [ComplexTerms], correlation: f64, distance: f64) {
     let spread = (1.0 - correlation * correlation).sqrt();
     let last = values.len() as f64 - 1.0;
     for (point, before) in before.iter_mut().enumerate() {
@@ -175,7 +175,7 @@ fn step(values: &[Terms], before: &mut [Terms], correlation: f64, distance: f64)
                 imaginary[term] = density.mul_add(terms.imaginary[term], imaginary[term]);
             }
         }
-        *before = Terms { real, imaginary };
+        *before = ComplexTerms { real, imaginary };
     }
 }
 

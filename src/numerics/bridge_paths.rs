@@ -88,13 +88,13 @@ fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
 
 /// Position of a node in the dyadic grid: between `left` and the next grid point, with these weights. The remaining
 /// variance is that of a normal with this deviation, which is 0 at a grid point.
-struct Place {
+struct GridPosition {
     left: usize,
     weights: [f64; 2],
     deviation: f64,
 }
 
-impl Place {
+impl GridPosition {
     /// Returns the place of node i/n among `cells`. Given the grid's path, B is normal about the line between the
     /// adjacent grid points.
     fn of(node: usize, sample_size: usize, cells: usize) -> Self {
@@ -102,7 +102,7 @@ impl Place {
         let left = (position as usize).min(cells - 1);
         let share = position - left as f64;
         let deviation = (share * (1.0 - share) / cells as f64).sqrt();
-        Place { left, weights: [1.0 - share, share], deviation }
+        GridPosition { left, weights: [1.0 - share, share], deviation }
     }
 
     fn value(&self, bridge: &[f64], generator: &mut impl Rng) -> f64 {
@@ -127,7 +127,7 @@ impl AbsoluteBridges {
     fn simulated(sample_size: usize, paths: usize, seed: u64, divisor: Divisor) -> Self {
         let nodes = sample_size.saturating_sub(1);
         let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
-        let places: Vec<Place> = (1..=nodes).map(|node| Place::of(node, sample_size, cells)).collect();
+        let places: Vec<GridPosition> = (1..=nodes).map(|node| GridPosition::of(node, sample_size, cells)).collect();
         let times: Vec<f64> = (1..=nodes).map(|node| node as f64 / sample_size as f64).collect();
         let mut bridge = vec![0.0; cells + 1];
         let path = |index: usize, path: &mut [f64]| {
@@ -265,7 +265,7 @@ mod tests {
         for sample_size in [3, 10, 600] {
             let mut cells = vec![0.0; LEAST_CELLS.max(4 * sample_size).next_power_of_two() + 1];
             let nodes = [sample_size / 3, sample_size / 2, sample_size - 1].map(|node| node.max(1));
-            let places = nodes.map(|node| Place::of(node, sample_size, cells.len() - 1));
+            let places = nodes.map(|node| GridPosition::of(node, sample_size, cells.len() - 1));
             let mut sums = [[0.0; 3]; 3];
             for path in 0..20_000 {
                 refine(&mut cells, &mut stream(5, "bridge", 0, path));
@@ -311,7 +311,7 @@ mod tests {
         for size in [2, 10, 600] {
             let bridges = AbsoluteBridges::simulate(size, 300, 5);
             let cells = LEAST_CELLS.max(4 * size).next_power_of_two();
-            let places: Vec<Place> = (1..size).map(|node| Place::of(node, size, cells)).collect();
+            let places: Vec<GridPosition> = (1..size).map(|node| GridPosition::of(node, size, cells)).collect();
             let times: Vec<f64> = (1..size).map(|node| node as f64 / size as f64).collect();
             let mut bridge = vec![0.0; cells + 1];
             for index in 0..300 {

@@ -21,7 +21,7 @@ const NO_MASS: f64 = 1e-14;
 const NONE: Share = (0, 0.0);
 
 /// The weights of gaps, for laws of one size and retention.
-pub(super) struct Places<'a> {
+pub(super) struct SizedGaps<'a> {
     bridges: &'a AbsoluteBridges,
     /// Total weight of all values of a law.
     total: f64,
@@ -31,17 +31,17 @@ pub(super) struct Places<'a> {
     near: usize,
 }
 
-impl<'a> Places<'a> {
+impl<'a> SizedGaps<'a> {
     /// Prepares for laws of `size` values whose weights sum to `total`.
     pub fn new(bridges: &'a AbsoluteBridges, size: usize, total: f64, retention: f64, which: Statistic) -> Self {
         if let Times::Sample(own) = bridges.times {
             assert_eq!(own, size + usize::from(which == Statistic::OneLater), "bridges of the sample size of the law");
         }
-        Places { bridges, total, retention, which, near: 0 }
+        SizedGaps { bridges, total, retention, which, near: 0 }
     }
 
     pub fn of_laws_like(bridges: &'a AbsoluteBridges, law: &EmpiricalDistribution, which: Statistic) -> Self {
-        Places::new(bridges, law.sample_size(), law.total_weight(), law.retention(), which)
+        SizedGaps::new(bridges, law.sample_size(), law.total_weight(), law.retention(), which)
     }
 
     /// Returns the times and weights of a gap with values of total weight `below` under it.

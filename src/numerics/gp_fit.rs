@@ -89,7 +89,7 @@ pub fn fit(
             let some_inputs = inputs.select_rows(&chosen);
             let some = |values: &Vec<f64>| chosen.iter().map(|&row| values[row]).collect();
             let some_targets: Vec<Vec<f64>> = targets.iter().map(some).collect();
-            let search = Search { inputs: &some_inputs, targets: &some_targets, bounds, stop };
+            let search = LikelihoodSearch { inputs: &some_inputs, targets: &some_targets, bounds, stop };
             let found = search.run(&point, curvature_of_a_row.as_ref())?;
             point = found.minimum.point;
             evaluations += found.minimum.evaluations;
@@ -101,7 +101,7 @@ pub fn fit(
     }
     shorten(&mut point, inputs.ncols());
     let Optimum { minimum, signal_variance } =
-        Search { inputs, targets, bounds, stop }.run(&point, curvature_of_a_row.as_ref())?;
+        LikelihoodSearch { inputs, targets, bounds, stop }.run(&point, curvature_of_a_row.as_ref())?;
     Ok(Fit {
         hyperparameters: hyperparameters(&minimum.point, signal_variance),
         log_likelihood: -minimum.value,
@@ -116,7 +116,7 @@ fn shorten(point: &mut [f64], inputs: usize) {
 }
 
 /// A search for the most likely hyperparameters of some rows.
-struct Search<'a> {
+struct LikelihoodSearch<'a> {
     inputs: &'a DMatrix<f64>,
     targets: &'a [Vec<f64>],
     bounds: &'a Bounds,
@@ -131,7 +131,7 @@ struct Optimum {
     signal_variance: f64,
 }
 
-impl Search<'_> {
+impl LikelihoodSearch<'_> {
     /// Returns the best point found from `start`, by L-BFGS-B, or by quasi-Newton steps if the curvature is known.
     fn run(&self, start: &[f64], curvature_of_a_row: Option<&DMatrix<f64>>) -> Result<Optimum, FitError> {
         let (lower, upper) = self.limits();
@@ -201,7 +201,7 @@ impl Search<'_> {
     /// holds s2, it moves against nu. Profiling removes the ridge along which s2 and the length scales compensate each
     /// other, and with it most iterations of a search. `None` if A is singular. Cost as [`likelihood`].
     fn profiled(&self, point: &[f64], matrices: &mut Matrices) -> Option<Likelihood> {
-        let Search { inputs, targets, bounds, .. } = *self;
+        let LikelihoodSearch { inputs, targets, bounds, .. } = *self;
         let unit = hyperparameters(point, 1.0);
         let ratio = unit.noise_variance;
         let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);

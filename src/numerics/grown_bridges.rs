@@ -21,7 +21,7 @@ const LAWS_A_TABLE: usize = 4;
 
 /// A number for each path of a block. In single precision a sum along the base is off by about 1e-6 of itself,
 /// differently in every path.
-type Block = [f32; PATHS];
+type PathBlock = [f32; PATHS];
 
 /// An added value, and the number of values of the base at or below it.
 type Learned = (f64, usize);
@@ -29,16 +29,16 @@ type Learned = (f64, usize);
 /// Tables from which the statistics of laws are assembled, for a block of paths.
 struct Tables {
     /// `|B(t_(k-1))| - |B(t_k)|` for k from 1.
-    falls: Vec<Block>,
+    falls: Vec<PathBlock>,
     /// For each number of smaller added values, the sums of value times fall over the first values of the base.
-    sums: Vec<Block>,
+    sums: Vec<PathBlock>,
     /// Length of the sums for one number: one more than the base has values.
     stride: usize,
 }
 
 /// Returns the bytes of the tables for laws that add `learned` values to a base, or 0 if the tables are not made.
 pub fn table_bytes(base: usize, learned: usize) -> usize {
-    let bytes = (learned + 1).saturating_mul(base + 1).saturating_mul(size_of::<Block>());
+    let bytes = (learned + 1).saturating_mul(base + 1).saturating_mul(size_of::<PathBlock>());
     if bytes <= MOST_BYTES { bytes } else { 0 }
 }
 
@@ -83,7 +83,7 @@ impl AbsoluteBridges {
     /// Returns `|B|` at a time, from 1, over the paths from `first` on; at 0 and at 1, after the last time, a bridge is
     /// 0.
     #[inline(always)]
-    fn some(&self, time: usize, first: usize) -> Block {
+    fn some(&self, time: usize, first: usize) -> PathBlock {
         let mut block = [0.0; PATHS];
         if let Some(&unit) = time.checked_sub(1).and_then(|time| self.units.get(time)) {
             let values = &self.values[first / bridge_paths::PATHS * self.units.len() + time - 1];
@@ -130,7 +130,7 @@ impl Tables {
 
     /// Returns the statistic of a law with these added values.
     #[inline(always)]
-    fn law(&self, learned: &[Learned]) -> Block {
+    fn law(&self, learned: &[Learned]) -> PathBlock {
         let (mut sum, mut from) = ([0.0; PATHS], 0);
         for (smaller, &(value, below)) in learned.iter().enumerate() {
             let sums = &self.sums[smaller * self.stride..][..self.stride];

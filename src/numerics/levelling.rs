@@ -14,30 +14,30 @@
 
 /// The cost of moving logarithms of positions.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Ground {
+pub enum GroundMetric {
     /// The largest move.
     Sup,
     /// The weighted sum of the moves, with positive weights.
     Weighted(Vec<f64>),
 }
 
-impl Ground {
+impl GroundMetric {
     /// Returns true if the cost is the largest move.
     pub fn is_sup(&self) -> bool {
-        matches!(self, Ground::Sup)
+        matches!(self, GroundMetric::Sup)
     }
 
     /// Returns the movement of a position per unit of level.
     fn speed(&self, index: usize, position: f64) -> f64 {
         match self {
-            Ground::Sup => position,
-            Ground::Weighted(weights) => weights[index],
+            GroundMetric::Sup => position,
+            GroundMetric::Weighted(weights) => weights[index],
         }
     }
 
     /// Returns the weight of its move in the sum of costs; 0 if the cost is the largest move.
     fn weight(&self, index: usize) -> f64 {
-        if let Ground::Weighted(weights) = self { weights[index] } else { 0.0 }
+        if let GroundMetric::Weighted(weights) = self { weights[index] } else { 0.0 }
     }
 
     /// Returns a position once the level is reached.
@@ -48,8 +48,8 @@ impl Ground {
     /// Returns the cost of the positions at this level; `ratio(i)` is the original position divided by the lowered one.
     pub fn cost(&self, count: usize, level: f64, ratio: impl Fn(usize) -> f64) -> f64 {
         match self {
-            Ground::Sup => -level.min(1.0).ln(),
-            Ground::Weighted(weights) => {
+            GroundMetric::Sup => -level.min(1.0).ln(),
+            GroundMetric::Weighted(weights) => {
                 let moved = (0..count).map(|index| (weights[index], ratio(index))).filter(|(_, ratio)| *ratio > 1.0);
                 moved.map(|(weight, ratio)| weight * ratio.ln()).sum()
             }
@@ -59,7 +59,7 @@ impl Ground {
 
 /// A part of the path along which the same positions move: the sum is `fixed + speed * level`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Phase {
+pub struct FillingPhase {
     /// The sum of the positions that do not move, and of anything that is not a position.
     pub fixed: f64,
     /// The sum of the moving positions per unit of level.
@@ -78,7 +78,7 @@ pub struct Levelling {
     /// Levels at which a position ends (true) or starts (false) to move, ascending.
     turns: Vec<(f64, bool, usize)>,
     /// Phases, from the lowest level up.
-    phases: Vec<Phase>,
+    phases: Vec<FillingPhase>,
 }
 
 impl Levelling {
@@ -86,13 +86,13 @@ impl Levelling {
     /// position at or below its floor, or of 0, does not move. Cost O(d ln d) for d positions.
     ///
     /// Sums run from the lowest level up, so that large terms do not round away small ones, whose logarithm is needed.
-    pub fn phases(&mut self, rest: f64, positions: &[f64], floors: &[f64], ground: &Ground) -> &[Phase] {
+    pub fn phases(&mut self, rest: f64, positions: &[f64], floors: &[f64], ground: &GroundMetric) -> &[FillingPhase] {
         self.turns.clear();
         self.phases.clear();
         if ground.is_sup() && floors.iter().all(|floor| *floor <= 0.0) {
             // All positions fall together, without an end.
             let speed = positions.iter().sum();
-            let whole = Phase { fixed: rest, speed, rate: 1.0, high: 1.0, low: 0.0 };
+            let whole = FillingPhase { fixed: rest, speed, rate: 1.0, high: 1.0, low: 0.0 };
             self.phases.extend((speed > 0.0).then_some(whole));
             return &self.phases;
         }
@@ -115,7 +115,7 @@ impl Levelling {
         for &(level, ends, index) in &self.turns {
             if level > low && moving > 0 {
                 let rate = if ground.is_sup() { 1.0 } else { rate };
-                self.phases.push(Phase { fixed, speed, rate, high: level, low });
+                self.phases.push(FillingPhase { fixed, speed, rate, high: level, low });
             }
             low = level;
             let own = ground.speed(index, positions[index]);
@@ -157,7 +157,7 @@ mod tests {
     use crate::numerics::streams::stream;
 
     /// Returns the sum at a cost, along the phases from the top down.
-    fn least(phases: &[Phase], whole: f64, mut cost: f64) -> f64 {
+    fn least(phases: &[FillingPhase], whole: f64, mut cost: f64) -> f64 {
         let mut sum = whole;
         for phase in phases.iter().rev() {
             let whole = phase.rate * (phase.high / phase.low).ln();
@@ -196,7 +196,7 @@ mod tests {
             let floors: Vec<f64> = positions.iter().map(|position| position * draw(0.0, share, &mut random)).collect();
             let weights: Vec<f64> = (0..3).map(|_| draw(0.1, 1.0, &mut random)).collect();
             let (rest, cost) = (draw(0.0, 0.5, &mut random), draw(0.0, 1.5, &mut random));
-            for ground in [Ground::Sup, Ground::Weighted(weights.clone())] {
+            for ground in [GroundMetric::Sup, GroundMetric::Weighted(weights.clone())] {
                 let whole = rest + positions.iter().sum::<f64>();
                 let mut levelling = Levelling::default();
                 let found = least(levelling.phases(rest, &positions, &floors, &ground), whole, cost);
@@ -206,18 +206,18 @@ mod tests {
                 let mut best = f64::INFINITY;
                 for (first, second) in (0..=steps).flat_map(|first| (0..=steps).map(move |second| (first, second))) {
                     let part = |index: usize, count: i32| match ground {
-                        Ground::Sup => cost,
-                        Ground::Weighted(_) => cost / weights[index] * f64::from(count) / f64::from(steps),
+                        GroundMetric::Sup => cost,
+                        GroundMetric::Weighted(_) => cost / weights[index] * f64::from(count) / f64::from(steps),
                     };
                     let spent = weights[0] * part(0, first) + weights[1] * part(1, second);
-                    let third = if ground == Ground::Sup { cost } else { (cost - spent) / weights[2] };
+                    let third = if ground == GroundMetric::Sup { cost } else { (cost - spent) / weights[2] };
                     if third < -1e-12 {
                         continue;
                     }
                     let moves = [part(0, first), part(1, second), third];
                     let lowered = |index: usize| (positions[index] * (-moves[index]).exp()).max(floors[index]);
                     best = best.min(rest + (0..3).map(lowered).sum::<f64>());
-                    if ground == Ground::Sup {
+                    if ground == GroundMetric::Sup {
                         break;
                     }
                 }

@@ -49,7 +49,7 @@ struct Trial {
 }
 
 /// State of the search: the last evaluation, so that none is repeated, and the best.
-struct Record<F> {
+struct SearchState<F> {
     objective: F,
     last: Option<Trial>,
     best: Option<(Vec<f64>, f64)>,
@@ -57,7 +57,7 @@ struct Record<F> {
     evaluations: usize,
 }
 
-impl<F: FnMut(&[f64]) -> (f64, Vec<f64>)> Record<F> {
+impl<F: FnMut(&[f64]) -> (f64, Vec<f64>)> SearchState<F> {
     fn evaluate(&mut self, point: &[f64]) -> &Trial {
         if self.last.as_ref().is_none_or(|last| last.point != point) {
             self.evaluations += 1;
@@ -81,7 +81,7 @@ impl<F: FnMut(&[f64]) -> (f64, Vec<f64>)> Record<F> {
 }
 
 struct BoxProblem<'a, F> {
-    record: &'a RefCell<Record<F>>,
+    record: &'a RefCell<SearchState<F>>,
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
@@ -128,7 +128,7 @@ pub fn minimise_bounded(
 ) -> Minimum {
     assert!(start.len() == lower.len() && start.len() == upper.len(), "start and bounds differ in length");
     let start: Vec<f64> = start.iter().zip(lower).zip(upper).map(|((x, l), u)| x.max(*l).min(*u)).collect();
-    let record = RefCell::new(Record {
+    let record = RefCell::new(SearchState {
         objective: objective_and_gradient,
         last: None,
         best: None,
@@ -147,7 +147,7 @@ pub fn minimise_bounded(
 }
 
 fn search<F: FnMut(&[f64]) -> (f64, Vec<f64>)>(
-    record: &RefCell<Record<F>>,
+    record: &RefCell<SearchState<F>>,
     start: &[f64],
     lower: &[f64],
     upper: &[f64],

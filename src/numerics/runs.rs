@@ -6,20 +6,20 @@ use std::ops::Range;
 
 /// Adjacent points whose mass all goes to one point.
 #[derive(Debug, Clone)]
-pub(super) struct Run {
+pub(super) struct MassRun {
     pub points: Range<usize>,
     pub to: usize,
 }
 
 /// Returns the target of the run at a point, if there is one, and the end of that run or the start of the next. Drops
 /// runs that end before the point.
-pub(super) fn passed(runs: &mut &[Run], at: usize) -> (Option<usize>, usize) {
+pub(super) fn passed(runs: &mut &[MassRun], at: usize) -> (Option<usize>, usize) {
     let before = runs.iter().take_while(|run| run.points.end <= at).count();
     *runs = &runs[before..];
     match runs.first() {
         None => (None, usize::MAX),
-        Some(Run { points, to }) if points.start <= at => (Some(*to), points.end),
-        Some(Run { points, .. }) => (None, points.start),
+        Some(MassRun { points, to }) if points.start <= at => (Some(*to), points.end),
+        Some(MassRun { points, .. }) => (None, points.start),
     }
 }
 
@@ -55,7 +55,7 @@ impl Levels<'_> {
 
     /// Finds the runs of `from` that go down to a point of `between`.
     #[inline(always)]
-    pub fn downs(self, between: &Range<usize>, from: &Range<usize>, downs: &mut Vec<Run>) {
+    pub fn downs(self, between: &Range<usize>, from: &Range<usize>, downs: &mut Vec<MassRun>) {
         downs.clear();
         let (mut at, end) = (between.start, from.end);
         let rises = |pairs| self.steps(pairs, |level, next| next > level);
@@ -63,14 +63,14 @@ impl Levels<'_> {
             at = first(to + 2..end, self.as_low(to)).unwrap_or(end);
             let points = from.start.max(to + 1)..at;
             if !points.is_empty() {
-                downs.push(Run { points, to });
+                downs.push(MassRun { points, to });
             }
         }
     }
 
     /// Finds the runs of `from` that go up to a point of `between`, from the highest on.
     #[inline(always)]
-    pub fn ups(self, between: &Range<usize>, from: &Range<usize>, ups: &mut Vec<Run>) {
+    pub fn ups(self, between: &Range<usize>, from: &Range<usize>, ups: &mut Vec<MassRun>) {
         ups.clear();
         let (start, mut end) = (from.start, between.end);
         let falls = |pairs| self.steps(pairs, |level, next| level > next);
@@ -79,7 +79,7 @@ impl Levels<'_> {
             end = last(start..highest, self.as_low(to)).map_or(start, |low| low + 1);
             let points = end..from.end.min(to);
             if !points.is_empty() {
-                ups.push(Run { points, to });
+                ups.push(MassRun { points, to });
             }
         }
     }

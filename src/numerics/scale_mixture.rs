@@ -49,13 +49,13 @@ pub struct ScaleMixture {
 /// Warm start for the next quantile of similar draws.
 #[derive(Debug, Clone, Default)]
 pub struct LastQuantile {
-    found: Option<Found>,
+    found: Option<MixtureFit>,
     /// The mean of the draws divided by each of them.
     over: Vec<f32>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Found {
+struct MixtureFit {
     /// Position of the draws along their line.
     at: f64,
     /// The quantile divided by the mean of the draws, and its rate of change along the line.
@@ -66,7 +66,7 @@ struct Found {
 
 /// Start of a search: a quantile divided by the mean of the draws, the slope of the share in ln q there, and the
 /// relative error of that slope.
-struct Start {
+struct SearchStart {
     ratio: f64,
     slope: f64,
     slope_error: f64,
@@ -98,7 +98,7 @@ impl ScaleMixture {
     pub fn quantile_with_error(&self, share: f64, draws: &[f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, 0.0, &mut last);
-        let Some(Found { ratio, slope, .. }) = last.found else { return (0.0, 0.0) };
+        let Some(MixtureFit { ratio, slope, .. }) = last.found else { return (0.0, 0.0) };
         // Moved, as a dispatched closure must be.
         let share = share as f32;
         let variance = self.mean(ratio, &last.over, move |below| (below - share) * (below - share));
@@ -113,7 +113,7 @@ impl ScaleMixture {
         }
         let LastQuantile { found, over } = last;
         let start = match found {
-            Some(last) => Start {
+            Some(last) => SearchStart {
                 ratio: (last.ratio + last.rate * (at - last.at)).max(0.5 * last.ratio),
                 slope: last.slope,
                 slope_error: LAST_SLOPE_ERROR,
@@ -126,18 +126,18 @@ impl ScaleMixture {
         dispatched!(over.extend(draws.iter().map(|draw| 1.0 / (draw * inverse) as f32)));
         let (ratio, slope) = search(tolerance, share, start, |ratio| self.mean(ratio, over, |below| below));
         let rate = found.filter(|before| before.at != at).map(|before| (ratio - before.ratio) / (at - before.at));
-        *found = Some(Found { at, ratio, rate: rate.unwrap_or_default(), slope });
+        *found = Some(MixtureFit { at, ratio, rate: rate.unwrap_or_default(), slope });
         ratio * mean
     }
 
     /// Returns the quantile and its slope as if R h were lognormal with approximately its mean and variance; ln R has a
     /// variance of about 1/(2 m). Within 2 % from m = 20 on, which saves half of a search.
-    fn lognormal(&self, share: f64, mean: f64, draws: &[f64]) -> Start {
+    fn lognormal(&self, share: f64, mean: f64, draws: &[f64]) -> SearchStart {
         let square = dot(draws, draws) / draws.len() as f64;
         let spread = (square / (mean * mean)).ln().max(0.0);
         let deviation = (spread + 0.5 / (self.typical * self.typical)).sqrt();
         let normal = normal_quantile(share);
-        Start {
+        SearchStart {
             ratio: self.typical * (normal * deviation - 0.5 * spread).exp(),
             slope: (-0.5 * normal * normal).exp() / ((2.0 * PI).sqrt() * deviation),
             slope_error: LOGNORMAL_SLOPE_ERROR,
@@ -194,8 +194,8 @@ fn sum_of(values: &[f32]) -> f64 {
 /// Finds q over the mean of h at which `share_below`, the mean of F(q / h), is `share`; also returns the slope there in
 /// ln q. Takes secant steps from the start, or halves the bracket if a step leaves it, until the error is below the
 /// tolerance.
-fn search(tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
-    let Start { mut ratio, mut slope, mut slope_error } = start;
+fn search(tolerance: f64, share: f64, start: SearchStart, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
+    let SearchStart { mut ratio, mut slope, mut slope_error } = start;
     let (mut low, mut high) = (0.0, f64::INFINITY);
     let mut before: Option<(f64, f64)> = None;
     for _ in 0..STEP_LIMIT {

@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use super::dispatch::dispatched;
-use super::runs::{Levels, Run, passed};
+use super::runs::{Levels, MassRun, passed};
 
 /// A ball around a discrete law: `masses[k]` is at `support[k]` (ascending, distinct), and the masses sum to 1.
 #[derive(Debug, Clone, Copy)]
@@ -49,14 +49,14 @@ pub struct WorstLaw {
 
 /// The destination of all mass at one multiplier: its cost in distance, and the amount by which it lowers the mean.
 #[derive(Debug, Clone, Copy)]
-struct Plan {
+struct DualPlan {
     multiplier: f64,
     cost: f64,
     loss: f64,
 }
 
 /// The plan that moves nothing.
-const STAYING: Plan = Plan { multiplier: f64::INFINITY, cost: 0.0, loss: 0.0 };
+const STAYING: DualPlan = DualPlan { multiplier: f64::INFINITY, cost: 0.0, loss: 0.0 };
 /// The most plans tried: each nearly halves the remaining interval.
 const PLAN_LIMIT: usize = 200;
 /// The factors of a guessed multiplier that are tried, to bound it from both sides.
@@ -65,14 +65,14 @@ const GUESSES: [f64; 3] = [0.99, 1.01, 0.8];
 const ROUNDING: f64 = 1e-12;
 
 /// The two plans between which the worst law spends the radius, and the multiplier at which both are optimal.
-struct Edge {
-    near: Plan,
-    far: Plan,
+struct OptimalFace {
+    near: DualPlan,
+    far: DualPlan,
     multiplier: f64,
 }
 
 /// A search for the points at which `v + gamma distance` is least.
-struct Search<'a> {
+struct MinimumSearch<'a> {
     ball: &'a WassersteinBall<'a>,
     payoff: &'a [f64],
     /// Range of the mass that may still move: mass that stays at one multiplier stays at every greater one.
@@ -80,25 +80,25 @@ struct Search<'a> {
     /// Range that contains this mass and every point it may move to.
     between: Range<usize>,
     /// The runs moved by the latest plan, ascending.
-    runs: Vec<Run>,
+    runs: Vec<MassRun>,
     /// The runs that would move if all moved down, ascending, and if all moved up, descending.
-    downs: Vec<Run>,
-    ups: Vec<Run>,
+    downs: Vec<MassRun>,
+    ups: Vec<MassRun>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> MinimumSearch<'a> {
     fn new(ball: &'a WassersteinBall<'a>, payoff: &'a [f64]) -> Self {
         let has_mass = |mass: &f64| *mass > 0.0;
         let first = ball.masses.iter().position(has_mass).unwrap_or(0);
         let end = ball.masses.iter().rposition(has_mass).map_or(0, |last| last + 1);
         let (from, between) = (first..end, 0..ball.support.len());
-        Search { ball, payoff, from, between, runs: Vec::new(), downs: Vec::new(), ups: Vec::new() }
+        MinimumSearch { ball, payoff, from, between, runs: Vec::new(), downs: Vec::new(), ups: Vec::new() }
     }
 
     /// Finds the runs that move at a multiplier, each in the better of two directions. Cost O(points between).
     fn look(&mut self, multiplier: f64) {
         let (support, payoff) = (self.ball.support, self.payoff);
-        let Search { from, between, runs, downs, ups, .. } = self;
+        let MinimumSearch { from, between, runs, downs, ups, .. } = self;
         let levels = |slope: f64| Levels { support, payoff, slope };
         dispatched!(levels(multiplier).downs(between, from, downs));
         dispatched!(levels(-multiplier).ups(between, from, ups));
@@ -106,7 +106,7 @@ impl<'a> Search<'a> {
         runs.clear();
         let mut push = |points: Range<usize>, to: usize| {
             if !points.is_empty() {
-                runs.push(Run { points, to });
+                runs.push(MassRun { points, to });
             }
         };
         let (mut downs, mut ups, mut at) = (downs.as_slice(), ups.as_slice(), from.start);
@@ -130,23 +130,24 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the best plan at a multiplier. Cost O(points between).
-    fn plan(&mut self, multiplier: f64) -> Plan {
+    fn plan(&mut self, multiplier: f64) -> DualPlan {
         self.look(multiplier);
         let WassersteinBall { support, masses, .. } = *self.ball;
         let beyond = |values: &[f64]| {
-            let of_run =
-                |Run { points, to }: &Run| sum_beyond(values[*to], &values[points.clone()], &masses[points.clone()]);
+            let of_run = |MassRun { points, to }: &MassRun| {
+                sum_beyond(values[*to], &values[points.clone()], &masses[points.clone()])
+            };
             dispatched!(self.runs.iter().map(of_run).map(f64::abs).sum())
         };
         // All points of a run move in one direction, to a point with a lower payoff.
-        Plan { multiplier, cost: beyond(support), loss: beyond(self.payoff) }
+        DualPlan { multiplier, cost: beyond(support), loss: beyond(self.payoff) }
     }
 
     /// Drops the mass that stays in the latest plan; its multiplier must be below the one sought.
     fn narrow(&mut self) {
         let support = self.ball.support;
         let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
-        for Run { points, to } in &self.runs {
+        for MassRun { points, to } in &self.runs {
             let [first, last, to] = [points.start, points.end - 1, *to].map(|point| support[point]);
             // Mass that moved to one side may move less far to the other.
             (lowest, highest) = (lowest.min(to).min(2.0 * first - to), highest.max(to).max(2.0 * last - to));
@@ -161,12 +162,12 @@ impl<'a> Search<'a> {
 
     /// Finds the edge of the frontier of cost and loss on which the radius lies. The slope of a chord of the frontier
     /// is the multiplier of the plan farthest beyond it. That plan replaces one end of the chord, until there is none.
-    fn edge(&mut self, guess: f64) -> Edge {
+    fn edge(&mut self, guess: f64) -> OptimalFace {
         let radius = self.ball.radius;
         let (mut near, mut far) = (STAYING, None);
         let guesses = GUESSES.map(|factor| factor * guess).into_iter().filter(|guess| *guess > 0.0);
         for multiplier in guesses.chain([0.0]) {
-            if far.is_some_and(|far: Plan| multiplier <= far.multiplier) || multiplier >= near.multiplier {
+            if far.is_some_and(|far: DualPlan| multiplier <= far.multiplier) || multiplier >= near.multiplier {
                 continue;
             }
             let plan = self.plan(multiplier);
@@ -179,9 +180,9 @@ impl<'a> Search<'a> {
         }
         let Some(mut far) = far else {
             // The rest of the radius gains nothing.
-            return Edge { near, far: near, multiplier: 0.0 };
+            return OptimalFace { near, far: near, multiplier: 0.0 };
         };
-        let chord = |near: Plan, far: Plan| (far.loss - near.loss) / (far.cost - near.cost);
+        let chord = |near: DualPlan, far: DualPlan| (far.loss - near.loss) / (far.cost - near.cost);
         for _ in 0..PLAN_LIMIT {
             let multiplier = chord(near, far);
             let plan = self.plan(multiplier);
@@ -196,15 +197,15 @@ impl<'a> Search<'a> {
                 near = plan;
             }
         }
-        Edge { near, far, multiplier: chord(near, far) }
+        OptimalFace { near, far, multiplier: chord(near, far) }
     }
 
     /// Returns the point to which a plan sends the mass of each point.
-    fn destinations(&mut self, plan: Plan) -> Vec<usize> {
+    fn destinations(&mut self, plan: DualPlan) -> Vec<usize> {
         let mut places: Vec<usize> = (0..self.payoff.len()).collect();
         if plan.multiplier < f64::INFINITY {
             self.look(plan.multiplier);
-            self.runs.iter().for_each(|Run { points, to }| places[points.clone()].fill(*to));
+            self.runs.iter().for_each(|MassRun { points, to }| places[points.clone()].fill(*to));
         }
         places
     }
@@ -238,7 +239,7 @@ impl WassersteinBall<'_> {
     /// Returns the same values, up to rounding, given a guess of the multiplier, or 0: half as many plans if the guess
     /// is good.
     pub fn worst_expectation_near(&self, payoff: &[f64], guess: f64) -> (f64, f64) {
-        let edge = Search::new(self, payoff).edge(guess);
+        let edge = MinimumSearch::new(self, payoff).edge(guess);
         (self.expectation(payoff, &edge), edge.multiplier)
     }
 
@@ -249,7 +250,7 @@ impl WassersteinBall<'_> {
 
     /// Returns the worst law given a guess of the multiplier, as in [`Self::worst_expectation_near`].
     pub fn worst_law_near(&self, payoff: &[f64], guess: f64) -> WorstLaw {
-        let mut search = Search::new(self, payoff);
+        let mut search = MinimumSearch::new(self, payoff);
         let edge = search.edge(guess);
         let [near, far] = [edge.near, edge.far].map(|plan| search.destinations(plan));
         let (mut budget, mut moves) = (self.radius - edge.near.cost, Vec::new());
@@ -298,7 +299,7 @@ impl WassersteinBall<'_> {
     }
 
     /// Returns the expectation under the law that spends the radius between the two plans of `edge`.
-    fn expectation(&self, payoff: &[f64], edge: &Edge) -> f64 {
+    fn expectation(&self, payoff: &[f64], edge: &OptimalFace) -> f64 {
         self.mean(payoff) - edge.near.loss - edge.multiplier * (self.radius - edge.near.cost)
     }
 }

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use super::choices::Choices;
 use super::dates::could_be_date;
 use super::number::{Mark, is_number, looks_numeric, number};
-use super::outcome::{Place, Stop};
+use super::outcome::{Stop, TextPosition};
 
 /// The most bytes of a text: a century of days for dozens of assets.
 const MOST_BYTES: usize = 8_000_000;
@@ -64,7 +64,7 @@ impl Cell<'_> {
 
     /// Returns the place of the cell and its value, in words.
     pub fn called(&self, name: &str) -> String {
-        let Place { line, column, value } = self.place();
+        let TextPosition { line, column, value } = self.place();
         let name = if name.is_empty() { format!("column {column}") } else { name.to_owned() };
         format!("line {line}: {name} is {value:?}")
     }
@@ -77,25 +77,25 @@ impl Cell<'_> {
         }
     }
 
-    fn place(&self) -> Place {
-        Place { line: self.line as usize, column: self.column as usize, value: self.shown() }
+    fn place(&self) -> TextPosition {
+        TextPosition { line: self.line as usize, column: self.column as usize, value: self.shown() }
     }
 }
 
 /// A line without its line ending, counted from 1.
 #[derive(Clone, Copy)]
-struct Line<'a> {
+struct TextLine<'a> {
     text: &'a str,
     number: u32,
 }
 
 /// Rows of cells without blank rows, and the number of lines that were comments.
-pub struct Rows<'a> {
+pub struct CellRows<'a> {
     pub rows: Vec<Vec<Cell<'a>>>,
     pub remarks: usize,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> CellRows<'a> {
     /// # Errors
     /// The text is too long or no text, or a comma in it has two possible meanings.
     pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
@@ -103,12 +103,12 @@ impl<'a> Rows<'a> {
         let end = if text.contains('\n') { '\n' } else { '\r' };
         check(text, end)?;
         let number =
-            |(index, text): (usize, &'a str)| Line { text, number: u32::try_from(index + 1).unwrap_or(u32::MAX) };
-        let given: Vec<Line> =
+            |(index, text): (usize, &'a str)| TextLine { text, number: u32::try_from(index + 1).unwrap_or(u32::MAX) };
+        let given: Vec<TextLine> =
             text.split(end).enumerate().map(number).filter(|line| !line.text.trim().is_empty()).collect();
         let declared = given.first().and_then(|line| declared(line.text));
         let from = usize::from(declared.is_some());
-        let lines: Vec<Line> = given[from..].iter().copied().filter(|line| !is_remark(line.text)).collect();
+        let lines: Vec<TextLine> = given[from..].iter().copied().filter(|line| !is_remark(line.text)).collect();
         if lines.is_empty() {
             return Err(Stop::refused("There are no numbers in the text."));
         }
@@ -122,7 +122,7 @@ impl<'a> Rows<'a> {
         if rows.is_empty() {
             return Err(Stop::refused("There are no numbers in the text."));
         }
-        Ok(Rows { rows, remarks: given.len() - lines.len() })
+        Ok(CellRows { rows, remarks: given.len() - lines.len() })
     }
 }
 
@@ -156,22 +156,22 @@ fn declared(line: &str) -> Option<char> {
 
 /// Returns the lines that end in a number, apart from separators. They show how cells are separated; words around a
 /// table do not.
-fn numeric<'a>(lines: &[Line<'a>]) -> Vec<Line<'a>> {
-    let ends_in_number = |line: &Line| {
+fn numeric<'a>(lines: &[TextLine<'a>]) -> Vec<TextLine<'a>> {
+    let ends_in_number = |line: &TextLine| {
         let rest = line.text.trim_end_matches(|letter: char| letter.is_whitespace() || "\",;|%)".contains(letter));
         rest.ends_with(|letter: char| letter.is_ascii_digit() || letter == '.')
     };
     // The line above the first such line may be its heading.
     let from = lines.iter().position(ends_in_number).unwrap_or(0).saturating_sub(1);
-    let is_shown = |(index, line): &(usize, &Line)| *index == from || ends_in_number(line);
-    let found: Vec<Line> = lines.iter().enumerate().filter(is_shown).map(|(_, line)| *line).collect();
+    let is_shown = |(index, line): &(usize, &TextLine)| *index == from || ends_in_number(line);
+    let found: Vec<TextLine> = lines.iter().enumerate().filter(is_shown).map(|(_, line)| *line).collect();
     if found.len() < 2 { lines.to_vec() } else { found }
 }
 
-fn separator(lines: &[Line], said: &Choices) -> Result<char, Stop> {
+fn separator(lines: &[TextLine], said: &Choices) -> Result<char, Stop> {
     let lines = &numeric(lines)[..];
     let holding = |wanted: char| {
-        let outside = |line: &&Line| line.text.split('"').step_by(2).any(|unquoted| unquoted.contains(wanted));
+        let outside = |line: &&TextLine| line.text.split('"').step_by(2).any(|unquoted| unquoted.contains(wanted));
         lines.iter().filter(outside).count()
     };
     let counts = SEPARATORS.map(|separator| (holding(separator), separator));
@@ -186,14 +186,14 @@ fn separator(lines: &[Line], said: &Choices) -> Result<char, Stop> {
         };
     }
     // Without commas each word is a cell, unless a quoted cell or a date of several words contains the blanks.
-    let is_whole = |line: &Line| !line.text.trim().contains(char::is_whitespace) || could_be_date(line.text.trim());
+    let is_whole = |line: &TextLine| !line.text.trim().contains(char::is_whitespace) || could_be_date(line.text.trim());
     let quoted = lines.iter().any(|line| line.text.contains('"'));
     Ok(if quoted || lines.iter().all(is_whole) { COMMA } else { BLANK })
 }
 
 /// Decides whether a comma separates cells or is a decimal or thousands mark within them. If the text allows both, a
 /// person must choose.
-fn comma(lines: &[Line]) -> Result<char, Stop> {
+fn comma(lines: &[TextLine]) -> Result<char, Stop> {
     let (parting, inside) = (strangers(lines, COMMA)?, strangers(lines, BLANK)?);
     if parting < inside {
         return Ok(COMMA);
@@ -212,7 +212,7 @@ fn comma(lines: &[Line]) -> Result<char, Stop> {
 
 /// Counts the cells that would be neither numbers nor dates if lines were split by `separator`; a heading is not
 /// counted.
-fn strangers(lines: &[Line], separator: char) -> Result<usize, Stop> {
+fn strangers(lines: &[TextLine], separator: char) -> Result<usize, Stop> {
     let lines = &lines[..lines.len().min(FIRST)];
     let rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
     let is_known = |cell: &Cell| cell.text.is_empty() || is_number(&cell.text) || could_be_date(&cell.text);
@@ -220,13 +220,13 @@ fn strangers(lines: &[Line], separator: char) -> Result<usize, Stop> {
     Ok(rows[usize::from(headed)..].iter().flatten().filter(|cell| !is_known(cell)).count())
 }
 
-fn cells(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
+fn cells(line: TextLine, separator: char) -> Result<Vec<Cell>, Stop> {
     if separator == BLANK { Ok(words(line)) } else { fields(line, separator) }
 }
 
 /// Splits a line at blanks. A comma at the end of a word is removed, and so are quotes around it; a percent sign
 /// belongs to the number before it.
-fn words(line: Line) -> Vec<Cell> {
+fn words(line: TextLine) -> Vec<Cell> {
     let mut found: Vec<Cell> = Vec::new();
     for word in line.text.split_whitespace() {
         let word = word.strip_suffix(COMMA).unwrap_or(word);
@@ -240,13 +240,13 @@ fn words(line: Line) -> Vec<Cell> {
     found
 }
 
-fn cell<'a>(line: Line<'a>, before: usize, text: Cow<'a, str>) -> Cell<'a> {
+fn cell<'a>(line: TextLine<'a>, before: usize, text: Cow<'a, str>) -> Cell<'a> {
     Cell { text, line: line.number, column: u32::try_from(before + 1).unwrap_or(u32::MAX) }
 }
 
 /// Splits a line at `separator`. Quotes protect a separator within them and are removed; a doubled quote within quotes
 /// is one quote.
-fn fields(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
+fn fields(line: TextLine, separator: char) -> Result<Vec<Cell>, Stop> {
     let mut found = Vec::new();
     let mut rest = Some(line.text);
     while let Some(text) = rest {

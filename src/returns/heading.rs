@@ -167,7 +167,7 @@ const FACTORS: [&str; 6] = ["smb", "hml", "rmw", "cma", "umd", "wml"];
 
 /// The span of the gains under a heading, if it is not the time since the row before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Span {
+pub enum GainSpan {
     SinceStart,
     Other,
 }
@@ -178,7 +178,7 @@ pub struct ColumnHeading {
     pub is_return: bool,
     pub is_price: bool,
     pub is_level: bool,
-    pub span: Option<Span>,
+    pub span: Option<GainSpan>,
     pub is_excess: bool,
 }
 
@@ -241,7 +241,7 @@ impl ColumnHeading {
             is_return,
             is_price: !is_return && (["price", "close"].iter().any(|word| lower.contains(word)) || has(&PRICES)),
             is_level: LEVELS.iter().any(|word| lower.contains(word)),
-            span: if has(&CUMULATED) { Some(Span::SinceStart) } else { is_span.then_some(Span::Other) },
+            span: if has(&CUMULATED) { Some(GainSpan::SinceStart) } else { is_span.then_some(GainSpan::Other) },
             is_excess: is_beyond_bank || has(&EXCESS),
         }
     }

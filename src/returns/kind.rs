@@ -7,7 +7,7 @@
 use super::cells::Cell;
 use super::choices::{Choices, Kind, Unit};
 use super::doubt::{is_around_one, is_slow, jump, unusual_moments};
-use super::heading::{ColumnHeading, Span};
+use super::heading::{ColumnHeading, GainSpan};
 use super::moments::{bulk, middle, moments, odd, spread};
 use super::number::{has_percent, money};
 use super::outcome::Stop;
@@ -176,15 +176,15 @@ impl Numbers<'_> {
     fn ask_slow(&self) -> Stop {
         let question = "Each number is near the one before, as gains cumulated since the start are and returns of a period are \
                         not. What are they?";
-        self.ask_gains(question, Span::SinceStart)
+        self.ask_gains(question, GainSpan::SinceStart)
     }
 
-    fn ask_span(&self, span: Span) -> Stop {
+    fn ask_span(&self, span: GainSpan) -> Stop {
         let question = match span {
-            Span::SinceStart => {
+            GainSpan::SinceStart => {
                 format!("Column {} is headed as gains cumulated since the start. What are its numbers?", self.name)
             }
-            Span::Other => format!(
+            GainSpan::Other => format!(
                 "Column {} is headed as gains over another span than that of its row. Are they returns of one period each?",
                 self.name
             ),
@@ -192,10 +192,10 @@ impl Numbers<'_> {
         self.ask_gains(&question, span)
     }
 
-    fn ask_gains(&self, question: &str, span: Span) -> Stop {
+    fn ask_gains(&self, question: &str, span: GainSpan) -> Stop {
         let option = |label: &str, kind| (label.to_owned(), Choices::from(kind));
         let mut options = Vec::new();
-        if span == Span::SinceStart {
+        if span == GainSpan::SinceStart {
             options.push(option(SINCE_START, Kind::Cumulated));
             if self.is_positive() {
                 options.push(option("Prices or levels", Kind::Price));

@@ -31,7 +31,7 @@ mod windows_1252;
 mod words;
 
 pub use choices::{Choices, Kind, RateUnit, Unit};
-pub use outcome::{Answer, Place, Question};
+pub use outcome::{Answer, Question, TextPosition};
 pub use reading::{Reading, read};
 pub use record::{BankRate, Record, Series};
 pub use sheet::{ColumnFound, Holds};

@@ -30,7 +30,7 @@ pub struct Answer {
 
 /// The place of an error in the text.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Place {
+pub struct TextPosition {
     /// Line, from 1.
     pub line: usize,
     /// Field of the line, from 1.
@@ -43,7 +43,7 @@ pub struct Place {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Stop {
     Asked(Vec<Question>),
-    Refused { sentence: String, place: Option<Place> },
+    Refused { sentence: String, place: Option<TextPosition> },
 }
 
 impl Stop {

@@ -11,8 +11,8 @@ use super::kept::KeptRows;
 use super::kind::{Beside, Numbers, Returns, called};
 use super::number::{Mark, number};
 use super::order::{is_newest_first, ordered};
-use super::outcome::{Answer, Place, Question, Stop, both};
-use super::record::{Found, Order, Record};
+use super::outcome::{Answer, Question, Stop, TextPosition, both};
+use super::record::{ColumnContents, Order, Record};
 use super::sheet::{Column, ColumnFound, Holds, Sheet};
 use crate::control::request::frequency::Frequency;
 
@@ -42,7 +42,7 @@ pub enum Reading {
         sentence: String,
         /// The place of the error, if it is at one place.
         #[serde(skip_serializing_if = "Option::is_none")]
-        place: Option<Place>,
+        place: Option<TextPosition>,
     },
 }
 
@@ -147,8 +147,14 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
         remarks.push("The rows came newest first and are turned round.".to_owned());
     }
     remarks.extend(order.remark.take().into_iter().chain(kept.remarks).chain(sheet.remarks.iter().cloned()));
-    let found =
-        Found { names: chosen.iter().map(|column| column.name.clone()).collect(), order, returns, rate, used, remarks };
+    let found = ColumnContents {
+        names: chosen.iter().map(|column| column.name.clone()).collect(),
+        order,
+        returns,
+        rate,
+        used,
+        remarks,
+    };
     Ok(found.record(sheet.found()))
 }
 

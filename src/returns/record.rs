@@ -103,7 +103,7 @@ impl Order {
 }
 
 /// The contents of the columns that are read.
-pub struct Found {
+pub struct ColumnContents {
     pub names: Vec<String>,
     pub order: Order,
     /// Returns by column, all of one length.
@@ -115,10 +115,10 @@ pub struct Found {
     pub remarks: Vec<String>,
 }
 
-impl Found {
+impl ColumnContents {
     /// Returns the record of the latest periods, with the sentence that describes it.
     pub fn record(self, columns: Vec<ColumnFound>) -> Record {
-        let Found { names, order, returns, rate, used, remarks } = self;
+        let ColumnContents { names, order, returns, rate, used, remarks } = self;
         let (count, periods_per_year) = (returns[0].simple.len(), order.periods_per_year());
         let Order { dates, is_turned, frequency, .. } = order;
         let series =

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::cells::{Cell, MOST_LINES, Rows};
+use super::cells::{Cell, CellRows, MOST_LINES};
 use super::choices::Choices;
 use super::dates::{are_dates, heads_dates};
 use super::heading::{aside, core, headings};
@@ -113,7 +113,7 @@ impl<'a> Sheet<'a> {
     /// # Errors
     /// Lines have different lengths, there are no numbers, or it is unclear whether the numbers form columns.
     pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
-        let Rows { rows, remarks: lines } = Rows::of(text, said)?;
+        let CellRows { rows, remarks: lines } = CellRows::of(text, said)?;
         let Table { heading, rows, mut remarks } = Table::of(rows)?;
         if lines > 0 {
             remarks.push(format!("{} of remarks passed over.", counted(lines, "line")));

@@ -12,7 +12,7 @@ use super::outcome::Stop;
 use super::unit::names_percent;
 use super::words::counted;
 
-type Row<'a> = Vec<Cell<'a>>;
+type TableRow<'a> = Vec<Cell<'a>>;
 
 /// The number of columns that are searched for dates, and of rows in which a form must occur at least once.
 const COLUMNS: usize = 8;
@@ -55,13 +55,13 @@ const EVENTS: [&str; 2] = ["dividend", "split"];
 
 /// A table, and sentences about the lines around it that are left out.
 pub struct Table<'a> {
-    pub heading: Option<Row<'a>>,
-    pub rows: Vec<Row<'a>>,
+    pub heading: Option<TableRow<'a>>,
+    pub rows: Vec<TableRow<'a>>,
     pub remarks: Vec<String>,
 }
 
 /// Consecutive rows that have a date in one form in one column.
-struct Block {
+struct DatedBlock {
     column: usize,
     form: Form,
     start: usize,
@@ -74,14 +74,14 @@ struct Block {
 impl<'a> Table<'a> {
     /// # Errors
     /// There are no numbers, or lines that are no rows split the table.
-    pub fn of(rows: Vec<Row<'a>>) -> Result<Self, Stop> {
+    pub fn of(rows: Vec<TableRow<'a>>) -> Result<Self, Stop> {
         if !rows.iter().flatten().any(|cell| has_digit(&cell.text)) {
             let word = rows.iter().flatten().find(|cell| !cell.text.is_empty()).map_or(String::new(), Cell::shown);
             return Err(Stop::refused(format!(
                 "There are no numbers in the text: it has words alone, such as {word:?}."
             )));
         }
-        match Block::longest(&rows) {
+        match DatedBlock::longest(&rows) {
             Some(block) => dated(rows, &block),
             None => Ok(undated(rows)),
         }
@@ -89,7 +89,7 @@ impl<'a> Table<'a> {
 }
 
 /// Splits the rows of `block` from the lines around them.
-fn dated<'a>(mut rows: Vec<Row<'a>>, block: &Block) -> Result<Table<'a>, Stop> {
+fn dated<'a>(mut rows: Vec<TableRow<'a>>, block: &DatedBlock) -> Result<Table<'a>, Stop> {
     let mut remarks = Vec::new();
     let after = rows.split_off(block.end);
     if let Some(first) = after.first() {
@@ -104,7 +104,7 @@ fn dated<'a>(mut rows: Vec<Row<'a>>, block: &Block) -> Result<Table<'a>, Stop> {
     if !rows.is_empty() {
         remarks.insert(0, left_out(&rows, "before the table"));
     }
-    let events: Vec<Row> = body.extract_if(.., |row| event(row).is_some()).collect();
+    let events: Vec<TableRow> = body.extract_if(.., |row| event(row).is_some()).collect();
     if let Some(cell) = events.first().and_then(|row| event(row)) {
         let what = counted(events.len(), "line");
         remarks.push(format!(
@@ -117,7 +117,7 @@ fn dated<'a>(mut rows: Vec<Row<'a>>, block: &Block) -> Result<Table<'a>, Stop> {
 }
 
 /// Builds a table without dates: the last of the first lines that hold words alone is the heading.
-fn undated(mut rows: Vec<Row>) -> Table {
+fn undated(mut rows: Vec<TableRow>) -> Table {
     let words = rows.iter().take_while(|row| row.iter().all(is_word)).count();
     let mut remarks = Vec::new();
     if words > 1 && words < rows.len() {
@@ -131,7 +131,7 @@ fn undated(mut rows: Vec<Row>) -> Table {
 }
 
 /// Returns true if the first row names the columns: it holds words alone, or has a blank cell above a column of dates.
-fn is_heading(rows: &[Row]) -> bool {
+fn is_heading(rows: &[TableRow]) -> bool {
     let [first, rest @ ..] = rows else { return false };
     let below =
         |index: usize| rest.iter().filter_map(|row| row.get(index)).map(|cell| cell.text.as_ref()).collect::<Vec<_>>();
@@ -152,16 +152,16 @@ fn has_digit(text: &str) -> bool {
     text.contains(|letter: char| letter.is_ascii_digit())
 }
 
-fn numbers(row: &Row) -> usize {
+fn numbers(row: &TableRow) -> usize {
     row.iter().filter(|cell| is_number(&cell.text)).count()
 }
 
-fn filled(row: &Row) -> usize {
+fn filled(row: &TableRow) -> usize {
     row.iter().filter(|cell| !cell.text.is_empty()).count()
 }
 
 /// Returns the cell of a row that records a dividend or a split instead of a price.
-fn event<'r, 'a>(row: &'r Row<'a>) -> Option<&'r Cell<'a>> {
+fn event<'r, 'a>(row: &'r TableRow<'a>) -> Option<&'r Cell<'a>> {
     row.iter().find(|cell| {
         let text = cell.text.to_ascii_lowercase();
         text.starts_with(|letter: char| letter.is_ascii_digit()) && EVENTS.iter().any(|event| text.contains(event))
@@ -174,8 +174,8 @@ fn is_total(text: &str) -> bool {
 }
 
 /// Returns for example "Lines 1 to 3 before the table are left out, from "Fund: Northern Lights" on."
-fn left_out(rows: &[Row], place: &str) -> String {
-    let line = |row: Option<&Row>| row.and_then(|row| row.first()).map_or(0, Cell::line);
+fn left_out(rows: &[TableRow], place: &str) -> String {
+    let line = |row: Option<&TableRow>| row.and_then(|row| row.first()).map_or(0, Cell::line);
     let (first, last) = (line(rows.first()), line(rows.last()));
     let words = rows.iter().flatten().find(|cell| !cell.text.is_empty()).map_or(String::new(), Cell::shown);
     if first == last {
@@ -186,8 +186,8 @@ fn left_out(rows: &[Row], place: &str) -> String {
 
 /// Describes the lines after the table. They are a second table if two rows have a number or a date, and a number next
 /// to it.
-fn told_after(after: &[Row]) -> String {
-    let is_row = |row: &&Row| {
+fn told_after(after: &[TableRow]) -> String {
+    let is_row = |row: &&TableRow| {
         let starts = row.first().is_some_and(|cell| has_digit(&cell.text) && !is_total(&cell.text));
         starts && row[1..].iter().any(|cell| is_number(&cell.text))
     };
@@ -198,33 +198,33 @@ fn told_after(after: &[Row]) -> String {
     format!("A second table begins at line {line} and is left out.")
 }
 
-impl Block {
+impl DatedBlock {
     /// Finds the longest block in the text; of equal ones, the first form and the first column win.
-    fn longest(rows: &[Row]) -> Option<Self> {
+    fn longest(rows: &[TableRow]) -> Option<Self> {
         let width = rows.iter().map(Vec::len).max().filter(|width| *width > 1)?;
         let numbers: Vec<usize> = rows.iter().map(numbers).collect();
         let numeric = numbers.iter().filter(|count| **count > 0).count();
-        let mut best: Option<Block> = None;
+        let mut best: Option<DatedBlock> = None;
         for form in FORMS {
             for column in 0..width.min(COLUMNS) {
-                let occurs = |row: &Row| row.get(column).is_some_and(|cell| form.date(&cell.text).is_some());
+                let occurs = |row: &TableRow| row.get(column).is_some_and(|cell| form.date(&cell.text).is_some());
                 if !rows.iter().take(FIRST).any(occurs) {
                     continue;
                 }
                 // Numbers are dates only if nearly all rows of the block have one, and years only if they are most of
                 // the text.
-                let is_most = |found: &Block| {
+                let is_most = |found: &DatedBlock| {
                     let share = found.count as f64 / (found.end - found.start) as f64;
                     (!form.is_digits() || share >= IN_DIGITS) && (form != YEAR || 2 * found.count >= numeric)
                 };
-                best = longer(best, Block::in_column(rows, &numbers, column, form).filter(is_most));
+                best = longer(best, DatedBlock::in_column(rows, &numbers, column, form).filter(is_most));
             }
         }
         best.filter(|best| best.count > 1)
     }
 
-    fn in_column(rows: &[Row], numbers: &[usize], column: usize, form: Form) -> Option<Self> {
-        let (mut best, mut current): (Option<Block>, Option<Block>) = (None, None);
+    fn in_column(rows: &[TableRow], numbers: &[usize], column: usize, form: Form) -> Option<Self> {
+        let (mut best, mut current): (Option<DatedBlock>, Option<DatedBlock>) = (None, None);
         for (index, row) in rows.iter().enumerate() {
             let date = row.get(column).filter(|_| row.len() > 1).and_then(|cell| form.date(&cell.text));
             match (date, &mut current) {
@@ -232,7 +232,8 @@ impl Block {
                     (block.end, block.count, block.last) = (index + 1, block.count + 1, date);
                 }
                 (Some(date), _) => {
-                    let block = Block { column, form, start: index, end: index + 1, count: 1, first: date, last: date };
+                    let block =
+                        DatedBlock { column, form, start: index, end: index + 1, count: 1, first: date, last: date };
                     best = longer(best, current.replace(block));
                 }
                 (None, Some(block)) if block.is_misdated(row, numbers[index]) => block.end = index + 1,
@@ -244,7 +245,7 @@ impl Block {
 
     /// Returns true if a row with `numbers` numbers has one besides its cell in the date column, which may be a date in
     /// another form.
-    fn is_misdated(&self, row: &Row, numbers: usize) -> bool {
+    fn is_misdated(&self, row: &TableRow, numbers: usize) -> bool {
         let is_one = |cell: &Cell| has_digit(&cell.text) && !is_total(&cell.text);
         let date = row.get(self.column).filter(|cell| is_one(cell));
         date.is_some_and(|cell| numbers > usize::from(is_number(&cell.text)))
@@ -252,8 +253,8 @@ impl Block {
 
     /// # Errors
     /// Rows of the table continue below the first line that is not a row.
-    fn check_end(&self, first: &Row, after: &[Row]) -> Result<(), Stop> {
-        let date = |row: &Row| Some((self.form.date(&row.get(self.column)?.text)?, row[self.column].line()));
+    fn check_end(&self, first: &TableRow, after: &[TableRow]) -> Result<(), Stop> {
+        let date = |row: &TableRow| Some((self.form.date(&row.get(self.column)?.text)?, row[self.column].line()));
         let Some((next, line)) = after.iter().filter(|row| row.len() > 1).find_map(date) else { return Ok(()) };
         let goes_on = if self.first <= self.last { next > self.last } else { next < self.last };
         let Some(cell) = first.get(self.column).or(first.first()).filter(|_| goes_on) else { return Ok(()) };
@@ -264,8 +265,8 @@ impl Block {
     }
 
     /// Counts the last rows before the table that are its headings, one above the other.
-    fn levels(&self, before: &[Row], width: usize) -> usize {
-        let is_words = |row: &Row| row.iter().all(is_word) && (filled(row) > 1 || width < 2);
+    fn levels(&self, before: &[TableRow], width: usize) -> usize {
+        let is_words = |row: &TableRow| row.iter().all(is_word) && (filled(row) > 1 || width < 2);
         let Some(last) = before.last() else { return 0 };
         // A row is also a heading if only the dates have a name, or if its cell above the dates has their name or is
         // blank. The names of other columns may then be numbers.
@@ -289,11 +290,11 @@ impl Block {
 }
 
 /// Returns true if only the column of dates is named.
-fn row_is_index(row: &Row, column: usize) -> bool {
+fn row_is_index(row: &TableRow, column: usize) -> bool {
     filled(row) == 1 && row.get(column).is_some_and(|cell| !cell.text.is_empty() && is_word(cell))
 }
 
-fn longer(one: Option<Block>, other: Option<Block>) -> Option<Block> {
+fn longer(one: Option<DatedBlock>, other: Option<DatedBlock>) -> Option<DatedBlock> {
     match (one, other) {
         (Some(one), Some(other)) => Some(if other.count > one.count { other } else { one }),
         (one, other) => one.or(other),
@@ -301,14 +302,14 @@ fn longer(one: Option<Block>, other: Option<Block>) -> Option<Block> {
 }
 
 /// Joins several headings into one: for each column, the names that differ between columns, and units.
-fn joined(mut levels: Vec<Row>, dates: usize) -> Option<Row> {
+fn joined(mut levels: Vec<TableRow>, dates: usize) -> Option<TableRow> {
     let mut heading = levels.pop()?;
     if levels.is_empty() {
         return Some(heading);
     }
     levels.push(heading.clone());
-    let text = |level: &Row, index: usize| level.get(index).map_or(String::new(), |cell| cell.text.to_string());
-    let differs = |level: &Row| {
+    let text = |level: &TableRow, index: usize| level.get(index).map_or(String::new(), |cell| cell.text.to_string());
+    let differs = |level: &TableRow| {
         let mut names = level.iter().enumerate().filter(|(index, _)| *index != dates).map(|(_, cell)| &cell.text);
         let first = names.next();
         names.any(|name| Some(name) != first)

@@ -1,12 +1,12 @@
 //! The advice of a session for its coming period.
 
-use super::allowance::HeavyTurn;
+use super::allowance::HeavyPermit;
 use super::assets::Assets;
 use super::error::ServiceError;
 use super::explain::ATOM_BYTES;
-use super::live::Live;
+use super::live::LiveSession;
 use super::memory::Large;
-use super::periods::{Passage, Periods};
+use super::periods::{Periods, Replay};
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
@@ -17,7 +17,7 @@ use crate::control::problem::state::State;
 use crate::store::Tenant;
 
 /// The advice for the coming period, as [`Sessions::action`] returns it.
-pub struct Action {
+pub struct PeriodAdvice {
     pub period: usize,
     /// For several assets, the advice of their fund.
     pub advice: Advice,
@@ -31,7 +31,7 @@ pub struct Action {
 
 /// Options of a request for advice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Question {
+pub struct AdviceOptions {
     pub mode: AdviceMode,
     /// If true, re-solve and show the worst-case law.
     pub explain: bool,
@@ -48,24 +48,24 @@ impl Sessions {
         &self,
         tenant: &Tenant,
         session: &str,
-        question: Question,
-        turn: &HeavyTurn,
-    ) -> Result<Large<Action>, ServiceError> {
+        question: AdviceOptions,
+        turn: &HeavyPermit,
+    ) -> Result<Large<PeriodAdvice>, ServiceError> {
         let mut held = self.hold(tenant, session).await;
         let live = held.current(&self.rows(tenant, session)).await?;
         live.goes_on()?;
         let (period, waiting) = (live.observed + 1, live.is_due().then(|| live.horizon()));
-        let Question { mode, explain, sensitivity } = question;
+        let AdviceOptions { mode, explain, sensitivity } = question;
         let surrogate = mode == AdviceMode::Surrogate && !explain;
         if let Some(advice) = live.advice.clone().filter(|_| surrogate && !sensitivity) {
             let assets = live.standing.assets.clone();
-            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting }.into());
+            return Ok(PeriodAdvice { period, advice, assets, worst_case: None, sensitivity: None, waiting }.into());
         }
         let means = self.means(tenant, live, turn).await?;
         if surrogate && !sensitivity {
             let advice = live.surrogate_advice(&means).await?.clone();
             let assets = live.standing.assets.clone();
-            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting }.into());
+            return Ok(PeriodAdvice { period, advice, assets, worst_case: None, sensitivity: None, waiting }.into());
         }
         let advisor = means.advisor;
         let (mut state, step, assets) = (live.standing.state.clone(), live.step(), live.standing.assets.clone());
@@ -88,7 +88,7 @@ impl Sessions {
             };
             let mode = if explain { AdviceMode::Resolve } else { mode };
             let sensitivity = record.map(|record| advisor.sensitivity(step, &state, &record, (&advice, mode)));
-            Action { period, advice, assets, worst_case, sensitivity, waiting }
+            PeriodAdvice { period, advice, assets, worst_case, sensitivity, waiting }
         });
         Ok(Large { value: solving.await?, room })
     }
@@ -97,7 +97,12 @@ impl Sessions {
     ///
     /// # Errors
     /// There is no such session, or its sensitivity would take too long.
-    async fn record(&self, tenant: &Tenant, live: &Live, advisor: &Advisor) -> Result<(State, Vec<f64>), ServiceError> {
+    async fn record(
+        &self,
+        tenant: &Tenant,
+        live: &LiveSession,
+        advisor: &Advisor,
+    ) -> Result<(State, Vec<f64>), ServiceError> {
         if live.standing.assets.is_some() {
             let rule = "must be left out: it is not told of several assets";
             return Err(FieldError::new("sensitivity", true, rule).into());
@@ -107,7 +112,7 @@ impl Sessions {
         facts.entries.truncate(live.seen.entries());
         advisor.check_sensitivity(live.standing.state.law.sample_size())?;
         let periods = Periods::of(&facts)?;
-        let Passage { standing, record, .. } = periods.replay()?;
+        let Replay { standing, record, .. } = periods.replay()?;
         // The law holds only the last returns.
         let older = record.all().len() - standing.state.law.sample_size();
         Ok((standing.state, record.all()[older..].to_vec()))

@@ -8,7 +8,7 @@ use super::explain::ATOM_BYTES;
 use super::memory::Large;
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::levels::{LevelsAdvised, WhyNothing};
@@ -64,7 +64,7 @@ pub struct Advised {
 }
 
 /// A validated request.
-struct Checked {
+struct CheckedAdvise {
     /// The training request whose single step is solved.
     specification: Specification,
     holding: f64,
@@ -79,12 +79,12 @@ impl Advise {
     /// A field breaks a rule.
     pub fn answer(self) -> Result<Advised, FieldError> {
         let checked = self.checked()?;
-        let investor = OnePeriod::new(&checked.specification, Kept::default());
+        let investor = OnePeriod::new(&checked.specification, Cache::default());
         checked.check_sensitivity(&investor)?;
         checked.answered(&investor.resolved())
     }
 
-    fn checked(mut self) -> Result<Checked, FieldError> {
+    fn checked(mut self) -> Result<CheckedAdvise, FieldError> {
         let holding = self.holding.unwrap_or(0.0);
         rules::share("holding", holding)?;
         if self.problem.horizon != 1 {
@@ -96,11 +96,11 @@ impl Advise {
             self.problem.initial_wealth = wealth;
         }
         let specification = Specification::of(self.problem, self.seed).completed()?;
-        Ok(Checked { specification, holding, asks_sensitivity: self.sensitivity })
+        Ok(CheckedAdvise { specification, holding, asks_sensitivity: self.sensitivity })
     }
 }
 
-impl Checked {
+impl CheckedAdvise {
     fn check_sensitivity(&self, investor: &OnePeriod) -> Result<(), FieldError> {
         if self.asks_sensitivity { investor.check_sensitivity() } else { Ok(()) }
     }

@@ -10,7 +10,7 @@ use super::error::ServiceError;
 use super::sessions::Sessions;
 use crate::control::assets::advice::AssetsAdvice;
 use crate::control::error::FieldError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::levels::WhyNothing;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::request::annualised::Annualised;
@@ -72,7 +72,7 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule, the radius needs more memory than can be kept, or no permit to solve became free.
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
-        let Checked { problem, holdings, fund } = question.checked()?;
+        let CheckedAssets { problem, holdings, fund } = question.checked()?;
         let fund = self.policies.one_period(&fund)?;
         Ok(self.resolving.run(tenant, move || AssetsAdvised::of(&problem, &holdings, &fund)).await??)
     }
@@ -84,11 +84,11 @@ impl AdviseAssets {
     /// # Errors
     /// A field breaks a rule.
     pub fn answer(self) -> Result<AssetsAdvised, FieldError> {
-        let Checked { problem, holdings, fund } = self.checked()?;
-        AssetsAdvised::of(&problem, &holdings, &OnePeriod::new(&fund, Kept::default()))
+        let CheckedAssets { problem, holdings, fund } = self.checked()?;
+        AssetsAdvised::of(&problem, &holdings, &OnePeriod::new(&fund, Cache::default()))
     }
 
-    fn checked(self) -> Result<Checked, FieldError> {
+    fn checked(self) -> Result<CheckedAssets, FieldError> {
         let AdviseAssets { mut problem, wealth, holdings, seed } = self;
         if let Some(wealth) = wealth {
             rules::wealth("wealth", wealth)?;
@@ -99,12 +99,12 @@ impl AdviseAssets {
             Some(holdings) => shares("holdings", &holdings, &problem.assets)?,
             None => vec![0.0; problem.assets.len()],
         };
-        Ok(Checked { problem, holdings, fund })
+        Ok(CheckedAssets { problem, holdings, fund })
     }
 }
 
 /// A validated request with the problem of its inverse-volatility fund.
-struct Checked {
+struct CheckedAssets {
     problem: AssetsProblem,
     /// One share for each asset.
     holdings: Vec<f64>,

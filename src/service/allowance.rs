@@ -4,7 +4,7 @@
 //! need heavy permits, of which one tenant gets at most half. Advice and observations need none.
 //!
 //! Some calls turn out to be heavy only while they run: advice for a state outside the design, or an observation that
-//! needs such advice. So each call carries a [`HeavyTurn`], which is begun before a solve.
+//! needs such advice. So each call carries a [`HeavyPermit`], which is begun before a solve.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -116,7 +116,7 @@ pub struct StreamPlace {
 }
 
 /// The permits of a heavy call, released on drop.
-type Places = Vec<OwnedSemaphorePermit>;
+type HeavyPermits = Vec<OwnedSemaphorePermit>;
 
 impl Allowance {
     pub fn new(limits: &Limits) -> Self {
@@ -165,7 +165,7 @@ impl Allowance {
     ///
     /// # Errors
     /// No permit of one of the two kinds is free.
-    fn places(&self) -> Result<Places, Refused> {
+    fn places(&self) -> Result<HeavyPermits, Refused> {
         let taken = self.heavy.iter().zip([Refused::OwnWork, Refused::NoPlace]);
         taken.map(|(places, refused)| places.clone().try_acquire_owned().map_err(|_| refused)).collect()
     }
@@ -174,22 +174,22 @@ impl Allowance {
 /// The permits that one call, or one element of a list, needs before it does heavy work. One call of the heavy rate and
 /// the permits are each taken once, at the first request. The permits are released on drop.
 #[derive(Debug)]
-pub struct HeavyTurn {
+pub struct HeavyPermit {
     allowance: Arc<Allowance>,
     /// Acquired first, so that elements of one list do not take each other's permits.
     lane: Option<Arc<Semaphore>>,
     counted: OnceLock<()>,
-    places: OnceLock<Places>,
+    places: OnceLock<HeavyPermits>,
 }
 
-impl HeavyTurn {
+impl HeavyPermit {
     pub fn new(allowance: Arc<Allowance>) -> Self {
-        HeavyTurn { allowance, lane: None, counted: OnceLock::new(), places: OnceLock::new() }
+        HeavyPermit { allowance, lane: None, counted: OnceLock::new(), places: OnceLock::new() }
     }
 
     /// Builds the turn of a list element. At most as many elements do heavy work at a time as `lane` has permits.
     pub fn in_lane(allowance: Arc<Allowance>, lane: Arc<Semaphore>) -> Self {
-        HeavyTurn { lane: Some(lane), ..HeavyTurn::new(allowance) }
+        HeavyPermit { lane: Some(lane), ..HeavyPermit::new(allowance) }
     }
 
     /// Takes the call from the heavy rate, before its body is read.
@@ -291,12 +291,12 @@ mod tests {
     async fn a_heavy_call_is_counted_once_and_gives_its_place_up_when_it_ends() {
         let limits = Limits::new([0, 1, 0], 1);
         let allowance = Arc::new(Allowance::new(&limits));
-        let turn = HeavyTurn::new(allowance.clone());
+        let turn = HeavyPermit::new(allowance.clone());
         turn.count().unwrap();
         turn.begin().await.unwrap();
         turn.begin().await.unwrap();
-        assert!(matches!(HeavyTurn::new(allowance).begin().await, Err(Refused::TooOften(Class::Heavy, _))));
-        let other = HeavyTurn::new(Arc::new(Allowance::new(&limits)));
+        assert!(matches!(HeavyPermit::new(allowance).begin().await, Err(Refused::TooOften(Class::Heavy, _))));
+        let other = HeavyPermit::new(Arc::new(Allowance::new(&limits)));
         assert!(matches!(other.begin().await, Err(Refused::NoPlace)));
         drop(turn);
         other.begin().await.unwrap();
@@ -307,7 +307,7 @@ mod tests {
     async fn elements_of_a_list_wait_for_each_other_and_count_one_by_one() {
         let allowance = Arc::new(Allowance::new(&Limits::new([0, 2, 0], 2)));
         let lane = Arc::new(Semaphore::new(1));
-        let element = || HeavyTurn::in_lane(allowance.clone(), lane.clone());
+        let element = || HeavyPermit::in_lane(allowance.clone(), lane.clone());
         let (first, second) = (element(), element());
         first.begin().await.unwrap();
         let waiting = tokio::spawn(async move { second.begin().await });

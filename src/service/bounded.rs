@@ -39,23 +39,23 @@ const LONG_TURN: Duration = Duration::from_millis(250);
 const SECOND_WAITING: usize = 16;
 /// Pieces that may wait in the third stage. Few, because those that share a place must all end before their time limits.
 const LONG_WAITING: usize = 4;
-/// Threads that waiting pieces of one [`Bounded`] may hold.
+/// Threads that waiting pieces of one [`FairQueue`] may hold.
 pub(super) const WAITING_THREADS: usize = SECOND_WAITING + LONG_WAITING;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
-pub struct Bounded {
+pub struct FairQueue {
     /// What the work is, in traces and metrics.
     pub name: &'static str,
     /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
     pub of_one: usize,
-    lines: Arc<[Mutex<Line>; 3]>,
+    lines: Arc<[Mutex<StageQueue>; 3]>,
     wait: Duration,
 }
 
 /// How many pieces of work may be under way.
 #[derive(Debug, Clone, Copy)]
-pub struct Size {
+pub struct QueueSize {
     /// In the first stage.
     pub first: usize,
     /// In the second stage, and in the third.
@@ -95,7 +95,7 @@ impl Stage {
 }
 
 /// The places of one stage, and who waits for them.
-struct Line {
+struct StageQueue {
     /// Places that nobody has; while there are any, all who wait have as many as one tenant may.
     free: usize,
     /// Places that one tenant may have.
@@ -106,55 +106,55 @@ struct Line {
     running: HashMap<Tenant, usize>,
     /// Tenants that wait, whose turn is next first; each has a queue.
     ring: VecDeque<Tenant>,
-    queues: HashMap<Tenant, VecDeque<Waiting>>,
+    queues: HashMap<Tenant, VecDeque<WaitingPiece>>,
 }
 
 /// A piece that waits for a place.
-struct Waiting {
+struct WaitingPiece {
     rank: u128,
     grant: oneshot::Sender<Granted>,
 }
 
 /// What a waiting piece gets.
-type Granted = Result<Place, ServiceError>;
+type Granted = Result<Permit, ServiceError>;
 
 /// The right to work, given up when dropped.
-struct Place {
-    bounded: Bounded,
+struct Permit {
+    bounded: FairQueue,
     stage: Stage,
     tenant: Tenant,
 }
 
 /// A piece of work under way.
 struct Piece {
-    bounded: Bounded,
+    bounded: FairQueue,
     tenant: Tenant,
     /// Closed once the caller is gone.
     caller: watch::Receiver<()>,
     /// Why it may not go on: too many pieces wait.
     refused: OnceLock<ServiceError>,
-    held: Mutex<Held>,
+    held: Mutex<PieceState>,
 }
 
 /// The place of a piece and the time it has had.
-struct Held {
+struct PieceState {
     /// `None` while it waits.
-    place: Option<Place>,
+    place: Option<Permit>,
     since: Instant,
     /// What it had worked before.
     before: Duration,
 }
 
-impl Bounded {
-    pub fn new(name: &'static str, Size { first, long }: Size, wait: Duration) -> Self {
+impl FairQueue {
+    pub fn new(name: &'static str, QueueSize { first, long }: QueueSize, wait: Duration) -> Self {
         let line = |free, of_one, most_waiting| {
             let (running, queues) = (HashMap::new(), HashMap::new());
-            Mutex::new(Line { free, of_one, most_waiting, running, ring: VecDeque::new(), queues })
+            Mutex::new(StageQueue { free, of_one, most_waiting, running, ring: VecDeque::new(), queues })
         };
         let of_one = first.div_ceil(2);
         // How long a caller waits for the first stage is bounded, not how many do.
         let lines = [line(first, of_one, usize::MAX), line(long, long, SECOND_WAITING), line(long, long, LONG_WAITING)];
-        Bounded { name, of_one, lines: Arc::new(lines), wait }
+        FairQueue { name, of_one, lines: Arc::new(lines), wait }
     }
 
     /// Runs `work` on a thread that may block. It ends early where the future is dropped.
@@ -187,7 +187,7 @@ impl Bounded {
             tenant: tenant.clone(),
             caller,
             refused: OnceLock::new(),
-            held: Mutex::new(Held { place: Some(place), since: Instant::now(), before: Duration::ZERO }),
+            held: Mutex::new(PieceState { place: Some(place), since: Instant::now(), before: Duration::ZERO }),
         });
         let (done, answer) = oneshot::channel();
         tokio::task::spawn_blocking(move || {
@@ -213,7 +213,7 @@ impl Bounded {
         [Stage::First, Stage::Second, Stage::Long].map(|stage| self.line(stage).waiting()).into_iter().sum()
     }
 
-    async fn first_place(&self, tenant: &Tenant) -> Result<Place, ServiceError> {
+    async fn first_place(&self, tenant: &Tenant) -> Result<Permit, ServiceError> {
         let asked = self.line(Stage::First).ask(tenant, 0);
         let Some(granted) = asked else { return Ok(self.place(Stage::First, tenant.clone())) };
         let granted = tokio::time::timeout(self.wait, granted).await;
@@ -225,17 +225,17 @@ impl Bounded {
         granted.map_err(late)?.map_err(ServiceError::internal)?
     }
 
-    fn place(&self, stage: Stage, tenant: Tenant) -> Place {
-        Place { bounded: self.clone(), stage, tenant }
+    fn place(&self, stage: Stage, tenant: Tenant) -> Permit {
+        Permit { bounded: self.clone(), stage, tenant }
     }
 
-    fn line(&self, stage: Stage) -> MutexGuard<'_, Line> {
+    fn line(&self, stage: Stage) -> MutexGuard<'_, StageQueue> {
         // No code panics while holding the lock.
         self.lines[stage as usize].lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Drop for Place {
+impl Drop for Permit {
     fn drop(&mut self) {
         let next = self.bounded.line(self.stage).give_back(&self.tenant);
         if let Some((tenant, grant)) = next {
@@ -321,7 +321,7 @@ impl Piece {
     }
 }
 
-impl Line {
+impl StageQueue {
     fn may(&self, tenant: &Tenant) -> bool {
         self.free > 0 && !self.is_full_of(tenant)
     }
@@ -347,7 +347,7 @@ impl Line {
         if queue.is_empty() {
             self.ring.push_back(tenant.clone());
         }
-        queue.push_back(Waiting { rank, grant });
+        queue.push_back(WaitingPiece { rank, grant });
         Some(granted)
     }
 
@@ -365,7 +365,7 @@ impl Line {
         let tenant = next.min_by_key(|tenant| self.queues.get(*tenant).and_then(first).map(|(_, rank)| rank))?.clone();
         let queue = self.queues.get_mut(&tenant)?;
         let (at, _) = first(queue)?;
-        let Waiting { grant, .. } = queue.remove(at)?;
+        let WaitingPiece { grant, .. } = queue.remove(at)?;
         // The tenant goes to the end of the ring.
         self.ring.retain(|waiting| *waiting != tenant);
         if queue.is_empty() {
@@ -380,7 +380,7 @@ impl Line {
     /// Removes from a full queue the piece that should make room for one of `tenant`, if any should, and gives why it is refused.
     fn give_up_one(&mut self, tenant: &Tenant, rank: u128) -> Option<(oneshot::Sender<Granted>, ServiceError)> {
         self.forget_gone();
-        let worst = |(tenant, queue): (&Tenant, &VecDeque<Waiting>)| {
+        let worst = |(tenant, queue): (&Tenant, &VecDeque<WaitingPiece>)| {
             let (at, rank) = queue.iter().map(|waiting| waiting.rank).enumerate().max_by_key(|&(_, rank)| rank)?;
             Some(((queue.len(), rank), at, tenant.clone()))
         };
@@ -389,7 +389,7 @@ impl Line {
             return None;
         }
         let queue = self.queues.get_mut(&loser)?;
-        let Waiting { grant, .. } = queue.remove(at)?;
+        let WaitingPiece { grant, .. } = queue.remove(at)?;
         self.forget_gone();
         Some((grant, if count > 1 { Refused::OwnWork.into() } else { ServiceError::Busy }))
     }
@@ -400,7 +400,7 @@ impl Line {
             queue.retain(|waiting| !waiting.grant.is_closed());
             !queue.is_empty()
         });
-        let Line { ring, queues, .. } = self;
+        let StageQueue { ring, queues, .. } = self;
         ring.retain(|tenant| queues.contains_key(tenant));
     }
 
@@ -414,7 +414,7 @@ impl Line {
 }
 
 /// The place in a queue, and the rank, of its first piece of the lowest rank.
-fn first(queue: &VecDeque<Waiting>) -> Option<(usize, u128)> {
+fn first(queue: &VecDeque<WaitingPiece>) -> Option<(usize, u128)> {
     queue.iter().map(|waiting| waiting.rank).enumerate().min_by_key(|&(_, rank)| rank)
 }
 
@@ -429,8 +429,8 @@ mod tests {
         name.parse().unwrap()
     }
 
-    fn bounded(first: usize, long: usize) -> Bounded {
-        Bounded::new("work", Size { first, long }, Duration::from_secs(60))
+    fn bounded(first: usize, long: usize) -> FairQueue {
+        FairQueue::new("work", QueueSize { first, long }, Duration::from_secs(60))
     }
 
     /// Work that ends when told to, and says what it is when it begins.
@@ -439,7 +439,7 @@ mod tests {
         done: tokio::task::JoinHandle<Result<bool, ServiceError>>,
     }
 
-    fn hold(bounded: &Bounded, of: &str, begun: &mpsc::Sender<String>, name: &str) -> Task {
+    fn hold(bounded: &FairQueue, of: &str, begun: &mpsc::Sender<String>, name: &str) -> Task {
         let ((release, held), bounded, of) = (mpsc::channel::<()>(), bounded.clone(), tenant(of));
         let (begun, name) = (begun.clone(), name.to_owned());
         let work = move || begun.send(name).is_ok() && held.recv().is_ok();
@@ -448,7 +448,7 @@ mod tests {
 
     /// Work that passes checkpoints and counts them, until `enough`.
     fn busy(
-        bounded: &Bounded,
+        bounded: &FairQueue,
         of: &str,
         enough: u64,
     ) -> (Arc<AtomicU64>, tokio::task::JoinHandle<Result<(), ServiceError>>) {
@@ -465,7 +465,7 @@ mod tests {
     }
 
     /// Waits until every place is free: so many of the first stage, and of each of the others.
-    async fn all_free(bounded: &Bounded, [first, long]: [usize; 2]) {
+    async fn all_free(bounded: &FairQueue, [first, long]: [usize; 2]) {
         let is_free = |(stage, places): (Stage, usize)| {
             let line = bounded.line(stage);
             line.free == places && line.ring.is_empty() && line.queues.is_empty() && line.running.is_empty()
@@ -482,7 +482,7 @@ mod tests {
 
     #[tokio::test]
     async fn work_past_the_bound_is_refused_and_done_once_there_is_room() {
-        let bounded = Bounded::new("work", Size { first: 1, long: 1 }, Duration::from_millis(20));
+        let bounded = FairQueue::new("work", QueueSize { first: 1, long: 1 }, Duration::from_millis(20));
         let (begun, begins) = mpsc::channel();
         let first = hold(&bounded, "north", &begun, "first");
         until(|| begins.try_recv().is_ok()).await;

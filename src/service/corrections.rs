@@ -5,19 +5,19 @@ use jiff::civil::Date;
 use super::change::Change;
 use super::error::ServiceError;
 use super::gate::{self, Doubt, Doubts};
-use super::periods::{Periods, Step};
-use super::plan::Stretch;
+use super::periods::{Periods, ReplayedPeriod};
+use super::plan::PolicyTenure;
 use super::report::{Correct, LONGEST_REASON, MOST_CORRECTIONS, Report};
-use super::standing::Standing;
+use super::standing::SessionState;
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
 
 /// The effect of a correction on a session.
 pub(super) struct PutRight {
     /// The state before the correction.
-    pub before: Standing,
+    pub before: SessionState,
     /// The state after it.
-    pub standing: Standing,
+    pub standing: SessionState,
     /// Periods observed after it.
     pub observed: usize,
     /// Log-return of the period corrected or inserted; `None` if it is missing or removed.
@@ -74,7 +74,7 @@ impl Periods {
         for (period, stood) in (1..).zip(stood) {
             let periods_per_year = passage.stretch().terms.periods_per_year;
             let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
-            let Some(Step { before, seen, log_return: now, .. }) = passed else { break };
+            let Some(ReplayedPeriod { before, seen, log_return: now, .. }) = passed else { break };
             wealth_before = before.state.wealth;
             let report = &self.all[period - 1].report;
             let (seen_before, day_before) = stood.unzip();
@@ -100,7 +100,7 @@ impl Periods {
     }
 }
 
-impl Stretch {
+impl PolicyTenure {
     /// Checks that the `observed` periods of the session may be changed in this way under this policy.
     ///
     /// # Errors

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::keys::{Keys, REFRESH};
+use super::keys::{KeysInForce, REFRESH};
 use super::metrics;
 use super::shutdown::Shutdown;
 use crate::store::StoreError;
 
 /// Refreshes until shutdown begins. Damaged keys are counted at every refresh, so that their alert lasts as long as
 /// they do.
-pub(super) async fn keep_fresh(keys: Arc<Keys>, shutdown: Shutdown) {
+pub(super) async fn keep_fresh(keys: Arc<KeysInForce>, shutdown: Shutdown) {
     loop {
         tokio::select! {
             () = shutdown.begun() => return,

@@ -6,18 +6,18 @@ use jiff::civil::Date;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::allowance::HeavyTurn;
+use super::allowance::HeavyPermit;
 use super::answer::{Corrected, Observed};
 use super::assets::{Composed, ObservedAssets};
 use super::content::{answer, content};
 use super::error::ServiceError;
-use super::known::KnownReturns;
+use super::known::InitialHistory;
 use super::memory::Large;
-use super::periods::{Passage, Period, Periods, Step};
-use super::plan::{Plan, Renew, Renewed};
+use super::periods::{Periods, Replay, ReplayedPeriod, SessionPeriod};
+use super::plan::{Renew, Renewed, SessionPlan};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
-use super::standing::Standing;
+use super::standing::SessionState;
 use crate::control::assets::advice::named;
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::AdviceMode;
@@ -44,7 +44,7 @@ pub struct History {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub composed: Option<Composed>,
     /// Log-returns known at the start.
-    pub history: KnownReturns,
+    pub history: InitialHistory,
     pub observations: Vec<Observation>,
     pub corrections: Vec<Correction>,
     /// The policies that followed the first.
@@ -132,7 +132,7 @@ impl Sessions {
         &self,
         tenant: &Tenant,
         session: &str,
-        turn: &HeavyTurn,
+        turn: &HeavyPermit,
     ) -> Result<Large<History>, ServiceError> {
         let Large { value: facts, room } = self.facts(tenant, session).await?;
         let is_large = room.is_some();
@@ -150,7 +150,7 @@ impl Sessions {
             }
             false => Vec::new(),
         };
-        let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
+        let SessionPlan { terms, assets, .. } = SessionPlan::of(&facts.row)?;
         let start = periods.at_start(terms.learning);
         let listing = move || Ok::<_, ServiceError>((observations(&facts, &periods, first, changed)?, facts.row));
         let (observations, row) = self.apart(tenant, is_large, listing).await??;
@@ -165,7 +165,7 @@ impl Sessions {
             initial_wealth,
             initial_holding,
             initial_radius,
-            history: KnownReturns::of(history, assets.as_ref().map(Vec::len)),
+            history: InitialHistory::of(history, assets.as_ref().map(Vec::len)),
             assets,
             composed,
             observations,
@@ -185,7 +185,7 @@ impl Sessions {
         periods: &Periods,
         first: usize,
     ) -> Result<Vec<Changed>, ServiceError> {
-        let (mut passage, mut changed): (Passage<'_>, Vec<Changed>) = (periods.passage()?, Vec::new());
+        let (mut passage, mut changed): (Replay<'_>, Vec<Changed>) = (periods.passage()?, Vec::new());
         for (step, period) in periods.all.iter().enumerate() {
             let stretch = passage.stretch();
             let passed = passage.next().map_err(ServiceError::of_recorded)?;
@@ -247,7 +247,7 @@ fn observations(
     changed: Vec<Changed>,
 ) -> Result<Vec<Observation>, ServiceError> {
     let mut changed = changed.into_iter();
-    let row = |(index, period): (usize, &Period)| {
+    let row = |(index, period): (usize, &SessionPeriod)| {
         let entry = &facts.entries[period.entry];
         let (now, inserted) = if index >= first { changed.next() } else { None }.unzip();
         let (told, reported) = match inserted.flatten() {
@@ -261,8 +261,8 @@ fn observations(
 }
 
 /// Builds the period that leaves the session in the state `after`.
-fn now(period: &Period, passed: Step, after: &Standing, advice: &Advice) -> Now {
-    let Step { before, seen, log_return, executed_allocation, .. } = passed;
+fn now(period: &SessionPeriod, passed: ReplayedPeriod, after: &SessionState, advice: &Advice) -> Now {
+    let ReplayedPeriod { before, seen, log_return, executed_allocation, .. } = passed;
     let names = before.assets.as_ref().map(|assets| &assets.names);
     Now {
         reported: (!period.corrections.is_empty()).then(|| period.report.clone()),
@@ -282,8 +282,8 @@ fn now(period: &Period, passed: Step, after: &Standing, advice: &Advice) -> Now 
 /// because none was advised.
 fn inserted(
     (session, period): (&str, usize),
-    passed: &Step,
-    after: &Standing,
+    passed: &ReplayedPeriod,
+    after: &SessionState,
     (advice, uncertainty): (&Advice, Uncertainty),
 ) -> Observed {
     let assets = passed.before.assets.as_ref().map(|assets| ObservedAssets {

@@ -11,7 +11,7 @@ use super::idempotency;
 use super::identity;
 use super::keys::Caller;
 use super::memory::{Large, Memory};
-use super::progress::{Progress, ProgressBoard};
+use super::progress::{ProgressBoard, RunningProgress};
 use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::backtest::Backtest;
@@ -27,20 +27,20 @@ use crate::store::{
 
 /// A stored job, and its progress if it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Job {
+pub struct TrackedJob {
     pub row: JobRow,
-    pub progress: Option<Progress>,
+    pub progress: Option<RunningProgress>,
 }
 
 /// An accepted job, and what in its request may be a mistake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accepted {
-    pub job: Job,
+    pub job: TrackedJob,
     pub warnings: Vec<Warning>,
 }
 
 /// A request to queue.
-struct Request<'a, C> {
+struct QueuedRequest<'a, C> {
     kind: JobKind,
     sent: &'a [u8],
     /// The request with every default filled in.
@@ -49,10 +49,10 @@ struct Request<'a, C> {
     labels: Relabel,
 }
 
-impl<'a, C> Request<'a, C> {
+impl<'a, C> QueuedRequest<'a, C> {
     /// Builds the request of a job that makes no policy.
     fn of(kind: JobKind, sent: &'a [u8], completed: &'a C, steps_total: usize) -> Self {
-        Request { kind, sent, completed, steps_total, labels: Relabel::default() }
+        QueuedRequest { kind, sent, completed, steps_total, labels: Relabel::default() }
     }
 }
 
@@ -112,7 +112,7 @@ impl Jobs {
         let completed = self.admitted(specification)?;
         let (key, steps_total) = (request.key(), completed.problem.horizon);
         let sent = key.as_bytes();
-        let training = Request { kind: JobKind::Train, sent, completed: &completed, steps_total, labels };
+        let training = QueuedRequest { kind: JobKind::Train, sent, completed: &completed, steps_total, labels };
         let new = self.new_job(tenant, training, None)?;
         let by = Actor::service(self.clock.now_milliseconds());
         let training = self.store.by(by).train_for_session(new, request).await?;
@@ -141,10 +141,10 @@ impl Jobs {
         labels: Relabel,
         sent: &[u8],
         key: Option<String>,
-    ) -> Result<(Job, Specification), ServiceError> {
+    ) -> Result<(TrackedJob, Specification), ServiceError> {
         let completed = self.admitted(specification)?;
         let steps = completed.problem.horizon;
-        let request = Request { kind: JobKind::Train, sent, completed: &completed, steps_total: steps, labels };
+        let request = QueuedRequest { kind: JobKind::Train, sent, completed: &completed, steps_total: steps, labels };
         Ok((self.queue(of, request, key).await?, completed))
     }
 
@@ -171,7 +171,7 @@ impl Jobs {
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let (of, steps) = ((&caller.tenant, caller.actor()), completed.step_count());
-        let request = Request::of(JobKind::Evaluate, &sent, &completed, steps);
+        let request = QueuedRequest::of(JobKind::Evaluate, &sent, &completed, steps);
         let job = self.queue(of, request, key).await?;
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
@@ -202,7 +202,7 @@ impl Jobs {
             }
         };
         self.memory.admits(&estimate)?;
-        let request = Request::of(JobKind::Backtest, &sent, &completed, steps);
+        let request = QueuedRequest::of(JobKind::Backtest, &sent, &completed, steps);
         let job = self.queue((&caller.tenant, caller.actor()), request, key).await?;
         Ok(Accepted { job, warnings })
     }
@@ -221,7 +221,7 @@ impl Jobs {
         let question = request.question()?;
         self.memory.admits(&estimate::frontier(&question, self.threads))?;
         let of = (&caller.tenant, caller.actor());
-        let request = Request::of(JobKind::Frontier, &sent, &question.request, 1);
+        let request = QueuedRequest::of(JobKind::Frontier, &sent, &question.request, 1);
         let job = self.queue(of, request, key).await?;
         Ok(Accepted { job, warnings: question.fund.problem.warnings() })
     }
@@ -229,7 +229,7 @@ impl Jobs {
     fn new_job(
         &self,
         tenant: &Tenant,
-        Request { kind, sent, completed, steps_total, labels }: Request<'_, impl Serialize>,
+        QueuedRequest { kind, sent, completed, steps_total, labels }: QueuedRequest<'_, impl Serialize>,
         idempotency_key: Option<String>,
     ) -> Result<NewJob, ServiceError> {
         Ok(NewJob {
@@ -249,9 +249,9 @@ impl Jobs {
     async fn queue(
         &self,
         (tenant, by): (&Tenant, Actor),
-        request: Request<'_, impl Serialize>,
+        request: QueuedRequest<'_, impl Serialize>,
         key: Option<String>,
-    ) -> Result<Job, ServiceError> {
+    ) -> Result<TrackedJob, ServiceError> {
         key.as_deref().map_or(Ok(()), idempotency::check)?;
         let new = self.new_job(tenant, request, key.clone())?;
         match self.store.by(by).create_job(new).await? {
@@ -280,7 +280,7 @@ impl Jobs {
     ///
     /// # Errors
     /// There is no such job.
-    pub async fn get(&self, tenant: &Tenant, job: &str) -> Result<Job, ServiceError> {
+    pub async fn get(&self, tenant: &Tenant, job: &str) -> Result<TrackedJob, ServiceError> {
         Ok(self.with_progress(self.of(tenant, job).await?))
     }
 
@@ -288,7 +288,12 @@ impl Jobs {
     ///
     /// # Errors
     /// The store does not answer.
-    pub async fn list(&self, tenant: &Tenant, limit: usize, after: Option<i64>) -> Result<Vec<Job>, ServiceError> {
+    pub async fn list(
+        &self,
+        tenant: &Tenant,
+        limit: usize,
+        after: Option<i64>,
+    ) -> Result<Vec<TrackedJob>, ServiceError> {
         let rows = self.store.jobs(tenant, limit, after).await?;
         Ok(rows.into_iter().map(|row| self.with_progress(row)).collect())
     }
@@ -297,7 +302,7 @@ impl Jobs {
     ///
     /// # Errors
     /// There is no such job.
-    pub async fn cancel(&self, caller: &Caller, job: &str) -> Result<Job, ServiceError> {
+    pub async fn cancel(&self, caller: &Caller, job: &str) -> Result<TrackedJob, ServiceError> {
         self.of(&caller.tenant, job).await?;
         let actor = caller.actor();
         let asked_ms = actor.at_ms;
@@ -331,8 +336,8 @@ impl Jobs {
         row.ok_or_else(|| ServiceError::unknown("job", job))
     }
 
-    fn with_progress(&self, row: JobRow) -> Job {
+    fn with_progress(&self, row: JobRow) -> TrackedJob {
         let progress = self.board.of(&row.job);
-        Job { row, progress }
+        TrackedJob { row, progress }
     }
 }

@@ -25,7 +25,7 @@ use super::identity;
 pub use super::secret::{PREFIX, Secret};
 use crate::control::error::FieldError;
 use crate::store::{
-    Actor, KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, StoredKeys, Successor, Tenant,
+    Actor, KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotation, Store, StoreError, StoredKeys, Successor, Tenant,
 };
 
 /// A key made or revoked elsewhere counts within this time.
@@ -78,9 +78,9 @@ pub async fn rotate(
     let overlap_ms = i64::try_from(overlap.as_millis()).unwrap_or(i64::MAX);
     let successor = Successor { key, hash, created_ms, expires_ms };
     match ring.rotate(old, successor, created_ms.saturating_add(overlap_ms)).await? {
-        Rotate::Rotated { old, new } => Ok(Rotated { old: *old, new: *new, secret }),
-        Rotate::Absent => Err(ServiceError::unknown("key", old)),
-        Rotate::Ended => Err(FieldError::new("key", old, "must be in force; make a new one").into()),
+        Rotation::Rotated { old, new } => Ok(Rotated { old: *old, new: *new, secret }),
+        Rotation::Absent => Err(ServiceError::unknown("key", old)),
+        Rotation::Ended => Err(FieldError::new("key", old, "must be in force; make a new one").into()),
     }
 }
 
@@ -177,7 +177,7 @@ pub struct KeyFigures {
 
 /// Why a caller is rejected. The text of the key is not repeated.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Turned {
+pub enum Rejected {
     /// No key was given.
     NoKey,
     /// The key is not in force.
@@ -189,25 +189,25 @@ pub enum Turned {
     Expired { of: Tenant, expires_ms: i64 },
 }
 
-impl Turned {
+impl Rejected {
     /// Builds the rejection of an ended key of the tenant.
     fn of(tenant: &Tenant, expires_ms: Option<i64>, is_revoked: bool) -> Self {
         match expires_ms.filter(|_| !is_revoked) {
-            Some(expires_ms) => Turned::Expired { of: tenant.clone(), expires_ms },
-            None => Turned::WrongKey { of: Some(tenant.clone()) },
+            Some(expires_ms) => Rejected::Expired { of: tenant.clone(), expires_ms },
+            None => Rejected::WrongKey { of: Some(tenant.clone()) },
         }
     }
 }
 
 /// The keys in force, as of the last read of the store.
-pub struct Keys {
+pub struct KeysInForce {
     store: Store,
     limits: Limits,
     clock: Clock,
-    known: RwLock<Known>,
+    known: RwLock<KnownKeys>,
 }
 
-struct Known {
+struct KnownKeys {
     /// The caller for everybody; `None` once the store has a key.
     anybody: Option<Arc<Caller>>,
     /// Keys by the first eight bytes of the hash. Finding a key by these need not take constant time.
@@ -219,13 +219,14 @@ struct Known {
     allowances: HashMap<Tenant, Arc<Allowance>>,
 }
 
-impl Keys {
+impl KeysInForce {
     pub(super) async fn load(store: Store, limits: Limits, clock: Clock) -> Result<Self, StoreError> {
         let allowance = Arc::new(Allowance::new(&limits));
         let anybody = Some(Caller::new(Tenant::default(), None, allowance.clone(), clock.clone()));
         let allowances = HashMap::from([(Tenant::default(), allowance)]);
-        let known = Known { anybody, by_hash: HashMap::new(), ended: HashMap::new(), damaged: Vec::new(), allowances };
-        let keys = Keys { store, limits, clock, known: RwLock::new(known) };
+        let known =
+            KnownKeys { anybody, by_hash: HashMap::new(), ended: HashMap::new(), damaged: Vec::new(), allowances };
+        let keys = KeysInForce { store, limits, clock, known: RwLock::new(known) };
         keys.refresh().await?;
         Ok(keys)
     }
@@ -239,12 +240,12 @@ impl Keys {
     ///
     /// # Errors
     /// A key is needed, and this is none.
-    pub fn admit(&self, text: Option<&str>) -> Result<Arc<Caller>, Turned> {
+    pub fn admit(&self, text: Option<&str>) -> Result<Arc<Caller>, Rejected> {
         let known = self.read();
         if let Some(anybody) = &known.anybody {
             return Ok(anybody.clone());
         }
-        let shown = hash(text.ok_or(Turned::NoKey)?);
+        let shown = hash(text.ok_or(Rejected::NoKey)?);
         let is_shown = |key: &&KeyRow| is_equal(&key.hash, &shown);
         let found = known.by_hash.get(&start(&shown));
         match found.filter(|caller| caller.key.as_ref().filter(is_shown).is_some()) {
@@ -252,10 +253,10 @@ impl Keys {
                 caller.note_use();
                 Ok(caller.clone())
             }
-            Some(ended) => Err(Turned::of(&ended.tenant, ended.expires_ms(), ended.revoked.load(Ordering::Relaxed))),
+            Some(ended) => Err(Rejected::of(&ended.tenant, ended.expires_ms(), ended.revoked.load(Ordering::Relaxed))),
             None => match known.ended.get(&start(&shown)).filter(is_shown) {
-                Some(key) => Err(Turned::of(&key.tenant, key.expires_ms, key.revoked_ms.is_some())),
-                None => Err(Turned::WrongKey { of: None }),
+                Some(key) => Err(Rejected::of(&key.tenant, key.expires_ms, key.revoked_ms.is_some())),
+                None => Err(Rejected::WrongKey { of: None }),
             },
         }
     }
@@ -298,13 +299,13 @@ impl Keys {
         self.read().damaged.clone()
     }
 
-    fn read(&self) -> std::sync::RwLockReadGuard<'_, Known> {
+    fn read(&self) -> std::sync::RwLockReadGuard<'_, KnownKeys> {
         // No code panics while holding the lock.
         self.known.read().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Known {
+impl KnownKeys {
     /// Replaces the known keys. A damaged key ends anonymous access as the first key does, but admits nobody itself.
     fn become_those(&mut self, keys: StoredKeys, limits: &Limits, clock: &Clock) {
         if !keys.is_empty()
@@ -363,13 +364,13 @@ mod tests {
         }
     }
 
-    async fn keys() -> (tempfile::TempDir, Keys) {
+    async fn keys() -> (tempfile::TempDir, KeysInForce) {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).await.unwrap();
-        (folder, Keys::load(store, Limits::default(), Clock::system()).await.unwrap())
+        (folder, KeysInForce::load(store, Limits::default(), Clock::system()).await.unwrap())
     }
 
-    fn known(keys: &Keys, rows: Vec<KeyRow>) {
+    fn known(keys: &KeysInForce, rows: Vec<KeyRow>) {
         let rows = StoredKeys { sound: rows, damaged: Vec::new() };
         keys.known.write().unwrap().become_those(rows, &keys.limits, &keys.clock);
     }
@@ -401,14 +402,14 @@ mod tests {
         assert!(anybody.tenant == Tenant::default() && anybody.may(KeyRole::Admin) && !anybody.has_ended());
         known(&keys, vec![row("a", "north", None)]);
         assert!(anybody.has_ended());
-        assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
-        assert_eq!(keys.admit(Some("b")).unwrap_err(), Turned::WrongKey { of: None });
+        assert_eq!(keys.admit(None).unwrap_err(), Rejected::NoKey);
+        assert_eq!(keys.admit(Some("b")).unwrap_err(), Rejected::WrongKey { of: None });
         let holder = keys.admit(Some("a")).unwrap();
         assert!(holder.may(KeyRole::Read) && !holder.may(KeyRole::Train) && !holder.has_ended());
         known(&keys, vec![row("a", "north", Some(1))]);
         assert!(holder.has_ended());
-        assert_eq!(keys.admit(Some("a")).unwrap_err(), Turned::WrongKey { of: Some("north".parse().unwrap()) });
-        assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
+        assert_eq!(keys.admit(Some("a")).unwrap_err(), Rejected::WrongKey { of: Some("north".parse().unwrap()) });
+        assert_eq!(keys.admit(None).unwrap_err(), Rejected::NoKey);
     }
 
     #[tokio::test]
@@ -417,12 +418,12 @@ mod tests {
         let damaged = |sound, what: &str| StoredKeys { sound, damaged: vec![what.to_owned()] };
         let become_those = |found| keys.known.write().unwrap().become_those(found, &keys.limits, &keys.clock);
         become_those(damaged(Vec::new(), "key key_of_a"));
-        assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
+        assert_eq!(keys.admit(None).unwrap_err(), Rejected::NoKey);
         known(&keys, vec![row("a", "north", None), row("b", "north", None)]);
         let [a, b] = ["a", "b"].map(|text| keys.admit(Some(text)).unwrap());
         become_those(damaged(vec![row("b", "north", Some(1)), row("c", "south", None)], "key key_of_a"));
         assert!(a.has_ended() && b.has_ended() && keys.admit(Some("c")).is_ok());
-        assert_eq!(keys.admit(Some("a")).unwrap_err(), Turned::WrongKey { of: None });
+        assert_eq!(keys.admit(Some("a")).unwrap_err(), Rejected::WrongKey { of: None });
     }
 
     #[tokio::test]
@@ -452,7 +453,7 @@ mod tests {
         assert_eq!((figures.expires_ms, figures.used_ms), (Some(10_000), Some(9_999)));
         now.store(10_000, Ordering::Relaxed);
         assert!(holder.has_ended());
-        let of_north = Turned::Expired { of: "north".parse().unwrap(), expires_ms: 10_000 };
+        let of_north = Rejected::Expired { of: "north".parse().unwrap(), expires_ms: 10_000 };
         assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);
         known(&keys, vec![expiring(Some(10_000)), row("b", "north", None)]);
         assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);

@@ -9,33 +9,33 @@ use utoipa::ToSchema;
 /// Log-returns known at the start of a session, oldest first.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
-pub enum KnownReturns {
+pub enum InitialHistory {
     /// Returns of one asset.
     One(Vec<f64>),
     /// Rows of several assets, one row a date; each row has one number for each asset.
     Several(Vec<Vec<f64>>),
 }
 
-impl KnownReturns {
+impl InitialHistory {
     /// Builds the history of one asset, or of so many from values date after date.
     pub(super) fn of(values: Vec<f64>, assets: Option<usize>) -> Self {
         match assets {
-            None => KnownReturns::One(values),
-            Some(assets) => KnownReturns::Several(values.chunks_exact(assets).map(<[f64]>::to_vec).collect()),
+            None => InitialHistory::One(values),
+            Some(assets) => InitialHistory::Several(values.chunks_exact(assets).map(<[f64]>::to_vec).collect()),
         }
     }
 
     /// Returns the values of one asset, or of several date after date.
     pub(super) fn values(self) -> Vec<f64> {
         match self {
-            KnownReturns::One(values) => values,
-            KnownReturns::Several(rows) => rows.concat(),
+            InitialHistory::One(values) => values,
+            InitialHistory::Several(rows) => rows.concat(),
         }
     }
 }
 
 /// Reads number by number or row by row, so that an error names its position.
-impl<'de> Deserialize<'de> for KnownReturns {
+impl<'de> Deserialize<'de> for InitialHistory {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let dates = Vec::<Date>::deserialize(deserializer)?;
         let rows = dates.iter().filter(|date| matches!(date, Date::Row(_))).count();
@@ -47,7 +47,7 @@ impl<'de> Deserialize<'de> for KnownReturns {
             Date::Row(values) => values,
         };
         let read: Vec<Vec<f64>> = dates.into_iter().map(of).collect();
-        Ok(if rows > 0 { KnownReturns::Several(read) } else { KnownReturns::One(read.concat()) })
+        Ok(if rows > 0 { InitialHistory::Several(read) } else { InitialHistory::One(read.concat()) })
     }
 }
 
@@ -59,9 +59,9 @@ enum Date {
 
 impl<'de> Deserialize<'de> for Date {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Reader;
+        struct HistoryVisitor;
 
-        impl<'de> Visitor<'de> for Reader {
+        impl<'de> Visitor<'de> for HistoryVisitor {
             type Value = Date;
 
             fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -85,6 +85,6 @@ impl<'de> Deserialize<'de> for Date {
             }
         }
 
-        deserializer.deserialize_any(Reader)
+        deserializer.deserialize_any(HistoryVisitor)
     }
 }

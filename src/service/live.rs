@@ -4,33 +4,33 @@ use std::sync::Arc;
 
 use jiff::civil::Date;
 
-use super::allowance::HeavyTurn;
+use super::allowance::HeavyPermit;
 use super::answer::Observed;
 use super::assets::{Assets, ObservedAssets};
-use super::bounded::Bounded;
+use super::bounded::FairQueue;
 use super::error::ServiceError;
 use super::gate::{self, Doubt, Doubts};
 use super::periods::Periods;
-use super::plan::{Plan, Renewing, Stretch};
+use super::plan::{PolicyTenure, Renewing, SessionPlan};
 use super::report::{Observe, Report};
-use super::standing::{Passed, Standing};
+use super::standing::{SessionState, Transition};
 use crate::control::assets::advice::named;
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
-use crate::store::{Seen, SessionFacts, SessionRow, Tenant};
+use crate::store::{RowVersion, SessionFacts, SessionRow, Tenant};
 
 /// The resources that a call needs: its policy, the queues for its work, and the permits it must acquire before it
 /// solves.
-pub(super) struct Means<'a> {
+pub(super) struct AdviceContext<'a> {
     pub advisor: Arc<Advisor>,
-    pub advising: &'a Bounded,
-    pub resolving: &'a Bounded,
+    pub advising: &'a FairQueue,
+    pub resolving: &'a FairQueue,
     /// `None` for the service's own work.
-    pub turn: Option<&'a HeavyTurn>,
+    pub turn: Option<&'a HeavyPermit>,
 }
 
-impl Means<'_> {
+impl AdviceContext<'_> {
     /// Acquires the permits for heavy work that comes next.
     async fn begin(&self) -> Result<(), ServiceError> {
         match self.turn {
@@ -42,9 +42,9 @@ impl Means<'_> {
 
 /// A session replayed from its entries. It holds no policy: its advisor is cached under its name and may be dropped.
 #[derive(Clone)]
-pub struct Live {
+pub struct LiveSession {
     pub row: Arc<SessionRow>,
-    pub standing: Standing,
+    pub standing: SessionState,
     /// Periods observed.
     pub observed: usize,
     /// Corrections of these periods.
@@ -52,11 +52,11 @@ pub struct Live {
     /// Policies that followed the first.
     pub renewals: usize,
     /// The policy that advises the coming period.
-    pub current: Arc<Stretch>,
+    pub current: Arc<PolicyTenure>,
     /// How the session renews itself.
     pub renew: Option<Renewing>,
     /// The rows it was replayed from.
-    pub(super) seen: Seen,
+    pub(super) seen: RowVersion,
     /// Radius of the state, once computed.
     pub(super) radius: Option<f64>,
     /// The surrogate's advice for the coming period, once computed.
@@ -69,14 +69,14 @@ const RETURN_BYTES: usize = 24;
 /// Copies of the asset names: in the order of the columns, in the plan, and in the answers.
 const COPIES_OF_NAMES: usize = 8;
 
-impl Live {
+impl LiveSession {
     /// Replays a session from its entries.
-    pub(super) fn replayed(facts: SessionFacts) -> Result<Live, ServiceError> {
+    pub(super) fn replayed(facts: SessionFacts) -> Result<LiveSession, ServiceError> {
         let periods = Periods::of(&facts)?;
         let standing = periods.replay()?.standing;
         let SessionFacts { row, seen, .. } = facts;
-        Ok(Live {
-            renew: Plan::of(&row)?.renew,
+        Ok(LiveSession {
+            renew: SessionPlan::of(&row)?.renew,
             row: Arc::new(row),
             standing,
             observed: periods.all.len(),
@@ -176,7 +176,7 @@ impl Live {
     /// Returns the surrogate's advice for the coming period, computed once. A short computation runs here, a longer one
     /// on a
     /// thread that may block. A state outside the design is solved, which is heavy work.
-    pub(super) async fn surrogate_advice(&mut self, means: &Means<'_>) -> Result<&Advice, ServiceError> {
+    pub(super) async fn surrogate_advice(&mut self, means: &AdviceContext<'_>) -> Result<&Advice, ServiceError> {
         let step = self.step();
         let advice = match self.advice.take() {
             Some(advice) => advice,
@@ -194,7 +194,11 @@ impl Live {
     }
 
     /// Returns the surrogate's prediction for the state, unless the state lies outside the design.
-    async fn predicted(&self, step: usize, means: &Means<'_>) -> Result<Result<Advice, OutsideDesign>, ServiceError> {
+    async fn predicted(
+        &self,
+        step: usize,
+        means: &AdviceContext<'_>,
+    ) -> Result<Result<Advice, OutsideDesign>, ServiceError> {
         let predict = move |advisor: &Advisor, state: &State, radius: Option<f64>| {
             let radius = radius.unwrap_or_else(|| advisor.radius(state));
             advisor.advise_from_surrogate(step, state, radius)
@@ -211,14 +215,14 @@ impl Live {
         &mut self,
         observe: &Observe,
         report: &Report,
-        (means, today): (&Means<'_>, Date),
-    ) -> Result<(Standing, Observed), ServiceError> {
+        (means, today): (&AdviceContext<'_>, Date),
+    ) -> Result<(SessionState, Observed), ServiceError> {
         self.check_meant(observe, report, today)?;
         let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
         let dynamics = self.current.dynamics(self.observed);
         let periods_per_year = self.current.terms.periods_per_year;
         let passed = self.standing.after(dynamics, observe.period, report, (allocation, periods_per_year))?;
-        let Passed { seen, log_return, executed_allocation, executed, standing } = passed;
+        let Transition { seen, log_return, executed_allocation, executed, standing } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
         let goes_on = self.goes_on_after(observe.period);
         let next = self.current.step_from(observe.period, self.renew, self.renewals);
@@ -252,11 +256,11 @@ impl Live {
 /// is
 /// heavy work if it needs a solve.
 pub(super) async fn measured(
-    means: &Means<'_>,
+    means: &AdviceContext<'_>,
     tenant: &Tenant,
     step: usize,
-    mut standing: Standing,
-) -> Result<(Standing, Uncertainty), ServiceError> {
+    mut standing: SessionState,
+) -> Result<(SessionState, Uncertainty), ServiceError> {
     let advisor = &means.advisor;
     if standing.assets.is_none() && advisor.is_prompt(step, &standing.state) {
         let uncertainty = advisor.uncertainty(&standing.state);

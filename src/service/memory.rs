@@ -20,9 +20,9 @@ use super::error::ServiceError;
 use super::metrics as names;
 use crate::control::error::FieldError;
 use crate::control::estimate::Footprint;
-use crate::control::kept::{Kept, Part};
+use crate::control::kept::{Cache, CachePart};
 
-/// Parts of the limit, in eighths. Preparation for the cache has half as much as the cache, as in [`Kept`].
+/// Parts of the limit, in eighths. Preparation for the cache has half as much as the cache, as in [`Cache`].
 const EIGHTHS_FOR_JOBS: usize = 3;
 const EIGHTHS_KEPT: usize = 2;
 const EIGHTHS_FOR_SESSIONS: usize = 1;
@@ -90,15 +90,15 @@ impl fmt::Display for MemoryLimit {
             Origin::Machine => share("the machine's memory"),
             Origin::Unknown => share("2 GB, since the system does not tell"),
         };
-        write!(formatter, "{}, {origin}", Size(self.bytes))
+        write!(formatter, "{}, {origin}", ByteSize(self.bytes))
     }
 }
 
 /// A number of bytes, as people write it: `900MB`, `1.5GiB`, `4g`, or bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Size(pub usize);
+pub struct ByteSize(pub usize);
 
-impl fmt::Display for Size {
+impl fmt::Display for ByteSize {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 as f64 {
             bytes if bytes < 1e9 => write!(formatter, "{:.1} MB", bytes / 1e6),
@@ -107,7 +107,7 @@ impl fmt::Display for Size {
     }
 }
 
-impl FromStr for Size {
+impl FromStr for ByteSize {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -124,7 +124,7 @@ impl FromStr for Size {
             "gib" => 1024.0 * 1024.0 * 1024.0,
             _ => return Err(rule()),
         };
-        Ok(Size((number * unit) as usize))
+        Ok(ByteSize((number * unit) as usize))
     }
 }
 
@@ -132,7 +132,7 @@ impl FromStr for Size {
 #[derive(Clone)]
 pub struct Memory {
     limit: MemoryLimit,
-    kept: Kept,
+    kept: Cache,
     jobs: Arc<Semaphore>,
     /// Permits of that semaphore when no job runs.
     permits: usize,
@@ -159,14 +159,14 @@ impl Reserved {
 impl Memory {
     pub fn new(limit: MemoryLimit) -> Self {
         let permits = (eighths(limit, EIGHTHS_FOR_JOBS) / UNIT).min(Semaphore::MAX_PERMITS);
-        let kept = Kept::new(eighths(limit, EIGHTHS_KEPT));
+        let kept = Cache::new(eighths(limit, EIGHTHS_KEPT));
         let answer_permits = (limit.bytes / PART_FOR_ANSWERS / UNIT).clamp(1, u32::MAX as usize);
         let [jobs, answers] = [permits, answer_permits].map(|permits| Arc::new(Semaphore::new(permits)));
         Memory { limit, kept, jobs, permits, answers, answer_permits }
     }
 
     /// Returns the cache of what is kept ready for requests.
-    pub fn kept(&self) -> Kept {
+    pub fn kept(&self) -> Cache {
         self.kept.clone()
     }
 
@@ -228,10 +228,10 @@ impl Memory {
         gauge!(names::MEMORY, "part" => "large_answers").set(sent as f64);
         for (part, bytes) in self.kept.bytes() {
             let part = match part {
-                Part::Bridges => "bridges",
-                Part::Factors => "factors",
-                Part::Levels => "levels",
-                Part::Policies => "prepared_policies",
+                CachePart::Bridges => "bridges",
+                CachePart::Factors => "factors",
+                CachePart::Levels => "levels",
+                CachePart::Policies => "prepared_policies",
             };
             gauge!(names::MEMORY, "part" => part).set(bytes as f64);
         }
@@ -260,9 +260,9 @@ impl<T> Large<T> {
 
 impl fmt::Display for Memory {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (jobs, kept) = (Size(self.for_jobs()), Size(eighths(self.limit, EIGHTHS_KEPT)));
+        let (jobs, kept) = (ByteSize(self.for_jobs()), ByteSize(eighths(self.limit, EIGHTHS_KEPT)));
         write!(formatter, "{}: {jobs} for jobs, {kept} kept ready, ", self.limit)?;
-        write!(formatter, "{} for live sessions", Size(self.for_sessions()))
+        write!(formatter, "{} for live sessions", ByteSize(self.for_sessions()))
     }
 }
 
@@ -274,7 +274,7 @@ fn refuse_above(limit: usize, what: &str, estimate: &Footprint) -> Result<(), Fi
     if estimate.bytes() <= limit {
         return Ok(());
     }
-    let (estimated, limit) = (Size(estimate.bytes()), Size(limit));
+    let (estimated, limit) = (ByteSize(estimate.bytes()), ByteSize(limit));
     let rule = format!("must be less: {what} would take about {estimated} of memory, and the limit here is {limit}");
     Err(FieldError::new(estimate.field(), estimate.value(), rule))
 }
@@ -331,10 +331,10 @@ mod tests {
             ("512MiB", 512 << 20),
             ("64kb", 64_000),
         ] {
-            assert_eq!(text.parse(), Ok(Size(bytes)), "{text}");
+            assert_eq!(text.parse(), Ok(ByteSize(bytes)), "{text}");
         }
         for text in ["", "GB", "1 elephant", "-1", "1..2MB", "NaN"] {
-            assert!(text.parse::<Size>().unwrap_err().contains("is not a size"), "{text}");
+            assert!(text.parse::<ByteSize>().unwrap_err().contains("is not a size"), "{text}");
         }
     }
 

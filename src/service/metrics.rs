@@ -7,7 +7,7 @@ use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogra
 use super::keys::KeyFigures;
 use crate::store::StoreError;
 
-use crate::store::{OldestJobs, Room};
+use crate::store::{OldestJobs, StoreSpace};
 
 pub const TRAINING_STEP_SECONDS: &str = "ballast_training_step_duration_seconds";
 pub const OBSERVE_SECONDS: &str = "ballast_observe_duration_seconds";
@@ -155,7 +155,7 @@ pub fn record_skew(seconds: i64) {
 }
 
 /// Records the age of the oldest jobs at `now_ms` and the space that the store takes.
-pub fn record_store(oldest: OldestJobs, room: Room, now_ms: i64) {
+pub fn record_store(oldest: OldestJobs, room: StoreSpace, now_ms: i64) {
     for (state, since) in [("queued", oldest.queued_ms), ("running", oldest.running_ms)] {
         let age_ms = since.map_or(0, |since| now_ms.saturating_sub(since).max(0));
         metrics::gauge!(OLDEST_JOB_SECONDS, "state" => state).set(age_ms as f64 / 1000.0);

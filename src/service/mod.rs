@@ -67,12 +67,12 @@ pub mod what_if_assets;
 use std::sync::Arc;
 
 use audit::Audit;
-use bounded::{Bounded, Size};
+use bounded::{FairQueue, QueueSize};
 use clock::Clock;
 use config::{Config, Role, StoreLocation};
 use error::ServiceError;
 use jobs::{Accepted, Jobs};
-use keys::{Caller, Keys};
+use keys::{Caller, KeysInForce};
 use labels::Names;
 use memory::{Memory, Reserved};
 use policies::Policies;
@@ -90,9 +90,9 @@ use crate::store::{JobCounts, Store, StoreError};
 pub struct Service {
     pub audit: Audit,
     /// The queue for decoding large bodies.
-    pub decoding: Bounded,
+    pub decoding: FairQueue,
     pub jobs: Jobs,
-    pub keys: Arc<Keys>,
+    pub keys: Arc<KeysInForce>,
     pub names: Names,
     pub policies: Arc<Policies>,
     pub sessions: Sessions,
@@ -127,7 +127,7 @@ impl Service {
         // The first comparison of the clocks comes before anything is dated.
         time.time_to_delete_by().await?;
         let clock = time.clock();
-        let keys = Arc::new(Keys::load(store.clone(), config.limits.clone(), clock.clone()).await?);
+        let keys = Arc::new(KeysInForce::load(store.clone(), config.limits.clone(), clock.clone()).await?);
         if keys.are_absent() && !config.allow_anonymous && !config.listen.ip().to_canonical().is_loopback() {
             return Err(ServiceError::NobodyAsked { address: config.listen });
         }
@@ -142,8 +142,8 @@ impl Service {
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
-        let size = Size { first: config.decode_limit, long: config.long_limit };
-        let decoding = Bounded::new("decode", size, config.turn_wait);
+        let size = QueueSize { first: config.decode_limit, long: config.long_limit };
+        let decoding = FairQueue::new("decode", size, config.turn_wait);
         let policies = Arc::new(Policies::new(store.clone(), memory.clone(), decoding.clone()));
         let (due, told) = tokio::sync::mpsc::channel(renewer::TOLD);
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), &memory, due);

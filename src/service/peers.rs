@@ -11,7 +11,7 @@ use jiff::civil::Date;
 
 use super::gate::{Doubt, DoubtReason, ROUNDING};
 use super::keys::Caller;
-use super::record::Seen;
+use super::record::PeriodReturns;
 use super::report::{Observe, Report};
 use super::sessions::Sessions;
 
@@ -21,7 +21,7 @@ const FEWEST: usize = 2;
 const AT_A_TIME: usize = 128;
 
 /// The return of a report, with the field that gave it.
-struct Return {
+struct ReportedReturn {
     report: usize,
     field: String,
     value: f64,
@@ -38,13 +38,13 @@ impl Sessions {
         if reports.windows(2).all(|pair| said_of(&pair[0]) == said_of(&pair[1])) {
             return doubts;
         }
-        let mut groups: HashMap<Group, Vec<Return>> = HashMap::new();
+        let mut groups: HashMap<Group, Vec<ReportedReturn>> = HashMap::new();
         let read = stream::iter(0..reports.len())
             .map(|index| async move { (index, self.returns(caller, &reports[index]).await) });
         let mut read = std::pin::pin!(read.buffer_unordered(AT_A_TIME));
         while let Some((report, returns)) = read.next().await {
             for (group, (field, value), log_return) in returns.unwrap_or_default() {
-                groups.entry(group).or_default().push(Return { report, field, value, log_return });
+                groups.entry(group).or_default().push(ReportedReturn { report, field, value, log_return });
             }
         }
         for (index, doubt) in groups.into_values().flat_map(different) {
@@ -70,7 +70,7 @@ impl Sessions {
                 Some(vec![(group(0), (field.to_owned(), value), log_return)])
             }
             Some(assets) => {
-                let row = Seen::Several(assets.log_returns(&report).ok()?);
+                let row = PeriodReturns::Several(assets.log_returns(&report).ok()?);
                 let of_asset = |(asset, log_return): (usize, &f64)| {
                     let (field, value) = report.given_of(&assets.names[asset]);
                     (group(asset), (field, value.unwrap_or(*log_return)), *log_return)
@@ -88,7 +88,7 @@ fn said_of(observe: &Observe) -> Report {
 }
 
 /// Returns the reports of a group that differ from most, each with the doubt about it.
-fn different(mut returns: Vec<Return>) -> Vec<(usize, Doubt)> {
+fn different(mut returns: Vec<ReportedReturn>) -> Vec<(usize, Doubt)> {
     returns.sort_unstable_by(|one, other| one.log_return.total_cmp(&other.log_return));
     let alike = |from: usize| {
         let near = returns[from..].iter().take_while(|one| one.log_return - returns[from].log_return <= ROUNDING);
@@ -104,7 +104,7 @@ fn different(mut returns: Vec<Return>) -> Vec<(usize, Doubt)> {
     let theirs = returns[from + count / 2].log_return;
     let all = returns.len();
     let others = returns.into_iter().filter(|one| (one.log_return - theirs).abs() > ROUNDING);
-    let doubt = |one: Return| {
+    let doubt = |one: ReportedReturn| {
         let [own, theirs] = [one.log_return, theirs].map(|log_return| 100.0 * log_return.exp_m1());
         let sentence =
             format!("{count} of the {all} reports for this policy and day say {theirs:.2} %, and this one {own:.2} %");
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     fn different_of(values: &[f64]) -> Vec<usize> {
-        let one = |(report, simple_return): (usize, &f64)| Return {
+        let one = |(report, simple_return): (usize, &f64)| ReportedReturn {
             report,
             field: "simple_return".into(),
             value: *simple_return,

@@ -14,10 +14,10 @@ use super::assets::{Assets, Composed, PlannedAssets};
 use super::change::Change;
 use super::content::{answer, content};
 use super::error::ServiceError;
-use super::plan::{Plan, Renew, Renewed, Stretch};
-use super::record::{Record, Seen};
+use super::plan::{PolicyTenure, Renew, Renewed, SessionPlan};
+use super::record::{PeriodReturns, SessionRecord};
 use super::report::{Correct, Report};
-use super::standing::{Passed, Standing};
+use super::standing::{SessionState, Transition};
 use crate::control::error::FieldError;
 use crate::control::problem::state::State;
 use crate::control::request::learning::Learning;
@@ -25,7 +25,7 @@ use crate::store::{EntryKind, SessionFacts};
 
 /// A period according to its entries.
 #[derive(Debug, Clone)]
-pub struct Period {
+pub struct SessionPeriod {
     /// The last report of it.
     pub report: Report,
     /// The first answer to it. Its advice holds whatever is corrected later. `None` if the period was inserted.
@@ -41,25 +41,25 @@ pub struct Period {
 /// All periods of a session, and its policies.
 #[derive(Debug, Clone)]
 pub struct Periods {
-    pub all: Vec<Period>,
+    pub all: Vec<SessionPeriod>,
     /// Number of corrections.
     pub corrections: usize,
     /// The first policy and its successors.
-    pub stretches: Vec<Stretch>,
-    start: Standing,
-    history: Record,
+    pub stretches: Vec<PolicyTenure>,
+    start: SessionState,
+    history: SessionRecord,
     /// Compositions of several assets that corrections and renewals reported, in order, by the number of periods before
     /// them.
     composed: BTreeMap<usize, Vec<Composed>>,
 }
 
 /// A replay of a session up to some period.
-pub struct Passage<'a> {
+pub struct Replay<'a> {
     periods: &'a Periods,
     /// The state under the policy that comes next.
-    pub standing: Standing,
+    pub standing: SessionState,
     /// All observed returns, in order.
-    pub record: Record,
+    pub record: SessionRecord,
     /// Periods replayed.
     step: usize,
     /// Index of the policy that comes next.
@@ -67,10 +67,10 @@ pub struct Passage<'a> {
 }
 
 /// A replayed period.
-pub struct Step {
+pub struct ReplayedPeriod {
     /// The state before it.
-    pub before: Standing,
-    pub seen: Seen,
+    pub before: SessionState,
+    pub seen: PeriodReturns,
     /// `None` if it is missing; for several assets, the return of the holdings.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
@@ -78,7 +78,7 @@ pub struct Step {
     pub executed: Vec<f64>,
 }
 
-impl Period {
+impl SessionPeriod {
     /// Returns whether a correction inserted it.
     pub(super) fn is_inserted(&self) -> bool {
         self.acknowledged.is_none()
@@ -92,9 +92,11 @@ impl Periods {
     /// The entries are not those of the session.
     pub(super) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
         let SessionFacts { row, entries, .. } = facts;
-        let plan = Plan::of(row)?;
-        let history =
-            Record::new(plan.assets.as_ref().map_or(1, |assets| assets.names.len()), row.initial_history.clone());
+        let plan = SessionPlan::of(row)?;
+        let history = SessionRecord::new(
+            plan.assets.as_ref().map_or(1, |assets| assets.names.len()),
+            row.initial_history.clone(),
+        );
         let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed }| {
             Assets::told(names, history.rows_of(history.all()), composed).map(Box::new)
         });
@@ -111,14 +113,14 @@ impl Periods {
             all: Vec::new(),
             corrections: 0,
             stretches: vec![first],
-            start: Standing::at(&row.session, state, assets),
+            start: SessionState::at(&row.session, state, assets),
             history,
             composed: BTreeMap::new(),
         };
         let names = plan.names();
         for (index, entry) in entries.iter().enumerate() {
             match entry.kind {
-                EntryKind::Observation => periods.all.push(Period {
+                EntryKind::Observation => periods.all.push(SessionPeriod {
                     report: content(entry, names)?,
                     acknowledged: Some(answer(entry, names)?),
                     stands: true,
@@ -152,7 +154,7 @@ impl Periods {
     }
 
     /// Returns the policy that advises the coming period.
-    pub(super) fn current(&self) -> &Stretch {
+    pub(super) fn current(&self) -> &PolicyTenure {
         // There is always a first one.
         &self.stretches[self.stretches.len() - 1]
     }
@@ -185,7 +187,7 @@ impl Periods {
             }
             Change::Insert => {
                 let (report, corrections) = (correction.report(), vec![self.corrections]);
-                self.all.insert(index, Period { report, acknowledged: None, stands: false, entry, corrections });
+                self.all.insert(index, SessionPeriod { report, acknowledged: None, stands: false, entry, corrections });
                 for (after, composed) in self.composed.split_off(&(index + 1)) {
                     self.composed.insert(after + 1, composed);
                 }
@@ -214,9 +216,9 @@ impl Periods {
     ///
     /// # Errors
     /// The first policy was renewed before the first period, from returns that are not a valid history.
-    pub(super) fn passage(&self) -> Result<Passage<'_>, FieldError> {
+    pub(super) fn passage(&self) -> Result<Replay<'_>, FieldError> {
         let (standing, record) = (self.start.clone(), self.history.clone());
-        let mut passage = Passage { periods: self, standing, record, step: 0, stretch: 0 };
+        let mut passage = Replay { periods: self, standing, record, step: 0, stretch: 0 };
         passage.renew(None)?;
         Ok(passage)
     }
@@ -225,7 +227,7 @@ impl Periods {
     ///
     /// # Errors
     /// A recorded report no longer keeps the rules.
-    pub(super) fn replay(&self) -> Result<Passage<'_>, ServiceError> {
+    pub(super) fn replay(&self) -> Result<Replay<'_>, ServiceError> {
         let mut passage = self.passage()?;
         while passage.next().map_err(ServiceError::of_recorded)?.is_some() {}
         passage.standing = passage.stands();
@@ -233,13 +235,13 @@ impl Periods {
     }
 }
 
-impl<'a> Passage<'a> {
+impl<'a> Replay<'a> {
     /// Replays the next period: as acknowledged if that still holds, otherwise recomputed. `None` after the last.
     ///
     /// # Errors
     /// A report breaks a rule in its present position; comes with the number of its period.
-    pub(super) fn next(&mut self) -> Result<Option<Step>, (usize, FieldError)> {
-        let Some(Period { report, acknowledged, stands, .. }) = self.periods.all.get(self.step) else {
+    pub(super) fn next(&mut self) -> Result<Option<ReplayedPeriod>, (usize, FieldError)> {
+        let Some(SessionPeriod { report, acknowledged, stands, .. }) = self.periods.all.get(self.step) else {
             return Ok(None);
         };
         let (dynamics, period) = (self.stretch().dynamics(self.step), self.step + 1);
@@ -252,23 +254,23 @@ impl<'a> Passage<'a> {
         let passed =
             self.standing.after(dynamics, period, &completed, (advised, self.stretch().terms.periods_per_year));
         let passed = passed.map_err(|error| (period, error))?;
-        let Passed { seen, log_return, executed_allocation, executed, mut standing } = passed;
+        let Transition { seen, log_return, executed_allocation, executed, mut standing } = passed;
         standing.price_as(report);
         let before = std::mem::replace(&mut self.standing, standing);
         self.record.learn(&seen);
         self.step = period;
         let composed = acknowledged.as_ref().and_then(|acknowledged| acknowledged.composed());
         self.renew(composed).map_err(|error| (period, error))?;
-        Ok(Some(Step { before, seen, log_return, executed_allocation, executed }))
+        Ok(Some(ReplayedPeriod { before, seen, log_return, executed_allocation, executed }))
     }
 
     /// Returns the state with the law of the fund of several assets, which a replay does not keep up to date.
-    pub(super) fn stands(&self) -> Standing {
+    pub(super) fn stands(&self) -> SessionState {
         self.standing.clone().with_law(self.stretch().terms.learning)
     }
 
     /// Returns the policy that advises the period after those replayed.
-    pub(super) fn stretch(&self) -> &'a Stretch {
+    pub(super) fn stretch(&self) -> &'a PolicyTenure {
         &self.periods.stretches[self.stretch]
     }
 
@@ -280,7 +282,7 @@ impl<'a> Passage<'a> {
         let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
         // The last one builds its law from the same returns, whatever its predecessors did.
         self.stretch += begin.count();
-        let Stretch { after, window, terms, .. } = self.stretch();
+        let PolicyTenure { after, window, terms, .. } = self.stretch();
         if self.stretch > 0 && *after == self.step {
             self.standing = self.standing.renewed(&self.record, *window, terms.learning)?;
         }

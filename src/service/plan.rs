@@ -36,7 +36,7 @@ pub struct Renewing {
 
 /// The settings that are fixed when a session is opened, besides its initial state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Plan {
+pub struct SessionPlan {
     pub(super) terms: Terms,
     pub(super) renew: Option<Renewing>,
     /// True if every period is advised by the first step of the policy.
@@ -48,7 +48,7 @@ pub struct Plan {
 
 /// The policy of a session from some period on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stretch {
+pub struct PolicyTenure {
     pub policy: String,
     /// Periods observed before it.
     pub after: usize,
@@ -96,7 +96,7 @@ pub struct Renewed {
 impl Renewing {
     /// Returns the number of periods after which the session is due for renewal; `None` if it may not continue any
     /// longer.
-    pub(super) fn due(self, renewals: usize, current: &Stretch) -> Option<usize> {
+    pub(super) fn due(self, renewals: usize, current: &PolicyTenure) -> Option<usize> {
         let due = current.after + self.every;
         (renewals < MOST_RENEWALS && due + current.terms.horizon <= MOST_PERIODS).then_some(due)
     }
@@ -126,10 +126,10 @@ pub(super) fn check_window(field: &str, window: Option<usize>) -> Result<(), Fie
     Err(FieldError::new(field, window, format!("must lie in [{least}, {most}]")))
 }
 
-impl Plan {
+impl SessionPlan {
     /// Returns the plan of a session that runs through the horizon of a policy and ends.
     pub fn once(problem: &ProblemSpecification) -> Self {
-        Plan { terms: Terms::of(problem), renew: None, rolling: false, assets: None }
+        SessionPlan { terms: Terms::of(problem), renew: None, rolling: false, assets: None }
     }
 
     /// Returns the plan of a session that starts a policy from `returns` returns.
@@ -143,9 +143,9 @@ impl Plan {
             let rule = "must be false where renew is given: a session that rolls goes on without";
             return Err(FieldError::new("rolling", rolling, rule));
         }
-        let plan = Plan { renew, rolling, ..Plan::once(problem) };
+        let plan = SessionPlan { renew, rolling, ..SessionPlan::once(problem) };
         let terms = plan.terms(advisor, returns, 0).map_err(|rule| FieldError::new("rolling", rolling, rule))?;
-        Ok(Plan { terms, ..plan })
+        Ok(SessionPlan { terms, ..plan })
     }
 
     /// Returns the terms of the periods after `observed` ones, with a policy that starts from `returns` returns. They
@@ -169,8 +169,8 @@ impl Plan {
     }
 
     /// Returns the entry for the policy after `observed` periods.
-    pub(super) fn stretch(&self, policy: String, after: usize, terms: Terms, window: Option<usize>) -> Stretch {
-        Stretch { policy, after, terms, window, rolling: self.rolling }
+    pub(super) fn stretch(&self, policy: String, after: usize, terms: Terms, window: Option<usize>) -> PolicyTenure {
+        PolicyTenure { policy, after, terms, window, rolling: self.rolling }
     }
 
     /// Returns the plan as it is stored.
@@ -192,7 +192,7 @@ impl Plan {
     }
 }
 
-impl Stretch {
+impl PolicyTenure {
     /// Returns whether the first step of its policy advises every period.
     pub fn is_rolling(&self) -> bool {
         self.rolling

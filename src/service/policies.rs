@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use tokio::sync::Semaphore;
 
-use super::bounded::Bounded;
+use super::bounded::FairQueue;
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::memory::{Large, Memory};
 use crate::control::error::FieldError;
 use crate::control::estimate::{self, Footprint};
-use crate::control::kept::{Kept, Key};
+use crate::control::kept::{Cache, Key};
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::{Policy, content_hash};
@@ -24,14 +24,14 @@ const PREPARED_AT_A_TIME: usize = 2;
 pub struct Policies {
     store: Store,
     memory: Memory,
-    kept: Kept,
+    kept: Cache,
     preparing: Semaphore,
     /// The queue for checking imported documents.
-    decoding: Bounded,
+    decoding: FairQueue,
 }
 
 impl Policies {
-    pub(super) fn new(store: Store, memory: Memory, decoding: Bounded) -> Self {
+    pub(super) fn new(store: Store, memory: Memory, decoding: FairQueue) -> Self {
         let kept = memory.kept();
         Policies { store, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME), decoding }
     }

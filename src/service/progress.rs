@@ -19,7 +19,7 @@ const LEAST_SHARE: f64 = 0.25;
 
 /// Progress of one running job.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
+pub struct RunningProgress {
     pub steps_done: usize,
     pub steps_total: usize,
     pub current: Option<StepProgress>,
@@ -27,17 +27,17 @@ pub struct Progress {
     pub seconds_left: Option<f64>,
 }
 
-struct Running {
+struct RunningJobs {
     stop: Arc<AtomicBool>,
     started: Instant,
     steps_at_start: usize,
     last_wake: Instant,
-    progress: Progress,
+    progress: RunningProgress,
 }
 
 /// The running jobs of this process, and a channel that notifies watchers when anything about any job changes.
 pub struct ProgressBoard {
-    running: Mutex<HashMap<String, Running>>,
+    running: Mutex<HashMap<String, RunningJobs>>,
     bell: watch::Sender<u64>,
 }
 
@@ -59,9 +59,10 @@ impl ProgressBoard {
     /// Enters a job that starts with `steps_done` of `steps_total` finished; returns its stop signal.
     pub fn enter(&self, job: &str, steps_done: usize, steps_total: usize) -> Arc<AtomicBool> {
         let stop = Arc::new(AtomicBool::new(false));
-        let (now, progress) = (Instant::now(), Progress { steps_done, steps_total, current: None, seconds_left: None });
+        let (now, progress) =
+            (Instant::now(), RunningProgress { steps_done, steps_total, current: None, seconds_left: None });
         let running =
-            Running { stop: stop.clone(), started: now, steps_at_start: steps_done, last_wake: now, progress };
+            RunningJobs { stop: stop.clone(), started: now, steps_at_start: steps_done, last_wake: now, progress };
         self.lock().insert(job.to_owned(), running);
         self.ring();
         stop
@@ -107,7 +108,7 @@ impl ProgressBoard {
         self.ring();
     }
 
-    pub fn of(&self, job: &str) -> Option<Progress> {
+    pub fn of(&self, job: &str) -> Option<RunningProgress> {
         self.lock().get(job).map(|running| running.progress)
     }
 
@@ -118,7 +119,7 @@ impl ProgressBoard {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Running>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<String, RunningJobs>> {
         // No code panics while holding the lock, and a map of progress is usable after any interruption.
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -130,7 +131,7 @@ impl Default for ProgressBoard {
     }
 }
 
-impl Running {
+impl RunningJobs {
     /// Returns the time per step so far times the steps left. A step being solved counts by its share of finished
     /// design
     /// points. Simulation takes another time per step than solving, so there is no estimate for it.

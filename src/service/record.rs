@@ -5,41 +5,41 @@ use crate::control::request::rules;
 
 /// The returns of a period; `None` if they are missing.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Seen {
+pub enum PeriodReturns {
     /// The log-return of one asset.
     One(Option<f64>),
     /// The log-returns of several assets.
     Several(Option<Vec<f64>>),
 }
 
-impl Seen {
+impl PeriodReturns {
     /// Returns the row of several assets if it is not missing.
     pub(super) fn row(&self) -> Option<&[f64]> {
         match self {
-            Seen::Several(row) => row.as_deref(),
-            Seen::One(_) => None,
+            PeriodReturns::Several(row) => row.as_deref(),
+            PeriodReturns::One(_) => None,
         }
     }
 }
 
 /// Log-returns in the order observed; several assets date after date.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Record {
+pub struct SessionRecord {
     assets: usize,
     values: Vec<f64>,
 }
 
-impl Record {
+impl SessionRecord {
     /// Builds the record of so many assets, at least one.
     pub(super) fn new(assets: usize, values: Vec<f64>) -> Self {
-        Record { assets, values }
+        SessionRecord { assets, values }
     }
 
     /// Appends the returns of a period.
-    pub(super) fn learn(&mut self, seen: &Seen) {
+    pub(super) fn learn(&mut self, seen: &PeriodReturns) {
         match seen {
-            Seen::One(log_return) => self.values.extend(log_return),
-            Seen::Several(row) => self.values.extend(row.iter().flatten()),
+            PeriodReturns::One(log_return) => self.values.extend(log_return),
+            PeriodReturns::Several(row) => self.values.extend(row.iter().flatten()),
         }
     }
 

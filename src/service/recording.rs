@@ -8,20 +8,20 @@ use jiff::Timestamp;
 use serde::Serialize;
 use tracing::Instrument;
 
-use super::allowance::HeavyTurn;
+use super::allowance::HeavyPermit;
 use super::answer::{Corrected, Observed};
 use super::content::{self, Packed, json};
 use super::corrections::PutRight;
 use super::drift::{self, DriftLevel};
 use super::error::ServiceError;
 use super::keys::Caller;
-use super::live::{Live, measured};
+use super::live::{LiveSession, measured};
 use super::memory::Large;
 use super::periods::Periods;
-use super::plan::{Plan, Renewed};
+use super::plan::{Renewed, SessionPlan};
 use super::report::{Correct, Observe};
 use super::sessions::{Name, Sessions};
-use super::slots::Held;
+use super::slots::SlotGuard;
 use super::spans;
 use crate::control::error::FieldError;
 use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
@@ -33,7 +33,12 @@ impl Sessions {
     ///
     /// # Errors
     /// A field breaks a rule, or the period was observed with other content, is not the next, or lies past the horizon.
-    pub async fn observe(&self, tenant: &Tenant, observe: &Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
+    pub async fn observe(
+        &self,
+        tenant: &Tenant,
+        observe: &Observe,
+        turn: &HeavyPermit,
+    ) -> Result<String, ServiceError> {
         let (session, period) = (&observe.session, numbered("period", observe.period)?);
         let report = observe.report();
         let mut held = self.hold(tenant, session).await;
@@ -60,7 +65,7 @@ impl Sessions {
                 key: observe.reported_by.to_string(),
             };
             let levels = (live.standing.bet.level(), answer.drift.level);
-            let next = Live {
+            let next = LiveSession {
                 row: live.row.clone(),
                 standing,
                 observed: period,
@@ -91,7 +96,7 @@ impl Sessions {
         caller: &Caller,
         session: &str,
         correct: &Correct,
-        turn: &HeavyTurn,
+        turn: &HeavyPermit,
     ) -> Result<String, ServiceError> {
         let number = numbered("correction", correct.correction)?;
         correct.check()?;
@@ -110,7 +115,7 @@ impl Sessions {
             let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
             let PutRight { before, standing, observed, log_return, wealth_change } =
                 self.advising.run(tenant, move || periods.put_right(&putting, entry, today)).await??;
-            let step = current.step_from(observed, Plan::of(&facts.row)?.renew, renewals);
+            let step = current.step_from(observed, SessionPlan::of(&facts.row)?.renew, renewals);
             let (standing, uncertainty) = measured(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
             let answer = Corrected {
                 session: session.to_owned(),
@@ -139,8 +144,8 @@ impl Sessions {
                 created_ms: self.clock.now_milliseconds(),
                 key: caller.key().to_string(),
             };
-            let next = Live {
-                renew: Plan::of(&facts.row)?.renew,
+            let next = LiveSession {
+                renew: SessionPlan::of(&facts.row)?.renew,
                 row: facts.row.into(),
                 standing,
                 observed,
@@ -183,9 +188,9 @@ impl Sessions {
     async fn append(
         &self,
         store: &Store,
-        held: &mut Held<Name, Live>,
+        held: &mut SlotGuard<Name, LiveSession>,
         new: EntryRow,
-        next: Live,
+        next: LiveSession,
         levels: (DriftLevel, DriftLevel),
     ) -> Result<bool, ServiceError> {
         held.clear();
@@ -203,9 +208,9 @@ impl Sessions {
     /// Handles the store's answer to an append as [`Self::append`] does.
     pub(super) fn settled(
         &self,
-        held: &mut Held<Name, Live>,
+        held: &mut SlotGuard<Name, LiveSession>,
         appended: Append,
-        next: Live,
+        next: LiveSession,
     ) -> Result<bool, ServiceError> {
         match appended {
             Append::Appended => {

@@ -9,17 +9,17 @@ use std::sync::Arc;
 
 use tracing::Instrument;
 
-use super::allowance::HeavyTurn;
+use super::allowance::HeavyPermit;
 use super::content::Packed;
 use super::error::ServiceError;
-use super::live::{Live, measured};
+use super::live::{LiveSession, measured};
 use super::memory::Large;
 use super::periods::Periods;
-use super::plan::{MOST_RENEWALS, Plan, Renew, Renewed, check_window};
+use super::plan::{MOST_RENEWALS, Renew, Renewed, SessionPlan, check_window};
 use super::recording::{is_repeat, numbered};
 use super::sessions::Sessions;
 use super::spans;
-use super::standing::Standing;
+use super::standing::SessionState;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::store::{Actor, EntryKind, EntryRow, Onto, SessionFacts, Tenant};
@@ -37,7 +37,7 @@ impl Sessions {
         by: Actor,
         session: &str,
         renew: &Renew,
-        turn: Option<&HeavyTurn>,
+        turn: Option<&HeavyPermit>,
     ) -> Result<String, ServiceError> {
         let number = numbered("renewal", renew.renewal)?;
         check_window("window", renew.window)?;
@@ -52,7 +52,8 @@ impl Sessions {
                 let rule = format!("must be at most {MOST_RENEWALS}: open a session on the record as it is now");
                 return Err(FieldError::new("renewal", number, rule).into());
             }
-            let Decided { new, sent, onto, next } = self.decided((tenant, turn), &by, facts, periods, renew).await?;
+            let DecidedRenewal { new, sent, onto, next } =
+                self.decided((tenant, turn), &by, facts, periods, renew).await?;
             let store = self.store.by(by.clone());
             held.clear();
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
@@ -69,15 +70,15 @@ impl Sessions {
     /// Computes the next renewal of a session from `facts`.
     async fn decided(
         &self,
-        (tenant, turn): (&Tenant, Option<&HeavyTurn>),
+        (tenant, turn): (&Tenant, Option<&HeavyPermit>),
         by: &Actor,
         facts: SessionFacts,
         periods: Periods,
         renew: &Renew,
-    ) -> Result<Decided, ServiceError> {
+    ) -> Result<DecidedRenewal, ServiceError> {
         let advisor = self.policies.advisor(tenant, &renew.policy).await?;
         let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
-        let (plan, problem) = (Plan::of(&facts.row)?, &advisor.specification().problem);
+        let (plan, problem) = (SessionPlan::of(&facts.row)?, &advisor.specification().problem);
         plan.renew.map_or(Ok(()), |renew| renew.check(problem))?;
         let (onto, planned, Renew { policy, window, .. }) = (advisor.clone(), plan.clone(), renew.clone());
         let go_on = move || {
@@ -118,7 +119,7 @@ impl Sessions {
         };
         let due = plan.renew.and_then(|next| next.due(renew.renewal, &current));
         let onto = Onto { policy: renew.policy.clone(), horizon, periods: horizon.saturating_sub(before), due };
-        let next = Live {
+        let next = LiveSession {
             seen: facts.seen.followed_by(&new),
             row: facts.row.into(),
             standing,
@@ -130,21 +131,21 @@ impl Sessions {
             radius,
             advice: None,
         };
-        Ok(Decided { new, sent, onto, next })
+        Ok(DecidedRenewal { new, sent, onto, next })
     }
 }
 
 /// A renewal to append, and the state it leads to.
-struct Decided {
+struct DecidedRenewal {
     new: EntryRow,
     /// The answer as it is sent.
     sent: String,
     onto: Onto,
-    next: Live,
+    next: LiveSession,
 }
 
 /// Checks that a session with this record and state can use the policy.
-fn accepts(advisor: &Advisor, record: &[f64], standing: &Standing) -> Result<(), FieldError> {
+fn accepts(advisor: &Advisor, record: &[f64], standing: &SessionState) -> Result<(), FieldError> {
     let (own, fund) = (standing.assets.as_deref(), advisor.specification().fund.as_deref());
     let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));
     if own != of_policy {

@@ -20,12 +20,12 @@ use self::under_way::{Left, UnderWay};
 use super::clock::Clock;
 use super::error::ServiceError;
 use super::jobs::Jobs;
-use super::live::Live;
+use super::live::LiveSession;
 use super::memory::Large;
 use super::metrics::RENEWALS;
 use super::periods::Periods;
 use super::plan::{Renew, Renewing};
-use super::record::Record;
+use super::record::SessionRecord;
 use super::sessions::{Name, Sessions};
 use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
@@ -207,7 +207,7 @@ impl Renewer {
     }
 
     /// Switches the session to the trained policy.
-    async fn onto(&self, live: &Live, policy: &str, renew: Renewing, number: usize) -> Result<(), ServiceError> {
+    async fn onto(&self, live: &LiveSession, policy: &str, renew: Renewing, number: usize) -> Result<(), ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
         let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window };
         let by = Actor::service(self.clock.now_milliseconds());
@@ -227,7 +227,7 @@ impl Renewer {
     }
 
     /// Queues the next attempt.
-    async fn train(&self, live: &Live, renew: Renewing, attempts: &Attempts) -> Result<Left, ServiceError> {
+    async fn train(&self, live: &LiveSession, renew: Renewing, attempts: &Attempts) -> Result<Left, ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
         let advisor = self.sessions.advisor(tenant, live).await?;
         let Large { value: facts, room: _room } = self.sessions.facts(tenant, session).await?;
@@ -258,7 +258,7 @@ impl Renewer {
 /// problem depends on wealth, present wealth replaces initial wealth and the design interval is scaled with it.
 fn next(
     specification: &Specification,
-    record: &Record,
+    record: &SessionRecord,
     window: Option<usize>,
     rate: Option<f64>,
     wealth: f64,

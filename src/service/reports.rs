@@ -15,7 +15,7 @@ use std::time::Instant;
 use futures_util::{StreamExt, stream};
 use tokio::sync::Semaphore;
 
-use super::allowance::{Class, HeavyTurn, Refused};
+use super::allowance::{Class, HeavyPermit, Refused};
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::metrics::OBSERVE_SECONDS;
@@ -43,7 +43,7 @@ impl Sessions {
     ///
     /// # Errors
     /// As [`Sessions::observe`].
-    pub async fn report(&self, caller: &Caller, report: Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
+    pub async fn report(&self, caller: &Caller, report: Observe, turn: &HeavyPermit) -> Result<String, ServiceError> {
         let started = Instant::now();
         let report = Observe { reported_by: caller.key().clone(), ..report };
         let answer = self.observe(&caller.tenant, &report, turn).await?;
@@ -64,7 +64,7 @@ impl Sessions {
         let doubts = self.peer_doubts(caller, &reports).await;
         let elements = reports.into_iter().zip(doubts).enumerate().map(|(index, (report, peer_doubts))| {
             let report = Observe { peer_doubts, ..report };
-            let turn = HeavyTurn::in_lane(caller.allowance.clone(), lane.clone());
+            let turn = HeavyPermit::in_lane(caller.allowance.clone(), lane.clone());
             async move {
                 let (session, period) = (report.session.clone(), report.period);
                 let counted = if index == 0 { Ok(()) } else { caller.allowance.take(Class::Live) };

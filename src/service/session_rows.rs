@@ -1,7 +1,7 @@
 //! Reads the rows of a session, within the memory that other large answers leave, and replays the session from them.
 
 use super::error::ServiceError;
-use super::live::Live;
+use super::live::LiveSession;
 use super::memory::Large;
 use super::sessions::Sessions;
 use super::slots::Source;
@@ -15,8 +15,8 @@ const RETURNS_AN_ENTRY: usize = 2000;
 const FORMS_OF_ENTRIES: usize = 2;
 
 impl Sessions {
-    pub(super) fn rows<'a>(&'a self, tenant: &'a Tenant, session: &'a str) -> Rows<'a> {
-        Rows { sessions: self, tenant, session }
+    pub(super) fn rows<'a>(&'a self, tenant: &'a Tenant, session: &'a str) -> SessionRows<'a> {
+        SessionRows { sessions: self, tenant, session }
     }
 
     /// Runs short work at once. Runs long work in the tenant's queue, apart from the runtime's threads.
@@ -48,24 +48,24 @@ impl Sessions {
 }
 
 /// The rows of a tenant's session.
-pub(super) struct Rows<'a> {
+pub(super) struct SessionRows<'a> {
     sessions: &'a Sessions,
     tenant: &'a Tenant,
     session: &'a str,
 }
 
-impl Source<Live> for Rows<'_> {
+impl Source<LiveSession> for SessionRows<'_> {
     type Error = ServiceError;
 
-    async fn is_current(&self, live: &mut Live) -> Result<bool, ServiceError> {
+    async fn is_current(&self, live: &mut LiveSession) -> Result<bool, ServiceError> {
         Ok(self.sessions.store.is_as_seen(self.session, &mut live.seen).await?)
     }
 
-    async fn read(&self) -> Result<Live, ServiceError> {
+    async fn read(&self) -> Result<LiveSession, ServiceError> {
         let Large { value: facts, room } = self.sessions.facts(self.tenant, self.session).await?;
         let is_prompt =
             facts.entries.len() * (1 + facts.row.initial_history.len() / RETURNS_AN_ENTRY) <= PROMPT_ENTRIES;
-        let live = self.sessions.apart(self.tenant, !is_prompt, move || Live::replayed(facts)).await??;
+        let live = self.sessions.apart(self.tenant, !is_prompt, move || LiveSession::replayed(facts)).await??;
         drop(room);
         self.sessions.weigh(&live);
         Ok(live)

@@ -17,24 +17,24 @@ use serde::Serialize;
 use tokio::sync::mpsc::Sender;
 use tracing::Instrument;
 
-use super::allowance::HeavyTurn;
+use super::allowance::HeavyPermit;
 use super::assets::Assets;
-use super::bounded::{Bounded, Size};
+use super::bounded::{FairQueue, QueueSize};
 use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
 use super::idempotency;
 use super::identity;
 use super::keys::Caller;
-use super::known::KnownReturns;
-use super::live::{Live, Means, SESSION_BYTES};
+use super::known::InitialHistory;
+use super::live::{AdviceContext, LiveSession, SESSION_BYTES};
 use super::memory::Memory;
-use super::plan::{Plan, Renewing};
+use super::plan::{Renewing, SessionPlan};
 use super::policies::Policies;
-use super::slots::{Generation, Held, Slots};
+use super::slots::{Generation, SlotGuard, Slots};
 use super::spans;
-use super::standing::Standing;
-use super::turns::Turns;
+use super::standing::SessionState;
+use super::turns::CallTurns;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
@@ -53,9 +53,9 @@ pub(super) type Name = (Tenant, String);
 
 /// The start of a session. History and wealth default to the policy's, and holdings default to 0.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Start {
+pub struct SessionStart {
     pub policy: String,
-    pub history: Option<KnownReturns>,
+    pub history: Option<InitialHistory>,
     pub wealth: Option<f64>,
     pub holding: Option<f64>,
     pub holdings: Option<BTreeMap<String, f64>>,
@@ -73,7 +73,7 @@ struct Beginning {
     history: Vec<f64>,
 }
 
-impl Start {
+impl SessionStart {
     /// Returns the request for this start under a key. Its hash differs from that of any job's request, which has other
     /// fields.
     fn under(&self, key: String) -> Result<RequestKey, ServiceError> {
@@ -84,17 +84,17 @@ impl Start {
 
     /// Returns the initial state for the policy of `advisor`.
     fn begins(self, advisor: &Advisor) -> Result<Beginning, FieldError> {
-        let Start { history, wealth, holding, holdings, .. } = self;
+        let SessionStart { history, wealth, holding, holdings, .. } = self;
         let Specification { problem, fund, .. } = advisor.specification();
         let Some(fund) = fund else {
-            if let Some(KnownReturns::Several(rows)) = &history {
+            if let Some(InitialHistory::Several(rows)) = &history {
                 let rule = "must be a list of numbers: the policy is of one asset";
                 return Err(FieldError::new("history", format!("{} rows", rows.len()), rule));
             }
             if holdings.is_some() {
                 return Err(FieldError::new("holdings", "an object", "must be absent: the policy is of one asset"));
             }
-            let history = history.map(KnownReturns::values);
+            let history = history.map(InitialHistory::values);
             let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
             let history = history.unwrap_or_else(|| problem.history.clone());
             return Ok(Beginning { state, assets: None, history });
@@ -105,8 +105,8 @@ impl Start {
         }
         let rows = match history {
             None => fund.history.clone(),
-            Some(KnownReturns::Several(rows)) => rows,
-            Some(KnownReturns::One(values)) => {
+            Some(InitialHistory::Several(rows)) => rows,
+            Some(InitialHistory::One(values)) => {
                 let rule = format!("must be a list of rows, each a log-return of {}", fund.assets.join(", "));
                 return Err(FieldError::new("history", format!("{} values", values.len()), rule));
             }
@@ -127,12 +127,12 @@ pub struct Sessions {
     pub(super) clock: Clock,
     pub(super) policies: Arc<Policies>,
     pub(super) memory: Memory,
-    slots: Arc<Slots<Name, Live>>,
+    slots: Arc<Slots<Name, LiveSession>>,
     /// Receives sessions that became due for renewal.
     pub(super) due: Sender<Name>,
-    pub(super) advising: Bounded,
-    pub(super) resolving: Bounded,
-    pub(super) listing: Turns,
+    pub(super) advising: FairQueue,
+    pub(super) resolving: FairQueue,
+    pub(super) listing: CallTurns,
 }
 
 impl Sessions {
@@ -144,10 +144,10 @@ impl Sessions {
         memory: &Memory,
         due: Sender<Name>,
     ) -> Self {
-        let size = |first| Size { first, long: config.long_limit };
-        let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
-        let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
-        let listing = Turns::new(LISTS, config.turn_wait);
+        let size = |first| QueueSize { first, long: config.long_limit };
+        let advising = FairQueue::new("advise", size(config.advice_limit), config.turn_wait);
+        let resolving = FairQueue::new("solve", size(config.resolve_limit), config.turn_wait);
+        let listing = CallTurns::new(LISTS, config.turn_wait);
         // There are two generations.
         let weight = memory.for_sessions() / 2;
         let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
@@ -161,24 +161,24 @@ impl Sessions {
     pub async fn open(
         &self,
         caller: &Caller,
-        start: Start,
+        start: SessionStart,
         key: Option<String>,
-        turn: &HeavyTurn,
-    ) -> Result<Live, ServiceError> {
+        turn: &HeavyPermit,
+    ) -> Result<LiveSession, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
         start.labels.check()?;
-        let Start { policy, renew, rolling, labels, .. } = start.clone();
+        let SessionStart { policy, renew, rolling, labels, .. } = start.clone();
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let beginning = start.begins(&advisor)?;
         // Withdrawals are checked against wealth, whatever is held.
         advisor.check_withdrawals(&beginning.state)?;
-        let plan = Plan::new(&advisor, beginning.state.law.sample_size(), renew, rolling)?;
+        let plan = SessionPlan::new(&advisor, beginning.state.law.sample_size(), renew, rolling)?;
         if beginning.assets.is_some() && Assets::must_solve(&advisor, 0) {
             turn.begin().await?;
         }
         let Beginning { state, assets, history } = self.composed(tenant, &advisor, beginning).await?;
-        let plan = Plan { assets: assets.as_ref().map(|assets| assets.planned()), ..plan };
+        let plan = SessionPlan { assets: assets.as_ref().map(|assets| assets.planned()), ..plan };
         self.policies.starts_from(&advisor, state.law.sample_size(), plan.terms.horizon)?;
         let row = SessionRow {
             session: identity::new_id("session")?,
@@ -210,8 +210,8 @@ impl Sessions {
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
         let current = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
-        let live = Live {
-            standing: Standing::at(&row.session, state, assets),
+        let live = LiveSession {
+            standing: SessionState::at(&row.session, state, assets),
             row: Arc::new(row),
             observed: 0,
             corrections: 0,
@@ -256,7 +256,7 @@ impl Sessions {
     ///
     /// # Errors
     /// There is no such session.
-    pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
+    pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<LiveSession, ServiceError> {
         let mut held = self.hold(tenant, session).await;
         held.current(&self.rows(tenant, session)).await.cloned()
     }
@@ -281,29 +281,29 @@ impl Sessions {
     }
 
     /// Returns the prepared policy of a session.
-    pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
+    pub(super) async fn advisor(&self, tenant: &Tenant, live: &LiveSession) -> Result<Arc<Advisor>, ServiceError> {
         self.policies.advisor(tenant, &live.current.policy).await
     }
 
     pub(super) async fn means<'a>(
         &'a self,
         tenant: &Tenant,
-        live: &Live,
-        turn: &'a HeavyTurn,
-    ) -> Result<Means<'a>, ServiceError> {
+        live: &LiveSession,
+        turn: &'a HeavyPermit,
+    ) -> Result<AdviceContext<'a>, ServiceError> {
         Ok(self.means_of(self.advisor(tenant, live).await?, Some(turn)))
     }
 
-    pub(super) fn means_of<'a>(&'a self, advisor: Arc<Advisor>, turn: Option<&'a HeavyTurn>) -> Means<'a> {
-        Means { advisor, advising: &self.advising, resolving: &self.resolving, turn }
+    pub(super) fn means_of<'a>(&'a self, advisor: Arc<Advisor>, turn: Option<&'a HeavyPermit>) -> AdviceContext<'a> {
+        AdviceContext { advisor, advising: &self.advising, resolving: &self.resolving, turn }
     }
 
     /// Updates the memory counted for a session.
-    pub(super) fn weigh(&self, live: &Live) {
+    pub(super) fn weigh(&self, live: &LiveSession) {
         self.slots.weigh(&(live.row.tenant.clone(), live.row.session.clone()), live.bytes());
     }
 
-    pub(super) async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
+    pub(super) async fn hold(&self, tenant: &Tenant, session: &str) -> SlotGuard<Name, LiveSession> {
         self.slots.hold((tenant.clone(), session.to_owned())).await
     }
 }

@@ -9,7 +9,7 @@
 //! A stale state is never used, for these reasons in order:
 //!
 //! 1. No slot that is held leaves the map, so later callers wait for the same lock as those that wait already.
-//! 2. [`Held::current`] is the only way to a state. Before every use it checks with the [`Source`] that the state is current.
+//! 2. [`SlotGuard::current`] is the only way to a state. Before every use it checks with the [`Source`] that the state is current.
 //!    If the source does not answer, there is an error and no state.
 //! 3. A state is out of its slot while the source decides on its successor. It is replaced or read again, never kept.
 //!
@@ -76,13 +76,13 @@ impl<N: Eq + Hash + Clone, S> Slots<N, S> {
     }
 
     /// Waits until no earlier caller holds the slot of `name`.
-    pub(super) async fn hold(self: &Arc<Self>, name: N) -> Held<N, S> {
+    pub(super) async fn hold(self: &Arc<Self>, name: N) -> SlotGuard<N, S> {
         let (state, dropped) = self.lock().enter(&name, self.largest);
         // After the lock of the map is released, because dropping a generation takes a while.
         drop(dropped);
         // Counted from here on, even if the caller stops waiting.
-        let place = Place { slots: self.clone(), name };
-        Held { state: state.lock_owned().await, _place: place }
+        let place = SlotHolder { slots: self.clone(), name };
+        SlotGuard { state: state.lock_owned().await, _place: place }
     }
 
     /// Sets the bytes that the state of a held slot takes.
@@ -167,13 +167,13 @@ impl<S> Slot<S> {
 }
 
 /// A slot whose lock is held until drop.
-pub(super) struct Held<N: Eq + Hash + Clone, S> {
+pub(super) struct SlotGuard<N: Eq + Hash + Clone, S> {
     // Dropped first: when the last holder leaves, no caller has the lock.
     state: OwnedMutexGuard<Option<S>>,
-    _place: Place<N, S>,
+    _place: SlotHolder<N, S>,
 }
 
-impl<N: Eq + Hash + Clone, S> Held<N, S> {
+impl<N: Eq + Hash + Clone, S> SlotGuard<N, S> {
     /// Returns the present state of `source`: the one in memory if it is current, otherwise read again.
     ///
     /// # Errors
@@ -203,12 +203,12 @@ impl<N: Eq + Hash + Clone, S> Held<N, S> {
 }
 
 /// One holder of a slot.
-struct Place<N: Eq + Hash + Clone, S> {
+struct SlotHolder<N: Eq + Hash + Clone, S> {
     slots: Arc<Slots<N, S>>,
     name: N,
 }
 
-impl<N: Eq + Hash + Clone, S> Drop for Place<N, S> {
+impl<N: Eq + Hash + Clone, S> Drop for SlotHolder<N, S> {
     fn drop(&mut self) {
         self.slots.lock().leave(&self.name);
     }

@@ -6,7 +6,7 @@ use super::assets::{Assets, Composed, mean};
 use super::days::Days;
 use super::drift::Bet;
 use super::gate::{self, Doubt};
-use super::record::{Record, Seen};
+use super::record::{PeriodReturns, SessionRecord};
 use super::report::{Report, by_name};
 use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
@@ -21,7 +21,7 @@ use crate::numerics::moments::CentralMoments;
 
 /// The state of a session between two periods.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Standing {
+pub struct SessionState {
     /// For several assets, the state of their fund.
     pub state: State,
     /// The assets, if there are several.
@@ -40,21 +40,21 @@ pub struct Standing {
 
 /// The effect of a report of a period.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Passed {
-    pub seen: Seen,
+pub struct Transition {
+    pub seen: PeriodReturns,
     /// For several assets, the log-return of the holdings.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
     /// Shares of wealth held in several assets; empty for one asset.
     pub executed: Vec<f64>,
-    pub standing: Standing,
+    pub standing: SessionState,
 }
 
-impl Standing {
+impl SessionState {
     /// Returns the state at the start of `session`.
     pub(super) fn at(session: &str, state: State, assets: Option<Box<Assets>>) -> Self {
         let seen = assets.as_ref().map(|assets| Assets::means(&assets.fund.rows));
-        Standing {
+        SessionState {
             state,
             assets,
             price: None,
@@ -71,7 +71,7 @@ impl Standing {
     /// They are not a valid history.
     pub(super) fn renewed(
         &self,
-        record: &Record,
+        record: &SessionRecord,
         window: Option<usize>,
         learning: Learning,
     ) -> Result<Self, FieldError> {
@@ -89,8 +89,8 @@ impl Standing {
             Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
             None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
         };
-        let Standing { price, days, bet, .. } = *self;
-        Ok(Standing { state, assets, price, days, bet, seen, session: self.session.clone() })
+        let SessionState { price, days, bet, .. } = *self;
+        Ok(SessionState { state, assets, price, days, bet, seen, session: self.session.clone() })
     }
 
     /// Returns the names of the assets if there are several; empty for one asset.
@@ -102,7 +102,7 @@ impl Standing {
     ///
     /// # Errors
     /// A field breaks a rule, or the date is not after the last one.
-    pub(super) fn read(&self, report: &Report) -> Result<Seen, FieldError> {
+    pub(super) fn read(&self, report: &Report) -> Result<PeriodReturns, FieldError> {
         report.check()?;
         if let (Some(date), Some(last)) = (report.date, self.days.last)
             && date <= last
@@ -110,8 +110,8 @@ impl Standing {
             return Err(FieldError::new("date", date, format!("must be later than {last}, that of a period before")));
         }
         match &self.assets {
-            Some(assets) => assets.log_returns(report).map(Seen::Several),
-            None => report.log_return(self.price).map(Seen::One),
+            Some(assets) => assets.log_returns(report).map(PeriodReturns::Several),
+            None => report.log_return(self.price).map(PeriodReturns::One),
         }
     }
 
@@ -120,14 +120,14 @@ impl Standing {
     /// the next one due, if `periods_per_year` is known.
     ///
     /// # Errors
-    /// As [`Standing::read`], or wealth leaves the permitted range.
+    /// As [`SessionState::read`], or wealth leaves the permitted range.
     pub(super) fn after(
         &self,
         dynamics: Dynamics,
         period: usize,
         report: &Report,
         (advised, periods_per_year): (f64, Option<f64>),
-    ) -> Result<Passed, FieldError> {
+    ) -> Result<Transition, FieldError> {
         let seen = self.read(report)?;
         let (executed, traded) = match &self.assets {
             Some(assets) => {
@@ -142,8 +142,8 @@ impl Standing {
             None => report.executed_allocation.unwrap_or(advised),
         };
         let log_return = match (&seen, &self.assets) {
-            (Seen::Several(Some(row)), Some(assets)) => Some(assets.fund.log_return(&executed, row)),
-            (Seen::One(log_return), _) => *log_return,
+            (PeriodReturns::Several(Some(row)), Some(assets)) => Some(assets.fund.log_return(&executed, row)),
+            (PeriodReturns::One(log_return), _) => *log_return,
             _ => None,
         };
         let Report { rate, flow, .. } = *report;
@@ -153,13 +153,13 @@ impl Standing {
             Some(reported) => reported,
             None => reached(state.wealth, report)?,
         };
-        let Standing { assets, bet, seen: known, session, .. } = self;
+        let SessionState { assets, bet, seen: known, session, .. } = self;
         let (assets, seen_before, session) = (assets.clone(), known.clone(), session.clone());
         let days = self.days.after(report.date, periods_per_year);
-        let mut standing = Standing { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
+        let mut standing = SessionState { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
         standing.learn(&seen, &executed, period);
         standing.price_as(report);
-        Ok(Passed { seen, log_return, executed_allocation, executed, standing })
+        Ok(Transition { seen, log_return, executed_allocation, executed, standing })
     }
 
     /// Returns the report of a period without trades unless it gives holdings.
@@ -172,14 +172,14 @@ impl Standing {
     }
 
     /// Updates the record, the drift test and the holdings after a period.
-    fn learn(&mut self, seen: &Seen, executed: &[f64], period: usize) {
+    fn learn(&mut self, seen: &PeriodReturns, executed: &[f64], period: usize) {
         let row = seen.row();
         if let Some(assets) = &mut self.assets {
             assets.fund.passed(executed, row, self.state.holding);
         }
         let told = match seen {
-            Seen::One(log_return) => *log_return,
-            Seen::Several(_) => row.map(mean),
+            PeriodReturns::One(log_return) => *log_return,
+            PeriodReturns::Several(_) => row.map(mean),
         };
         self.seen.iter_mut().zip(told).for_each(|(seen, told)| seen.push(told));
         self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), told, &self.session, period);
@@ -235,15 +235,15 @@ impl Standing {
     }
 
     /// Returns doubts about the returns of a report, each against the record of its asset.
-    pub(super) fn return_doubts(&self, report: &Report, seen: &Seen) -> Vec<Doubt> {
+    pub(super) fn return_doubts(&self, report: &Report, seen: &PeriodReturns) -> Vec<Doubt> {
         match (seen, &self.assets) {
-            (Seen::One(Some(log_return)), _) => {
+            (PeriodReturns::One(Some(log_return)), _) => {
                 let (field, value) = report.given();
                 let record = CentralMoments::of(&self.state.law);
                 let moments = (record.mean(), record.variance().sqrt());
                 gate::of_return(field, value, moments, *log_return).into_iter().collect()
             }
-            (Seen::Several(Some(row)), Some(assets)) => {
+            (PeriodReturns::Several(Some(row)), Some(assets)) => {
                 let of_asset = |(asset, (name, log_return)): (usize, (&String, &f64))| {
                     let (field, value) = report.given_of(name);
                     let moments = assets.moments(asset);

@@ -63,7 +63,7 @@ struct Worker {
 }
 
 /// How the work on a job ended.
-enum Ended {
+enum JobEnd {
     Finished(JobOutcome),
     /// The work stopped before its end.
     Stopped,
@@ -169,7 +169,7 @@ impl Worker {
     }
 
     /// Ends the job in the store and retries until that succeeds: a full disk must not cost a policy that took hours.
-    fn close_at_last(&self, job: &str, attempt: i64, ended: &Ended) {
+    fn close_at_last(&self, job: &str, attempt: i64, ended: &JobEnd) {
         while let Err(error) = self.close(job, attempt, ended) {
             self.pause("ending a job; trying again", &error);
             if self.shutdown.has_begun() || error.is_fatal() {
@@ -178,40 +178,40 @@ impl Worker {
         }
     }
 
-    fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Ended {
+    fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> JobEnd {
         let solved = match claimed.row.kind {
             JobKind::Train => self.train(claimed, stop),
             JobKind::Evaluate => self.evaluate(claimed, stop),
             JobKind::Backtest => self.backtest(claimed, stop),
             JobKind::Frontier => self.frontier(claimed, stop),
         };
-        solved.map_or_else(|ended| ended, Ended::Finished)
+        solved.map_or_else(|ended| ended, JobEnd::Finished)
     }
 
     /// Waits for the memory of a job. If this process can never provide it, fails the job: it was queued where there is
     /// more.
-    fn reserve(&self, estimate: &Footprint) -> Result<Reserved, Ended> {
+    fn reserve(&self, estimate: &Footprint) -> Result<Reserved, JobEnd> {
         self.runtime.block_on(self.memory.reserve(estimate)).map_err(|error| failed(error.to_string()))
     }
 
-    fn close(&self, job: &str, attempt: i64, ended: &Ended) -> Result<(), StoreError> {
+    fn close(&self, job: &str, attempt: i64, ended: &JobEnd) -> Result<(), StoreError> {
         let now = self.clock.now_milliseconds();
         let held = match ended {
-            Ended::Finished(outcome) => {
+            JobEnd::Finished(outcome) => {
                 let held = self.runtime.block_on(self.store.finish_job(job, attempt, outcome.clone(), now))?;
                 log_outcome(job, outcome);
                 held
             }
-            Ended::Stopped => {
+            JobEnd::Stopped => {
                 tracing::info!(job, "job stopped");
                 self.runtime.block_on(self.store.release_job(job, attempt, now))?
             }
-            Ended::Interrupted(error) => {
+            JobEnd::Interrupted(error) => {
                 let held = self.runtime.block_on(self.store.release_job(job, attempt, now))?;
                 self.pause("keeping a job, which is queued again", error);
                 held
             }
-            Ended::Fenced => false,
+            JobEnd::Fenced => false,
         };
         if !held {
             tracing::warn!(job, attempt, "the lease was lost; another worker has the job");
@@ -236,15 +236,15 @@ impl Worker {
 }
 
 /// Returns how the work ended; `Stopped` if it runs for [`PATIENCE`] after the stop signal.
-fn until_solved(solved: &mpsc::Receiver<Ended>, stop: &AtomicBool) -> Ended {
+fn until_solved(solved: &mpsc::Receiver<JobEnd>, stop: &AtomicBool) -> JobEnd {
     let mut stopped_at = None;
     loop {
         match solved.recv_timeout(STOP_POLL) {
             Ok(ended) => return ended,
-            Err(mpsc::RecvTimeoutError::Disconnected) => return Ended::Stopped,
+            Err(mpsc::RecvTimeoutError::Disconnected) => return JobEnd::Stopped,
             Err(mpsc::RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
                 if stopped_at.get_or_insert_with(Instant::now).elapsed() >= PATIENCE {
-                    return Ended::Stopped;
+                    return JobEnd::Stopped;
                 }
             }
             Err(mpsc::RecvTimeoutError::Timeout) => {}
@@ -253,10 +253,10 @@ fn until_solved(solved: &mpsc::Receiver<Ended>, stop: &AtomicBool) -> Ended {
 }
 
 /// Ends a job whose checkpoints could not be read or written: a retry helps if the store was full or busy.
-impl From<StoreError> for Ended {
+impl From<StoreError> for JobEnd {
     fn from(error: StoreError) -> Self {
         match error {
-            StoreError::Full { .. } | StoreError::Unavailable { .. } => Ended::Interrupted(error),
+            StoreError::Full { .. } | StoreError::Unavailable { .. } => JobEnd::Interrupted(error),
             _ => {
                 tracing::error!(error = &error as &dyn std::error::Error, "the store failed during a job");
                 failed(error.to_string())
@@ -266,10 +266,10 @@ impl From<StoreError> for Ended {
 }
 
 /// Ends a job whose training stopped or failed.
-impl From<TrainError> for Ended {
+impl From<TrainError> for JobEnd {
     fn from(error: TrainError) -> Self {
         match error {
-            TrainError::Stopped => Ended::Stopped,
+            TrainError::Stopped => JobEnd::Stopped,
             error => failed(error.to_string()),
         }
     }
@@ -309,23 +309,23 @@ async fn keep_lease(
 }
 
 /// Reads the stored request of a job.
-fn requested<T: DeserializeOwned>(claimed: &ClaimedJob) -> Result<T, Ended> {
+fn requested<T: DeserializeOwned>(claimed: &ClaimedJob) -> Result<T, JobEnd> {
     let read = serde_json::from_str(&claimed.request_json);
     read.map_err(|error| failed(format!("the stored request cannot be read: {error}")))
 }
 
 /// Ends a job that made a report.
-fn reported(report: &impl Serialize) -> Result<JobOutcome, Ended> {
+fn reported(report: &impl Serialize) -> Result<JobOutcome, JobEnd> {
     let report_json = serde_json::to_string(report).map_err(unwritten)?;
     Ok(JobOutcome::Reported { report_json })
 }
 
-fn unwritten(error: serde_json::Error) -> Ended {
+fn unwritten(error: serde_json::Error) -> JobEnd {
     failed(format!("the report cannot be written as JSON: {error}"))
 }
 
-fn failed(reason: String) -> Ended {
-    Ended::Finished(JobOutcome::Failed { reason })
+fn failed(reason: String) -> JobEnd {
+    JobEnd::Finished(JobOutcome::Failed { reason })
 }
 
 fn log_outcome(job: &str, outcome: &JobOutcome) {

@@ -11,7 +11,7 @@ use super::error::ServiceError;
 
 /// A limit on concurrent calls.
 #[derive(Clone)]
-pub(super) struct Turns {
+pub(super) struct CallTurns {
     places: Arc<Semaphore>,
     wait: Duration,
 }
@@ -19,9 +19,9 @@ pub(super) struct Turns {
 /// The permit of a tenant's call, released on drop.
 pub(super) struct Turn(#[expect(dead_code, reason = "held, not read")] [OwnedSemaphorePermit; 2]);
 
-impl Turns {
+impl CallTurns {
     pub(super) fn new(places: usize, wait: Duration) -> Self {
-        Turns { places: Arc::new(Semaphore::new(places)), wait }
+        CallTurns { places: Arc::new(Semaphore::new(places)), wait }
     }
 
     /// Waits for the other calls of the tenant first, so that it has only one in the common queue.
@@ -48,7 +48,7 @@ mod tests {
     #[tokio::test]
     async fn a_tenant_has_one_turn_at_a_time_and_another_passes_its_queue() {
         let (turns, [north, south]) =
-            (Turns::new(1, Duration::from_secs(60)), [(); 2].map(|()| Allowance::new(&Limits::default())));
+            (CallTurns::new(1, Duration::from_secs(60)), [(); 2].map(|()| Allowance::new(&Limits::default())));
         let first = turns.of(&north).await.unwrap();
         let mut queue: Vec<_> = (0..3).map(|_| Box::pin(turns.of(&north))).collect();
         for waiting in &mut queue {
@@ -68,7 +68,7 @@ mod tests {
     #[tokio::test]
     async fn who_waits_too_long_is_told_to_come_again() {
         let (turns, [north, south]) =
-            (Turns::new(1, Duration::from_millis(5)), [(); 2].map(|()| Allowance::new(&Limits::default())));
+            (CallTurns::new(1, Duration::from_millis(5)), [(); 2].map(|()| Allowance::new(&Limits::default())));
         let _first = turns.of(&north).await.unwrap();
         assert!(matches!(turns.of(&north).await, Err(ServiceError::Refused(Refused::OwnWork))));
         assert!(matches!(turns.of(&south).await, Err(ServiceError::Busy)));

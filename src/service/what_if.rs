@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use super::error::ServiceError;
 use super::explain::{self, ATOM_BYTES, Explain};
-use super::live::Live;
+use super::live::LiveSession;
 use super::memory::Large;
 use super::report::{OF_ONE, OF_SEVERAL, Report, log_return_of, none_of};
 use super::sessions::Sessions;
@@ -311,7 +311,7 @@ impl Sessions {
         &self,
         tenant: &Tenant,
         request: &WhatIf,
-        live: &Live,
+        live: &LiveSession,
         hypotheses: Vec<Hypothesis>,
     ) -> Result<Vec<AssetsWhatIfPoint>, ServiceError> {
         let supposition = Supposition::new(live, request.holdings.as_ref(), request.report())?;

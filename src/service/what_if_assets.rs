@@ -8,9 +8,9 @@ use utoipa::ToSchema;
 
 use super::assets::shares;
 use super::fund_advice::FundAdvice;
-use super::live::Live;
+use super::live::LiveSession;
 use super::report::Report;
-use super::standing::Standing;
+use super::standing::SessionState;
 use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
@@ -47,7 +47,7 @@ pub struct AssetsWhatIfPoint {
 /// A hypothesis about several assets, besides one about wealth and radius.
 #[derive(Debug, Clone)]
 pub(super) struct Supposition {
-    standing: Standing,
+    standing: SessionState,
     /// Periods observed.
     observed: usize,
     step: usize,
@@ -66,7 +66,7 @@ impl Supposition {
     /// # Errors
     /// The holdings are not shares of wealth in the assets, or there are returns past the last period.
     pub(super) fn new(
-        live: &Live,
+        live: &LiveSession,
         holdings: Option<&BTreeMap<String, f64>>,
         report: Option<(&'static str, Report)>,
     ) -> Result<Self, FieldError> {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use super::codec::{Seal, hexadecimal, to_sql};
 use super::error::Failure;
-use super::query::{Row, query};
+use super::query::{StoreRow, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -152,7 +152,7 @@ impl Store {
             .bind(tenant.as_str())
             .bind(object.as_str()),
         };
-        let decode = |rows: &[Row]| rows.iter().map(AuditRow::from_row).collect();
+        let decode = |rows: &[StoreRow]| rows.iter().map(AuditRow::from_row).collect();
         let mut page: Vec<AuditRow> = self.list("reading the audit", page, decode).await?;
         if let (Some(object), None) = (&filter.object, after) {
             let observed = self.observed(object, limit).await?;
@@ -178,7 +178,7 @@ impl AuditRow {
             .integer(self.at_ms)
     }
 
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         let (previous, seal): (Vec<u8>, Vec<u8>) = (row.get("previous")?, row.get("seal")?);
         let read = AuditRow {
             sequence: row.get("sequence")?,

@@ -19,7 +19,7 @@ use futures_util::FutureExt;
 use super::audit::{Actor, AuditRow, Deed, entry};
 use super::codec::{Seal, hexadecimal};
 use super::error::{Failure, Quota};
-use super::query::{Connection, Query, Row, query};
+use super::query::{Query, StoreConnection, StoreRow, query};
 use super::quotas::{self, Quotas};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
@@ -42,8 +42,8 @@ pub struct AuditEnd {
 impl Store {
     /// Lists the end of each chain.
     pub async fn audit_ends(&self) -> Result<Vec<AuditEnd>, StoreError> {
-        let end = |row: &Row| {
-            let Chain { tenant, chain, end, end_seal, .. } = Chain::from_row(row)?;
+        let end = |row: &StoreRow| {
+            let AuditChain { tenant, chain, end, end_seal, .. } = AuditChain::from_row(row)?;
             Ok(AuditEnd { tenant: Tenant::stored(&tenant), chain, number: end, seal: hexadecimal(&end_seal) })
         };
         self.list("reading the audit", chains(), |rows| rows.iter().map(end).collect()).await
@@ -58,7 +58,7 @@ impl Store {
                            AND audit.number = audit_chains.cut_number + 1
              WHERE audit_chains.cut_number + 1 < audit_chains.number AND audit.at_ms < $1 ORDER BY place",
         );
-        let names = |row: &Row| Ok((row.get("tenant")?, row.get("chain")?));
+        let names = |row: &StoreRow| Ok((row.get("tenant")?, row.get("chain")?));
         let aged = aged.bind(before_ms.saturating_sub(MARGIN_MS));
         let found: Vec<(String, String)> =
             self.list("reading the audit", aged, |rows| rows.iter().map(names).collect()).await?;
@@ -93,7 +93,7 @@ impl Store {
 /// Fails if the caller's chain already has as many entries as `quotas` allows; the transaction must then be rolled
 /// back.
 pub(super) async fn record(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     (quotas, actor): (Quotas, &Actor),
     tenant: &Tenant,
     deed: Deed,
@@ -101,7 +101,7 @@ pub(super) async fn record(
     outcome: &str,
 ) -> Result<(), Failure> {
     // The chain is locked from here on, so that no two entries follow the same one.
-    let mut chain = Chain::hold(connection, tenant, actor.chain()).await?;
+    let mut chain = AuditChain::hold(connection, tenant, actor.chain()).await?;
     if actor.is_caller() {
         quotas::within(Quota::AuditEntries, chain.end - chain.number, 1, quotas.audit_entries.into())?;
     }
@@ -147,14 +147,14 @@ pub(super) async fn record(
 }
 
 async fn cut(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     (tenant, name): (String, String),
     before_ms: i64,
     now_ms: i64,
 ) -> Result<u64, Failure> {
     let connection = &mut connection;
     let tenant = Tenant::stored(&tenant);
-    let mut chain = Chain::hold(connection, &tenant, &name).await?;
+    let mut chain = AuditChain::hold(connection, &tenant, &name).await?;
     // Without this check, resealing would make a damaged end look sound.
     chain.verify()?;
     let young = query("SELECT min(number) AS number FROM audit WHERE tenant = $1 AND chain = $2 AND at_ms >= $3");
@@ -197,7 +197,7 @@ fn total_seal(chains: i64) -> Seal {
 }
 
 /// Checks that `chains` equals the number of chains ever begun.
-pub(super) fn verify_total(total: Option<&Row>, chains: i64) -> Result<(), Failure> {
+pub(super) fn verify_total(total: Option<&StoreRow>, chains: i64) -> Result<(), Failure> {
     let what = || "the number of chains of the audit".to_owned();
     match total {
         None if chains == 0 => Ok(()),
@@ -209,7 +209,7 @@ pub(super) fn verify_total(total: Option<&Row>, chains: i64) -> Result<(), Failu
 }
 
 /// A chain that a check is walking, starting where the chain was cut.
-pub(super) struct Chain {
+pub(super) struct AuditChain {
     pub tenant: String,
     pub chain: String,
     place: i64,
@@ -221,9 +221,9 @@ pub(super) struct Chain {
     own_seal: Vec<u8>,
 }
 
-impl Chain {
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
-        Ok(Chain {
+impl AuditChain {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
+        Ok(AuditChain {
             tenant: row.get("tenant")?,
             chain: row.get("chain")?,
             place: row.get("place")?,
@@ -236,13 +236,13 @@ impl Chain {
     }
 
     /// Locks the chain for this transaction, and begins it if there is none.
-    async fn hold(connection: &mut Connection<'_>, tenant: &Tenant, chain: &str) -> Result<Self, Failure> {
+    async fn hold(connection: &mut StoreConnection<'_>, tenant: &Tenant, chain: &str) -> Result<Self, Failure> {
         let find = || {
             let find = query("SELECT * FROM audit_chains WHERE tenant = $1 AND chain = $2");
             find.bind(tenant.as_str()).bind(chain).for_update()
         };
         if let Some(row) = connection.row(find()).await? {
-            return Chain::from_row(&row);
+            return AuditChain::from_row(&row);
         }
         // Locked from here on, so that no two transactions begin the same chain or use the same `place`.
         let hold = query(
@@ -252,10 +252,10 @@ impl Chain {
         let held = connection.row(hold.bind(total_seal(0).finish())).await?;
         let place = 1 + held.map_or(Ok(0), |row| row.get::<i64>("chains"))?;
         if let Some(row) = connection.row(find()).await? {
-            return Chain::from_row(&row);
+            return AuditChain::from_row(&row);
         }
         let first = Seal::of("audit chain").text(tenant.as_str()).text(chain).finish();
-        let mut begun = Chain {
+        let mut begun = AuditChain {
             tenant: tenant.to_string(),
             chain: chain.to_owned(),
             place,
@@ -289,7 +289,7 @@ impl Chain {
             .bytes(&self.end_seal)
     }
 
-    /// Verifies the chain's own seal. Call this before [`Chain::follow`].
+    /// Verifies the chain's own seal. Call this before [`AuditChain::follow`].
     pub(super) fn verify(&self) -> Result<(), Failure> {
         self.seal().verify(&self.own_seal, || format!("the end of {} in the audit of {}", self.chain, self.tenant))
     }
@@ -308,8 +308,8 @@ impl Chain {
         self.number >= self.end
     }
 
-    /// Advances over the rows that [`Chain::next`] found, and returns the damage among them.
-    pub(super) fn follow(&mut self, rows: &[Row]) -> Result<Vec<String>, Failure> {
+    /// Advances over the rows that [`AuditChain::next`] found, and returns the damage among them.
+    pub(super) fn follow(&mut self, rows: &[StoreRow]) -> Result<Vec<String>, Failure> {
         let named = |number| entry(&self.chain, &self.tenant, number);
         let mut damage = Vec::new();
         let mut sequence = None;

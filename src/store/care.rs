@@ -2,7 +2,7 @@
 
 use super::codec::from_sql;
 use super::error::Failure;
-use super::query::{Row, query};
+use super::query::{StoreRow, query};
 use super::statement::{ANSWER, HORIZON, IS_WAITING, OBSERVATIONS, Statement};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
@@ -59,7 +59,7 @@ impl Store {
              JOIN policy_owners ON policy_owners.policy = policies.policy
              WHERE policy_owners.tenant = $1 AND periods_per_year IS NOT NULL",
         );
-        let decode = |rows: &[Row]| rows.iter().map(|row| row.get("periods_per_year")).collect();
+        let decode = |rows: &[StoreRow]| rows.iter().map(|row| row.get("periods_per_year")).collect();
         self.list("listing calendars", found.bind(tenant.as_str()), decode).await
     }
 }
@@ -120,7 +120,7 @@ pub(super) fn needs_any(statement: &mut Statement, today: &Today) {
 }
 
 impl CareCounts {
-    pub(super) fn from_rows(rows: &[Row]) -> Result<Self, Failure> {
+    pub(super) fn from_rows(rows: &[StoreRow]) -> Result<Self, Failure> {
         let Some(row) = rows.first() else { return Ok(CareCounts::default()) };
         let count = |column: &str| from_sql(row.get::<i64>(column)?);
         Ok(CareCounts {

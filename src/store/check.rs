@@ -11,13 +11,13 @@ use std::path::Path;
 use sqlx::SqliteConnection;
 use sqlx::postgres::PgConnection;
 
-use super::audit_chain::{self, Chain};
+use super::audit_chain::{self, AuditChain};
 use super::codec::to_sql;
 use super::entries::EntryRow;
 use super::error::{Cause, Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
-use super::query::{Connection, Query, Row, query};
+use super::query::{Query, StoreConnection, StoreRow, query};
 use super::quotas::{ASSET_BYTES, ENTRY_BYTES, ROW_BYTES};
 use super::sessions::SessionRow;
 use super::{PostgresUrl, entries, leases, migrations, policies, postgres, sqlite};
@@ -57,7 +57,7 @@ const UNRECORDED: &str = "
 
 /// The parts of a check, in the order in which they run.
 #[derive(Debug, Clone, Copy)]
-enum Part {
+enum CheckPart {
     File,
     Policies,
     Jobs,
@@ -67,25 +67,32 @@ enum Part {
     Audit,
 }
 
-impl Part {
-    const ALL: [Part; 7] =
-        [Part::File, Part::Policies, Part::Jobs, Part::Sessions, Part::Totals, Part::Keys, Part::Audit];
+impl CheckPart {
+    const ALL: [CheckPart; 7] = [
+        CheckPart::File,
+        CheckPart::Policies,
+        CheckPart::Jobs,
+        CheckPart::Sessions,
+        CheckPart::Totals,
+        CheckPart::Keys,
+        CheckPart::Audit,
+    ];
 }
 
 /// A store about to be checked.
 pub struct Inspection {
-    reader: Reader,
+    reader: CheckReader,
     /// The damage found so far.
     damage: Vec<String>,
 }
 
-enum Reader {
+enum CheckReader {
     Sqlite(SqliteConnection),
     Postgres(PgConnection),
 }
 
-impl From<Reader> for Inspection {
-    fn from(reader: Reader) -> Self {
+impl From<CheckReader> for Inspection {
+    fn from(reader: CheckReader) -> Self {
         Inspection { reader, damage: Vec::new() }
     }
 }
@@ -96,7 +103,7 @@ impl Inspection {
     /// # Errors
     /// Fails if there is no database or it cannot be read.
     pub async fn of_folder(dir: &Path) -> Result<Self, StoreError> {
-        sqlite::opening::inspect(dir).await.map(|connection| Reader::Sqlite(connection).into())
+        sqlite::opening::inspect(dir).await.map(|connection| CheckReader::Sqlite(connection).into())
     }
 
     /// Opens a [`backup`](super::backup), to which nothing writes.
@@ -104,7 +111,7 @@ impl Inspection {
     /// # Errors
     /// As [`Inspection::of_folder`].
     pub async fn of_backup(file: &Path) -> Result<Self, StoreError> {
-        sqlite::opening::inspect_file(file).await.map(|connection| Reader::Sqlite(connection).into())
+        sqlite::opening::inspect_file(file).await.map(|connection| CheckReader::Sqlite(connection).into())
     }
 
     /// Connects to the database at `url`.
@@ -112,7 +119,7 @@ impl Inspection {
     /// # Errors
     /// Fails if the database cannot be reached.
     pub async fn of_database(url: &PostgresUrl) -> Result<Self, StoreError> {
-        postgres::inspect(url).await.map(|connection| Reader::Postgres(connection).into())
+        postgres::inspect(url).await.map(|connection| CheckReader::Postgres(connection).into())
     }
 
     /// Checks everything, and calls `tell` with a sentence for each sound kind of data and for each damaged thing.
@@ -136,17 +143,17 @@ impl Inspection {
 
     async fn schema(&mut self) -> Result<i64, StoreError> {
         match &mut self.reader {
-            Reader::Sqlite(connection) => {
+            CheckReader::Sqlite(connection) => {
                 migrations::require_newest(&migrations::sqlite(), sqlite::opening::version(connection).await?)
             }
-            Reader::Postgres(connection) => {
+            CheckReader::Postgres(connection) => {
                 migrations::require_newest(&migrations::postgres(), postgres::version(connection).await?)
             }
         }
     }
 
     async fn all(&mut self, tell: &mut impl FnMut(String)) -> Result<(), Failure> {
-        for part in Part::ALL {
+        for part in CheckPart::ALL {
             let before = self.damage.len();
             // A part that cannot be read at all counts as damage of the file; the other parts may still be readable.
             let found = self.part(part).await;
@@ -155,7 +162,7 @@ impl Inspection {
                 (Some(sentence), []) => tell(sentence),
                 (_, damage) => damage.iter().for_each(|what| tell(format!("damaged: {what}"))),
             }
-            if self.damage.iter().any(|what| what.starts_with("the ")) && matches!(part, Part::File) {
+            if self.damage.iter().any(|what| what.starts_with("the ")) && matches!(part, CheckPart::File) {
                 // The driver may fail to read rows on damaged pages.
                 break;
             }
@@ -175,33 +182,35 @@ impl Inspection {
     }
 
     /// Checks a part, and returns a sentence that counts what it holds.
-    async fn part(&mut self, part: Part) -> Result<String, Failure> {
+    async fn part(&mut self, part: CheckPart) -> Result<String, Failure> {
         Ok(match part {
-            Part::File => {
+            CheckPart::File => {
                 self.file().await?;
                 match self.reader {
-                    Reader::Sqlite(_) => "the file: pages, indexes and references are whole".to_owned(),
-                    Reader::Postgres(_) => "the file: checked by PostgreSQL itself".to_owned(),
+                    CheckReader::Sqlite(_) => "the file: pages, indexes and references are whole".to_owned(),
+                    CheckReader::Postgres(_) => "the file: checked by PostgreSQL itself".to_owned(),
                 }
             }
-            Part::Policies => format!("policies: {}, each the bytes its name is the hash of", self.policies().await?),
-            Part::Jobs => {
+            CheckPart::Policies => {
+                format!("policies: {}, each the bytes its name is the hash of", self.policies().await?)
+            }
+            CheckPart::Jobs => {
                 let (jobs, checkpoints) = self.jobs().await?;
                 format!("jobs: {jobs}, with {checkpoints} checkpoints as sealed")
             }
-            Part::Sessions => {
+            CheckPart::Sessions => {
                 let (sessions, entries) = self.sessions().await?;
                 format!("sessions: {sessions}, with {entries} entries, as sealed and none missing between")
             }
-            Part::Totals => format!("totals: of {} tenants, each the sum of what it keeps", self.totals().await?),
-            Part::Keys => {
+            CheckPart::Totals => format!("totals: of {} tenants, each the sum of what it keeps", self.totals().await?),
+            CheckPart::Keys => {
                 let rows = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
                 for row in &rows {
                     self.note(KeyRow::from_row(row))?;
                 }
                 format!("keys: {}, each as sealed", rows.len())
             }
-            Part::Audit => {
+            CheckPart::Audit => {
                 let (chains, entries) = self.audit().await?;
                 format!("audit: {entries} entries in {chains} chains, as sealed and none missing")
             }
@@ -213,7 +222,7 @@ impl Inspection {
         let found = self.read(audit_chain::chains()).await?;
         let total = self.read(audit_chain::total()).await?;
         for row in &found {
-            let Some(mut chain) = self.note(Chain::from_row(row))? else { continue };
+            let Some(mut chain) = self.note(AuditChain::from_row(row))? else { continue };
             self.note(chain.verify())?;
             while !chain.is_whole() {
                 let page = self.read(chain.next(PAGE)).await?;
@@ -230,7 +239,7 @@ impl Inspection {
 
     /// Runs SQLite's own checks: its trees and indexes are intact, and no row refers to a missing one.
     async fn file(&mut self) -> Result<(), Failure> {
-        if let Reader::Postgres(_) = self.reader {
+        if let CheckReader::Postgres(_) = self.reader {
             return Ok(());
         }
         let faults = "SELECT CAST(integrity_check AS TEXT) AS fault FROM pragma_integrity_check LIMIT 100";
@@ -310,17 +319,17 @@ impl Inspection {
         Ok(totals.len())
     }
 
-    async fn read(&mut self, query: Query) -> Result<Vec<Row>, Failure> {
+    async fn read(&mut self, query: Query) -> Result<Vec<StoreRow>, Failure> {
         let mut connection = match &mut self.reader {
-            Reader::Sqlite(connection) => Connection::Sqlite(connection),
-            Reader::Postgres(connection) => Connection::Postgres(connection),
+            CheckReader::Sqlite(connection) => StoreConnection::Sqlite(connection),
+            CheckReader::Postgres(connection) => StoreConnection::Postgres(connection),
         };
         connection.rows(query).await
     }
 }
 
 /// Counts the entries of a session, and lists those that are damaged or missing.
-fn each(session: &str, rows: &[Row]) -> Result<(usize, Vec<String>), Failure> {
+fn each(session: &str, rows: &[StoreRow]) -> Result<(usize, Vec<String>), Failure> {
     let (mut last, mut damage) = (0, Vec::new());
     for row in rows {
         let Some(entry) = row.get::<Option<i64>>("entry")? else { return Ok((0, damage)) };

@@ -14,7 +14,7 @@ use super::codec::{Seal, from_sql, hexadecimal, to_sql};
 use super::error::Failure;
 use super::head::Head;
 use super::postgres::Database;
-use super::query::{Connection, Query, Row, query};
+use super::query::{Query, StoreConnection, StoreRow, query};
 use super::quotas::{self, Quotas, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError};
@@ -139,7 +139,7 @@ pub(super) fn all_of(session: &str) -> Query {
 }
 
 /// Decodes the rows of [`all_of`], verifying each and that none is missing before the last.
-pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Option<Vec<EntryRow>>, Failure> {
+pub(super) fn numbered(session: &str, rows: &[StoreRow]) -> Result<Option<Vec<EntryRow>>, Failure> {
     let Some(first) = rows.first() else { return Ok(None) };
     if first.get::<Option<i64>>("entry")?.is_none() {
         return Ok(Some(Vec::new()));
@@ -168,13 +168,16 @@ pub(super) const APPENDING: &str = "appending an entry";
 
 /// Inserts the row by a statement that itself checks that it is the next one. The reason for a failure is looked up
 /// afterwards. No other statement here changes rows.
-pub(super) async fn append(mut connection: Connection<'_>, new: EntryRow) -> Result<Append, Failure> {
+pub(super) async fn append(mut connection: StoreConnection<'_>, new: EntryRow) -> Result<Append, Failure> {
     append_next(&mut connection, &new).await.map(|(append, _)| append)
 }
 
 /// Appends like [`append`], and also returns the tenant of the session. Observations are inserted without this row
 /// lock. The lock must not block their reference to the session, or the two could deadlock.
-pub(super) async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<(Append, Tenant), Failure> {
+pub(super) async fn append_next(
+    connection: &mut StoreConnection<'_>,
+    new: &EntryRow,
+) -> Result<(Append, Tenant), Failure> {
     let session = query("SELECT tenant FROM sessions WHERE session = $1").bind(new.session.as_str());
     let Some(found) = connection.row(session.for_update_but_references()).await? else {
         return Ok((Append::NoSession, Tenant::default()));
@@ -186,7 +189,7 @@ pub(super) async fn append_next(connection: &mut Connection<'_>, new: &EntryRow)
 
 /// Appends an entry that had no quota reserved when its session was opened, and records it in the audit.
 async fn append_with_room(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     new: EntryRow,
     by: (Quotas, Actor),
 ) -> Result<Append, Failure> {
@@ -201,7 +204,7 @@ async fn append_with_room(
 
 /// Reserves quota for `room` more entries, and records in the audit what it is for.
 pub(super) async fn take_room(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     session: &str,
     room: i64,
@@ -262,7 +265,7 @@ fn insert_all(rows: usize) -> String {
 ///
 /// # Errors
 /// Fails too if some row is not the next one of a session that exists.
-pub(super) async fn append_all(connection: &mut Connection<'_>, new: &[&EntryRow]) -> Result<(), Failure> {
+pub(super) async fn append_all(connection: &mut StoreConnection<'_>, new: &[&EntryRow]) -> Result<(), Failure> {
     let size = new.len().next_power_of_two().trailing_zeros() as usize;
     let insert = new.iter().fold(query(INSERT_MANY[size].as_str()), |insert, new| bind_row(insert, new));
     connection.execute(insert).await.map(drop)
@@ -308,7 +311,7 @@ impl EntryRow {
     }
 
     /// Verifies an observation's seal and returns it as an audit row.
-    pub(super) fn told(row: &Row) -> Result<AuditRow, Failure> {
+    pub(super) fn told(row: &StoreRow) -> Result<AuditRow, Failure> {
         let observation = EntryRow::from_row(row)?;
         Ok(AuditRow {
             sequence: 0,
@@ -324,12 +327,12 @@ impl EntryRow {
         })
     }
 
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         Self::beside(row, "created_ms", "seal")
     }
 
     /// Reads the entry from a row that is joined with a session, so that its time and its seal have other column names.
-    pub(super) fn beside(row: &Row, created_ms: &str, seal: &str) -> Result<Self, Failure> {
+    pub(super) fn beside(row: &StoreRow, created_ms: &str, seal: &str) -> Result<Self, Failure> {
         let read = EntryRow {
             session: row.get("session")?,
             entry: from_sql(row.get("entry")?)?,

@@ -3,7 +3,7 @@
 
 use futures_util::FutureExt;
 
-use super::query::{Row, query};
+use super::query::{StoreRow, query};
 use super::{Engine, Store, StoreError};
 
 impl Store {
@@ -17,7 +17,7 @@ impl Store {
 
     /// Returns the time that was stored last.
     pub async fn heartbeat(&self) -> Result<Option<i64>, StoreError> {
-        let found = |rows: &[Row]| rows.first().map(|row| row.get("at_ms")).transpose();
+        let found = |rows: &[StoreRow]| rows.first().map(|row| row.get("at_ms")).transpose();
         self.probe("reading the last heartbeat", query("SELECT at_ms FROM heartbeat"), found).await
     }
 

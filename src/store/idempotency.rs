@@ -3,7 +3,7 @@
 //! A key belongs to its tenant, over jobs and sessions alike, and lives as long as what it made.
 
 use super::error::Failure;
-use super::query::{Connection, query};
+use super::query::{StoreConnection, query};
 use super::tenant::Tenant;
 
 /// Prefix of the idempotency key of a training that was made for sessions. No caller can send such a key, because no
@@ -29,7 +29,7 @@ pub(super) enum Used {
 
 /// Returns the earlier use of the key; `None` for a new key.
 pub(super) async fn used(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     key: &RequestKey,
 ) -> Result<Option<Used>, Failure> {
@@ -42,7 +42,7 @@ pub(super) async fn used(
 
 /// Takes the key for a session. Returns false if another transaction took it in the meantime.
 pub(super) async fn take(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     key: &RequestKey,
     session: &str,

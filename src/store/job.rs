@@ -7,7 +7,7 @@ use super::codec::from_sql;
 use super::error::Failure;
 use super::job_state::JobState;
 use super::labels::Relabel;
-use super::query::Row;
+use super::query::StoreRow;
 use super::tenant::Tenant;
 
 /// The kind of computation that a job runs.
@@ -138,7 +138,7 @@ pub struct OldestJobs {
 }
 
 impl JobRow {
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         let job: String = row.get("job")?;
         let damaged = |column: &str| Failure::Corrupt(format!("the {column} of job {job}"));
         Ok(JobRow {

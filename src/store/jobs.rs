@@ -9,7 +9,7 @@ use super::error::Failure;
 use super::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
 use super::job_state::{JobEvent, JobState};
 use super::labels::Relabel;
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Store, StoreError, training_names, turns};
@@ -123,7 +123,7 @@ impl Store {
 /// Creates a job while the tenant's turn is locked: no other transaction queues a job for the tenant, nor takes its
 /// idempotency key, in between.
 async fn create(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     new: NewJob,
     quotas: Quotas,
     actor: Actor,
@@ -154,7 +154,7 @@ async fn create(
 }
 
 /// Inserts a job and its request, and returns the bytes that they take.
-pub(super) async fn insert(connection: &mut Connection<'_>, new: &NewJob) -> Result<i64, Failure> {
+pub(super) async fn insert(connection: &mut StoreConnection<'_>, new: &NewJob) -> Result<i64, Failure> {
     let insert =
         query("INSERT INTO jobs (job, kind, state, steps_total, created_ms, tenant) VALUES ($1, $2, $3, $4, $5, $6)");
     let insert = insert
@@ -175,7 +175,7 @@ pub(super) async fn insert(connection: &mut Connection<'_>, new: &NewJob) -> Res
 
 /// Counts the bytes of a new job, and records it in the audit.
 pub(super) async fn count(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     new: &NewJob,
     bytes: i64,
     quotas: Quotas,
@@ -190,7 +190,7 @@ pub(super) async fn count(
 
 /// Returns the answer for an idempotency key that was used before; `None` for a new key.
 async fn repeated(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     key: &str,
     request_hash: &str,
@@ -209,13 +209,13 @@ async fn repeated(
 }
 
 /// Finds the job and locks it for this transaction.
-pub(super) async fn find(connection: &mut Connection<'_>, job: &str) -> Result<Option<JobRow>, Failure> {
+pub(super) async fn find(connection: &mut StoreConnection<'_>, job: &str) -> Result<Option<JobRow>, Failure> {
     let find = query("SELECT * FROM jobs WHERE job = $1").bind(job).for_update();
     connection.row(find).await?.as_ref().map(JobRow::from_row).transpose()
 }
 
 pub(super) async fn cancel(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     job: String,
     actor: Actor,
     now_ms: i64,
@@ -235,7 +235,7 @@ pub(super) async fn cancel(
 
 /// Sets a terminal state, and deletes the checkpoints and the request, which are no longer needed.
 pub(super) async fn end(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     row: &JobRow,
     state: JobState,
     now_ms: i64,
@@ -265,7 +265,7 @@ fn labels_json(labels: &Relabel) -> Result<String, Failure> {
 }
 
 /// Reads the labels for the policy of a job.
-pub(super) async fn labels_of(connection: &mut Connection<'_>, job: &str) -> Result<Relabel, Failure> {
+pub(super) async fn labels_of(connection: &mut StoreConnection<'_>, job: &str) -> Result<Relabel, Failure> {
     let find = query("SELECT labels_json FROM job_requests WHERE job = $1").bind(job);
     let found: String = connection.row(find).await?.map_or(Ok(String::new()), |row| row.get("labels_json"))?;
     if found.is_empty() {
@@ -275,6 +275,6 @@ pub(super) async fn labels_of(connection: &mut Connection<'_>, job: &str) -> Res
 }
 
 /// Sums the column `bytes`.
-fn sum(rows: &[Row]) -> Result<i64, Failure> {
+fn sum(rows: &[StoreRow]) -> Result<i64, Failure> {
     rows.iter().map(|row| row.get::<i64>("bytes")).sum()
 }

@@ -10,7 +10,7 @@ use super::audit::{Actor, AuditFilter, AuditRow, Deed};
 use super::audit_chain;
 use super::codec::Seal;
 use super::error::Failure;
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::Quotas;
 use super::tenant::Tenant;
 use super::{Engine, PostgresUrl, Store, StoreError, sqlite};
@@ -58,7 +58,7 @@ pub struct Successor {
 
 /// The outcome of a rotation.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Rotate {
+pub enum Rotation {
     /// Both are in force; `old` is the replaced key as it is now.
     Rotated { old: Box<KeyRow>, new: Box<KeyRow> },
     /// There is no key of this name.
@@ -89,7 +89,7 @@ pub struct StoredKeys {
 }
 
 impl StoredKeys {
-    fn from_rows(rows: &[Row]) -> Result<Self, Failure> {
+    fn from_rows(rows: &[StoreRow]) -> Result<Self, Failure> {
         let mut keys = StoredKeys::default();
         for row in rows {
             match KeyRow::from_row(row) {
@@ -154,7 +154,7 @@ impl KeyRing {
 
     /// Stores a successor of `key`, and makes `key` itself expire at `old_expires_ms` unless it expires sooner. Both
     /// happen or neither, so that there is always a key in force.
-    pub async fn rotate(&self, key: &str, new: Successor, old_expires_ms: i64) -> Result<Rotate, StoreError> {
+    pub async fn rotate(&self, key: &str, new: Successor, old_expires_ms: i64) -> Result<Rotation, StoreError> {
         let key = key.to_owned();
         self.0.write("rotating a key", move |connection| rotate(connection, key, new, old_expires_ms).boxed()).await
     }
@@ -182,19 +182,19 @@ impl Store {
     }
 }
 
-async fn create(mut connection: Connection<'_>, new: NewKey, actor: Actor) -> Result<(), Failure> {
+async fn create(mut connection: StoreConnection<'_>, new: NewKey, actor: Actor) -> Result<(), Failure> {
     let (tenant, key, outcome) = (new.tenant.clone(), new.key.clone(), format!("in force, {}", new.roles));
     insert(&mut connection, new).await?;
     audit_chain::record(&mut connection, (Quotas::NONE, &actor), &tenant, Deed::CreateKey, &key, &outcome).await
 }
 
 /// Finds the key and locks it for this transaction.
-async fn find(connection: &mut Connection<'_>, key: &str) -> Result<Option<KeyRow>, Failure> {
+async fn find(connection: &mut StoreConnection<'_>, key: &str) -> Result<Option<KeyRow>, Failure> {
     let find = query("SELECT * FROM access_keys WHERE access_key = $1").bind(key).for_update();
     connection.row(find).await?.as_ref().map(KeyRow::from_row).transpose()
 }
 
-async fn revoke(mut connection: Connection<'_>, key: String, now_ms: i64) -> Result<bool, Failure> {
+async fn revoke(mut connection: StoreConnection<'_>, key: String, now_ms: i64) -> Result<bool, Failure> {
     let connection = &mut connection;
     let Some(row) = find(connection, &key).await? else { return Ok(false) };
     if row.revoked_ms.is_none() {
@@ -206,13 +206,13 @@ async fn revoke(mut connection: Connection<'_>, key: String, now_ms: i64) -> Res
 }
 
 /// Stores when a key ends.
-async fn change(connection: &mut Connection<'_>, row: &KeyRow) -> Result<(), Failure> {
+async fn change(connection: &mut StoreConnection<'_>, row: &KeyRow) -> Result<(), Failure> {
     let change = query("UPDATE access_keys SET revoked_ms = $1, expires_ms = $2, seal = $3 WHERE access_key = $4");
     let change = change.bind(row.revoked_ms).bind(row.expires_ms).bind(row.seal().finish()).bind(row.key.as_str());
     connection.execute(change).await.map(drop)
 }
 
-async fn insert(connection: &mut Connection<'_>, new: NewKey) -> Result<(), Failure> {
+async fn insert(connection: &mut StoreConnection<'_>, new: NewKey) -> Result<(), Failure> {
     let insert = query(
         "INSERT INTO access_keys (access_key, hash, tenant, roles, created_ms, expires_ms, seal)
          VALUES ($1, $2, $3, $4, $5, $6, $7)",
@@ -230,15 +230,15 @@ async fn insert(connection: &mut Connection<'_>, new: NewKey) -> Result<(), Fail
 }
 
 async fn rotate(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     key: String,
     new: Successor,
     old_expires_ms: i64,
-) -> Result<Rotate, Failure> {
+) -> Result<Rotation, Failure> {
     let connection = &mut connection;
-    let Some(old) = find(connection, &key).await? else { return Ok(Rotate::Absent) };
+    let Some(old) = find(connection, &key).await? else { return Ok(Rotation::Absent) };
     if old.has_ended(new.created_ms) {
-        return Ok(Rotate::Ended);
+        return Ok(Rotation::Ended);
     }
     let life_ms = old.expires_ms.map(|expires_ms| expires_ms.saturating_sub(old.created_ms));
     let expires_ms = new.expires_ms.or(life_ms.map(|life_ms| new.created_ms.saturating_add(life_ms)));
@@ -250,7 +250,7 @@ async fn rotate(
     change(connection, &old).await?;
     let (actor, outcome) = (Actor::operator(created_ms), format!("succeeded by {}", new.key));
     audit_chain::record(connection, (Quotas::NONE, &actor), &old.tenant, Deed::RotateKey, &key, &outcome).await?;
-    Ok(Rotate::Rotated { old: Box::new(old), new: Box::new(new) })
+    Ok(Rotation::Rotated { old: Box::new(old), new: Box::new(new) })
 }
 
 impl From<KeyRow> for NewKey {
@@ -285,7 +285,7 @@ impl KeyRow {
         self.revoked_ms.is_some() || self.expires_ms.is_some_and(|expires_ms| expires_ms <= now_ms)
     }
 
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         let key: String = row.get("access_key")?;
         let what = || format!("key {key}");
         let roles: String = row.get("roles")?;

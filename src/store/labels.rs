@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 use super::audit::Deed;
 use super::audit_chain;
 use super::error::Failure;
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::{self, Usage};
 use super::tenant::Tenant;
 use super::words::{self, Labelled, Worded};
@@ -101,7 +101,7 @@ impl Labels {
     }
 
     /// Reads a row with the columns `name`, `notes` and `tags`; the values are NULL if a join found no labels.
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         let text = |column: &str| row.get::<Option<String>>(column).map(Option::unwrap_or_default);
         let tags = text("tags")?.split('\n').filter(|tag| !tag.is_empty()).map(str::to_owned).collect();
         Ok(Labels { name: text("name")?, notes: text("notes")?, tags })
@@ -168,7 +168,7 @@ impl Store {
     }
 }
 
-async fn stored(connection: &mut Connection<'_>, tenant: &Tenant, object: &str) -> Result<Labels, Failure> {
+async fn stored(connection: &mut StoreConnection<'_>, tenant: &Tenant, object: &str) -> Result<Labels, Failure> {
     let row = connection.row(query(FIND).bind(tenant.as_str()).bind(object)).await?;
     row.as_ref().map_or(Ok(Labels::default()), Labels::from_row)
 }
@@ -185,7 +185,7 @@ fn told(change: &Relabel) -> String {
 /// Locks a thing against deletion and changes of its labels until this transaction ends. Returns its row, if the tenant
 /// has it.
 pub(super) async fn hold(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     kind: Labelled,
     object: &str,
@@ -201,7 +201,7 @@ pub(super) async fn hold(
 /// Changes the labels of a thing that this transaction holds. Returns the new labels, and the additional bytes they
 /// take.
 pub(super) async fn put(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     of: Worded<'_>,
     object: &str,
     change: &Relabel,
@@ -233,7 +233,11 @@ pub(super) async fn put(
 }
 
 /// Deletes the labels and all the words of a deleted thing. Returns the usage that the labels took.
-pub(super) async fn remove(connection: &mut Connection<'_>, of: Worded<'_>, object: &str) -> Result<Usage, Failure> {
+pub(super) async fn remove(
+    connection: &mut StoreConnection<'_>,
+    of: Worded<'_>,
+    object: &str,
+) -> Result<Usage, Failure> {
     let labels = stored(connection, of.tenant, object).await?;
     let delete = query("DELETE FROM labels WHERE tenant = $1 AND object = $2");
     connection.execute(delete.bind(of.tenant.as_str()).bind(object)).await?;

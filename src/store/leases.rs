@@ -17,7 +17,7 @@ use super::job::{ClaimedJob, JobOutcome, JobRow};
 use super::job_state::{JobEvent, JobState};
 use super::jobs::{end, find, labels_of};
 use super::labels;
-use super::query::{Connection, Query, Row, query};
+use super::query::{Query, StoreConnection, StoreRow, query};
 use super::quotas::{self, Quotas, Usage};
 use super::words::{Labelled, Worded};
 use super::{Store, StoreError, policies, turns};
@@ -98,7 +98,7 @@ impl Store {
 }
 
 async fn claim(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     worker: String,
     until_ms: i64,
     now_ms: i64,
@@ -138,7 +138,7 @@ async fn claim(
     Ok(None)
 }
 
-async fn claimed(connection: &mut Connection<'_>, job: &str) -> Result<ClaimedJob, Failure> {
+async fn claimed(connection: &mut StoreConnection<'_>, job: &str) -> Result<ClaimedJob, Failure> {
     let request = connection.row(query("SELECT json FROM job_requests WHERE job = $1").bind(job)).await?;
     let request_json = request.map(|row| row.get("json")).transpose()?;
     match (find(connection, job).await?, request_json) {
@@ -148,7 +148,7 @@ async fn claimed(connection: &mut Connection<'_>, job: &str) -> Result<ClaimedJo
 }
 
 /// Finds and locks a job to take over, which has had its turn already; else the one whose turn it is.
-async fn claimable(connection: &mut Connection<'_>, now_ms: i64) -> Result<Option<JobRow>, Failure> {
+async fn claimable(connection: &mut StoreConnection<'_>, now_ms: i64) -> Result<Option<JobRow>, Failure> {
     let left = query("SELECT * FROM jobs WHERE state = $1 AND lease_until_ms <= $2 ORDER BY sequence LIMIT 1");
     let left = left.bind(JobState::Running.as_str()).bind(now_ms);
     match connection.row(left.for_update_of_free()).await? {
@@ -157,7 +157,7 @@ async fn claimable(connection: &mut Connection<'_>, now_ms: i64) -> Result<Optio
     }
 }
 
-async fn renew(mut connection: Connection<'_>, job: String, attempt: i64, until_ms: i64) -> Result<bool, Failure> {
+async fn renew(mut connection: StoreConnection<'_>, job: String, attempt: i64, until_ms: i64) -> Result<bool, Failure> {
     let renew = query("UPDATE jobs SET lease_until_ms = $1 WHERE job = $2 AND attempt = $3 AND state = $4")
         .bind(until_ms)
         .bind(job)
@@ -167,13 +167,13 @@ async fn renew(mut connection: Connection<'_>, job: String, attempt: i64, until_
 }
 
 /// Returns the job if this attempt still holds it, and locks it until this transaction ends.
-async fn held(connection: &mut Connection<'_>, job: &str, attempt: i64) -> Result<Option<JobRow>, Failure> {
+async fn held(connection: &mut StoreConnection<'_>, job: &str, attempt: i64) -> Result<Option<JobRow>, Failure> {
     let row = find(connection, job).await?;
     Ok(row.filter(|row| row.state == JobState::Running && row.attempt == attempt))
 }
 
 async fn checkpoint(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     job: String,
     attempt: i64,
     step: i64,
@@ -201,8 +201,8 @@ pub(super) fn checkpoints_of(job: &str) -> Query {
 }
 
 /// Decodes the rows of [`checkpoints_of`], verifying each against its seal.
-pub(super) fn verified_checkpoints(job: &str, rows: &[Row]) -> Result<Vec<(usize, Vec<u8>)>, Failure> {
-    let verified = |row: &Row| {
+pub(super) fn verified_checkpoints(job: &str, rows: &[StoreRow]) -> Result<Vec<(usize, Vec<u8>)>, Failure> {
+    let verified = |row: &StoreRow| {
         let (step, bytes) = (row.get("step")?, row.get::<Vec<u8>>("bytes")?);
         let what = || format!("the checkpoint of step {step} of job {job}");
         checkpoint_seal(job, step, &bytes).verify(&row.get::<Vec<u8>>("seal")?, what)?;
@@ -216,7 +216,7 @@ fn checkpoint_seal(job: &str, step: i64, bytes: &[u8]) -> Seal {
 }
 
 async fn finish(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     job: String,
     attempt: i64,
     (outcome, year): (JobOutcome, Option<f64>),
@@ -259,7 +259,7 @@ async fn finish(
     Ok(true)
 }
 
-async fn release(mut connection: Connection<'_>, job: String, attempt: i64, now_ms: i64) -> Result<bool, Failure> {
+async fn release(mut connection: StoreConnection<'_>, job: String, attempt: i64, now_ms: i64) -> Result<bool, Failure> {
     let connection = &mut connection;
     let Some(row) = held(connection, &job, attempt).await? else { return Ok(false) };
     let event = if row.cancel_requested { JobEvent::Cancel } else { JobEvent::Release };

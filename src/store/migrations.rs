@@ -8,10 +8,10 @@ use sqlx::migrate::{MigrateError, Migration, MigrationType, Migrator};
 use super::error::{Failure, StoreError};
 
 /// Version, description, statements.
-type Step = (i64, &'static str, &'static str);
+type SchemaStep = (i64, &'static str, &'static str);
 
-const SQLITE: [Step; 1] = [(1, "facts", include_str!("migrations/sqlite/0001_facts.sql"))];
-const POSTGRES: [Step; 1] = [(1, "facts", include_str!("migrations/postgres/0001_facts.sql"))];
+const SQLITE: [SchemaStep; 1] = [(1, "facts", include_str!("migrations/sqlite/0001_facts.sql"))];
+const POSTGRES: [SchemaStep; 1] = [(1, "facts", include_str!("migrations/postgres/0001_facts.sql"))];
 
 pub(super) fn sqlite() -> Migrator {
     migrator(&SQLITE)
@@ -22,8 +22,8 @@ pub(super) fn postgres() -> Migrator {
     migrator(&POSTGRES)
 }
 
-fn migrator(steps: &[Step]) -> Migrator {
-    let migration = |&(version, description, statements): &Step| {
+fn migrator(steps: &[SchemaStep]) -> Migrator {
+    let migration = |&(version, description, statements): &SchemaStep| {
         Migration::new(version, description.into(), MigrationType::Simple, statements.into_sql_str(), false)
     };
     Migrator::with_migrations(steps.iter().map(migration).collect())

@@ -68,7 +68,7 @@ use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 
 use error::Failure;
-use query::{Connection, Purpose, Query, Row};
+use query::{Purpose, Query, StoreConnection, StoreRow};
 
 pub use audit::{Actor, AuditFilter, AuditRow, Deed};
 pub use audit_chain::AuditEnd;
@@ -81,7 +81,7 @@ pub use head::Head;
 pub use idempotency::RequestKey;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
-pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, StoredKeys, Successor};
+pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotation, StoredKeys, Successor};
 pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labels, MOST_TAGS, Relabel, given};
 pub use overview::{
     Counted, SessionIs, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
@@ -92,8 +92,8 @@ pub use quotas::{Quotas, Usage};
 pub use relocation::relocate;
 pub use renewals::Onto;
 pub use repair::{Repair, repair};
-pub use retention::{DeleteJob, Room};
-pub use seen::Seen;
+pub use retention::{DeleteJob, StoreSpace};
+pub use seen::RowVersion;
 pub use session_trainings::SessionTraining;
 pub use sessions::{CreateSession, SessionFacts, SessionRow};
 pub use tenant::Tenant;
@@ -193,7 +193,7 @@ impl Store {
     async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
-        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+        W: for<'c> FnOnce(StoreConnection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         match &self.engine {
             Engine::Sqlite(folder) => folder.write(doing, work).await,
@@ -205,7 +205,7 @@ impl Store {
     async fn write_to<T, W>(&self, session: &str, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
-        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+        W: for<'c> FnOnce(StoreConnection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         match &self.engine {
             Engine::Sqlite(folder) => folder.write_to(session, doing, work).await,
@@ -218,7 +218,7 @@ impl Store {
         &self,
         doing: &'static str,
         query: Query,
-        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+        decode: impl FnOnce(&[StoreRow]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
         self.read_for(Purpose::Advice, doing, query, decode).await
     }
@@ -228,7 +228,7 @@ impl Store {
         &self,
         doing: &'static str,
         query: Query,
-        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+        decode: impl FnOnce(&[StoreRow]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
         self.read_for(Purpose::Lists, doing, query, decode).await
     }
@@ -238,7 +238,7 @@ impl Store {
         &self,
         doing: &'static str,
         query: Query,
-        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+        decode: impl FnOnce(&[StoreRow]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
         self.read_for(Purpose::Probes, doing, query, decode).await
     }
@@ -248,7 +248,7 @@ impl Store {
         purpose: Purpose,
         doing: &'static str,
         query: Query,
-        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+        decode: impl FnOnce(&[StoreRow]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
         let rows = match &self.engine {
             Engine::Sqlite(folder) => folder.read(purpose, doing, query).boxed().await?,

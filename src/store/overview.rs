@@ -12,8 +12,8 @@ use super::codec::{from_sql, to_sql};
 use super::entries::EntryRow;
 use super::error::Failure;
 use super::labels::Labels;
-use super::query::{Query, Row};
-use super::search::{self, Among, Rarest, Span};
+use super::query::{Query, StoreRow};
+use super::search::{self, Among, OpeningSpan, Rarest};
 use super::sessions::SessionRow;
 use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES, WEALTH};
 use super::tenant::Tenant;
@@ -154,7 +154,7 @@ impl Store {
 
     /// Counts the sessions of a tenant that match.
     pub async fn total(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<usize, StoreError> {
-        let decode = |rows: &[Row]| rows.first().map_or(Ok(0), |row| from_sql(row.get("total")?));
+        let decode = |rows: &[StoreRow]| rows.first().map_or(Ok(0), |row| from_sql(row.get("total")?));
         let among = self.rarest_of(tenant, asked).await?.map_or(Among::All, Rarest::all);
         self.list("counting sessions", asked.count(tenant, &among), decode).await
     }
@@ -167,7 +167,7 @@ impl Store {
 }
 
 impl SessionQuery {
-    fn listed(&self, rows: &[Row]) -> Result<SessionList, Failure> {
+    fn listed(&self, rows: &[StoreRow]) -> Result<SessionList, Failure> {
         let last = rows.last().filter(|_| rows.len() == self.limit);
         let last = last.map(|row| self.order.place(row)).transpose()?;
         let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last };
@@ -180,10 +180,10 @@ impl SessionQuery {
         Ok(list)
     }
 
-    fn span(&self) -> Span {
+    fn span(&self) -> OpeningSpan {
         let (order, beyond, first) = if self.descending { ("DESC", '<', i64::MAX) } else { ("ASC", '>', 0) };
         let start = self.after.as_ref().map_or(first, |place| place.sequence);
-        Span { start, order, beyond }
+        OpeningSpan { start, order, beyond }
     }
 
     fn page(&self, tenant: &Tenant, among: &Among) -> Query {
@@ -201,7 +201,7 @@ impl SessionQuery {
         let mut statement = Statement::of(&columns);
         among.narrow(&mut statement, tenant, self.span());
         self.only_matching(&mut statement);
-        let Span { order, beyond, .. } = self.span();
+        let OpeningSpan { order, beyond, .. } = self.span();
         if let Some(SessionPlace { key: value, sequence }) = &self.after {
             let value = match value {
                 SessionKey::Created => (*sequence).into(),
@@ -286,7 +286,7 @@ impl SessionOrder {
         }
     }
 
-    fn place(self, row: &Row) -> Result<SessionPlace, Failure> {
+    fn place(self, row: &StoreRow) -> Result<SessionPlace, Failure> {
         let key = match self {
             SessionOrder::Created => SessionKey::Created,
             SessionOrder::Name => SessionKey::Name(row.get("sort_key")?),
@@ -298,7 +298,7 @@ impl SessionOrder {
 }
 
 impl SessionSummary {
-    fn from_row(row: &Row, order: SessionOrder) -> Result<Self, Failure> {
+    fn from_row(row: &StoreRow, order: SessionOrder) -> Result<Self, Failure> {
         let observations = from_sql(row.get("observations")?)?;
         let due = row.get::<Option<i64>>("due")?.map(from_sql).transpose()?;
         let start = SessionRow::start_of(row)?;
@@ -323,7 +323,7 @@ impl SessionSummary {
 }
 
 /// Returns the last entry that changed a session, verified; `None` before the first.
-fn last_of(row: &Row) -> Result<Option<EntryRow>, Failure> {
+fn last_of(row: &StoreRow) -> Result<Option<EntryRow>, Failure> {
     match row.get::<Option<i64>>("entry")? {
         Some(_) => EntryRow::beside(row, "reported_ms", "last_seal").map(Some),
         None => Ok(None),

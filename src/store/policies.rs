@@ -8,7 +8,7 @@ use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
 use super::labels::{self, Labels};
-use super::query::{Connection, Query, Row, query};
+use super::query::{Query, StoreConnection, StoreRow, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::words::{self, Labelled, Worded};
@@ -103,7 +103,7 @@ impl Store {
 
     /// Returns the date and size of a policy without reading its bytes.
     pub async fn policy_stored(&self, tenant: &Tenant, id: &str) -> Result<Option<Stored>, StoreError> {
-        let decode = |row: &Row| Ok(Stored { created_ms: row.get("created_ms")?, bytes: row.length("bytes")? });
+        let decode = |row: &StoreRow| Ok(Stored { created_ms: row.get("created_ms")?, bytes: row.length("bytes")? });
         self.list("measuring a policy", owned(MEASURED, tenant, id), |rows| rows.first().map(decode).transpose()).await
     }
 
@@ -146,7 +146,7 @@ pub(super) fn verify(id: &str, json: &[u8]) -> Result<(), Failure> {
 }
 
 pub(super) async fn insert(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     id: &str,
     (json, periods_per_year): (Vec<u8>, Option<f64>),
@@ -181,19 +181,19 @@ pub(super) async fn insert(
 }
 
 /// Locks a policy against deletion until this transaction ends; returns whether it exists.
-pub(super) async fn lock(connection: &mut Connection<'_>, id: &str) -> Result<bool, Failure> {
+pub(super) async fn lock(connection: &mut StoreConnection<'_>, id: &str) -> Result<bool, Failure> {
     let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(id);
     Ok(connection.row(policy.for_share()).await?.is_some())
 }
 
-pub(super) async fn is_owned(connection: &mut Connection<'_>, tenant: &Tenant, id: &str) -> Result<bool, Failure> {
+pub(super) async fn is_owned(connection: &mut StoreConnection<'_>, tenant: &Tenant, id: &str) -> Result<bool, Failure> {
     let owner = query("SELECT sequence FROM policy_owners WHERE policy = $1 AND tenant = $2");
     Ok(connection.row(owner.bind(id).bind(tenant.as_str())).await?.is_some())
 }
 
 /// Deletes a policy of a tenant. It stays locked while its sessions are counted, so that none can be opened in between.
 async fn delete(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     tenant: Tenant,
     id: String,
     actor: Actor,
@@ -234,7 +234,7 @@ async fn delete(
 }
 
 impl PolicyRow {
-    fn verified(rows: &[Row], id: &str) -> Result<Option<Self>, Failure> {
+    fn verified(rows: &[StoreRow], id: &str) -> Result<Option<Self>, Failure> {
         let Some(row) = rows.first() else { return Ok(None) };
         let json: Vec<u8> = row.get("json")?;
         verify(id, &json)?;
@@ -243,7 +243,7 @@ impl PolicyRow {
 }
 
 impl PolicySummary {
-    fn from_row(row: &Row) -> Result<Self, Failure> {
+    fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         Ok(PolicySummary {
             sequence: row.get("sequence")?,
             policy: row.get("policy")?,

@@ -164,24 +164,27 @@ impl From<Vec<u8>> for Value {
     }
 }
 
-pub(super) enum Row {
+pub(super) enum StoreRow {
     Sqlite(SqliteRow),
     Postgres(PgRow),
 }
 
 /// A type that a column can be read as, from either engine.
-pub(super) trait Column:
+pub(super) trait ReadColumn:
     for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
 {
 }
 
-impl<T> Column for T where T: for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres> {}
+impl<T> ReadColumn for T where
+    T: for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
+{
+}
 
-impl Row {
-    pub(super) fn get<T: Column>(&self, column: &str) -> Result<T, Failure> {
+impl StoreRow {
+    pub(super) fn get<T: ReadColumn>(&self, column: &str) -> Result<T, Failure> {
         match self {
-            Row::Sqlite(row) => row.try_get(column).map_err(Failure::sqlite),
-            Row::Postgres(row) => row.try_get(column).map_err(Failure::postgres),
+            StoreRow::Sqlite(row) => row.try_get(column).map_err(Failure::sqlite),
+            StoreRow::Postgres(row) => row.try_get(column).map_err(Failure::postgres),
         }
     }
 
@@ -191,54 +194,54 @@ impl Row {
 }
 
 /// A connection used by one operation; for a write, inside its transaction.
-pub(super) enum Connection<'c> {
+pub(super) enum StoreConnection<'c> {
     Sqlite(&'c mut SqliteConnection),
     Postgres(&'c mut PgConnection),
 }
 
-impl Connection<'_> {
-    pub(super) async fn rows(&mut self, query: Query) -> Result<Vec<Row>, Failure> {
+impl StoreConnection<'_> {
+    pub(super) async fn rows(&mut self, query: Query) -> Result<Vec<StoreRow>, Failure> {
         match self {
-            Connection::Sqlite(connection) => {
+            StoreConnection::Sqlite(connection) => {
                 let mut found = connection.fetch_many(query.sqlite());
                 let (mut rows, mut has_ended) = (Vec::new(), false);
                 while let Some(next) = found.try_next().await.map_err(Failure::sqlite)? {
                     match next {
                         Either::Left(_) => has_ended = true,
-                        Either::Right(row) => rows.push(Row::Sqlite(row)),
+                        Either::Right(row) => rows.push(StoreRow::Sqlite(row)),
                     }
                 }
                 // If the engine's thread dies, its rows end as if there were no more.
                 if has_ended { Ok(rows) } else { Err(Failure::sqlite(sqlx::Error::WorkerCrashed)) }
             }
-            Connection::Postgres(connection) => {
+            StoreConnection::Postgres(connection) => {
                 let rows = query.postgres().fetch_all(&mut **connection).await.map_err(Failure::postgres)?;
-                Ok(rows.into_iter().map(Row::Postgres).collect())
+                Ok(rows.into_iter().map(StoreRow::Postgres).collect())
             }
         }
     }
 
     /// Returns the first row, if there is one.
-    pub(super) async fn row(&mut self, query: Query) -> Result<Option<Row>, Failure> {
+    pub(super) async fn row(&mut self, query: Query) -> Result<Option<StoreRow>, Failure> {
         Ok(self.rows(query).await?.into_iter().next())
     }
 
     /// Locks the rows a decision depends on until the transaction ends. SQLite needs no lock.
     pub(super) async fn lock(&mut self, query: Query) -> Result<(), Failure> {
         match self {
-            Connection::Sqlite(_) => Ok(()),
-            Connection::Postgres(_) => self.rows(query).await.map(drop),
+            StoreConnection::Sqlite(_) => Ok(()),
+            StoreConnection::Postgres(_) => self.rows(query).await.map(drop),
         }
     }
 
     /// Runs a statement and returns the number of rows changed.
     pub(super) async fn execute(&mut self, query: Query) -> Result<u64, Failure> {
         match self {
-            Connection::Sqlite(connection) => {
+            StoreConnection::Sqlite(connection) => {
                 let done = query.sqlite().execute(&mut **connection).await.map_err(Failure::sqlite)?;
                 Ok(done.rows_affected())
             }
-            Connection::Postgres(connection) => {
+            StoreConnection::Postgres(connection) => {
                 let done = query.postgres().execute(&mut **connection).await.map_err(Failure::postgres)?;
                 Ok(done.rows_affected())
             }

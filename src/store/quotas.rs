@@ -15,7 +15,7 @@ use super::codec::to_sql;
 use super::error::{Failure, OverQuota, Quota};
 use super::idempotency::FOR_SESSIONS;
 use super::job_state::JobState;
-use super::query::{Connection, query};
+use super::query::{StoreConnection, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -104,7 +104,11 @@ impl Store {
 ///
 /// # Errors
 /// Fails if the tenant's callers have used up the quota of queued jobs.
-pub(super) async fn admit_job(connection: &mut Connection<'_>, tenant: &Tenant, quotas: Quotas) -> Result<(), Failure> {
+pub(super) async fn admit_job(
+    connection: &mut StoreConnection<'_>,
+    tenant: &Tenant,
+    quotas: Quotas,
+) -> Result<(), Failure> {
     if quotas.queued_jobs == 0 {
         return Ok(());
     }
@@ -113,7 +117,7 @@ pub(super) async fn admit_job(connection: &mut Connection<'_>, tenant: &Tenant, 
 }
 
 /// Counts the queued jobs of a tenant that its callers queued: all but those made for sessions, up to `limit`.
-async fn queued_by_callers(connection: &mut Connection<'_>, tenant: &Tenant, limit: u32) -> Result<i64, Failure> {
+async fn queued_by_callers(connection: &mut StoreConnection<'_>, tenant: &Tenant, limit: u32) -> Result<i64, Failure> {
     let queued = query(
         "SELECT count(*) AS queued FROM (SELECT 1 AS one FROM jobs WHERE tenant = $1 AND state = $2
              AND NOT EXISTS (SELECT 1 FROM idempotency_keys WHERE idempotency_keys.job = jobs.job
@@ -128,7 +132,7 @@ async fn queued_by_callers(connection: &mut Connection<'_>, tenant: &Tenant, lim
 /// # Errors
 /// Fails if the usage would exceed a quota; the transaction must then be rolled back.
 pub(super) async fn take(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     more: Usage,
     quotas: Quotas,
@@ -139,7 +143,7 @@ pub(super) async fn take(
 }
 
 /// Changes the usage of a tenant without checking the quotas, and returns the new usage.
-pub(super) async fn change(connection: &mut Connection<'_>, tenant: &Tenant, by: Usage) -> Result<Usage, Failure> {
+pub(super) async fn change(connection: &mut StoreConnection<'_>, tenant: &Tenant, by: Usage) -> Result<Usage, Failure> {
     let change = query(
         "INSERT INTO usage (tenant, sessions, bytes) VALUES ($1, $2, $3)
          ON CONFLICT (tenant) DO UPDATE SET sessions = usage.sessions + excluded.sessions,

@@ -14,7 +14,7 @@ use super::check::Inspection;
 use super::error::{Failure, StoreError};
 use super::migrations;
 use super::postgres::{self, PostgresUrl};
-use super::query::{Connection, Row, Value, query};
+use super::query::{StoreConnection, StoreRow, Value, query};
 use super::sqlite::opening::{DATABASE, existing, inspect, lock, opening, version};
 use super::statement::Statement;
 
@@ -45,7 +45,7 @@ const TABLES: [(&str, usize); 19] = [
 
 /// The type of a column.
 #[derive(Debug, Clone, Copy)]
-enum Kind {
+enum ColumnType {
     Text,
     Integer,
     Real,
@@ -55,7 +55,7 @@ enum Kind {
 
 /// A value of either engine; a real number is compared by its bits.
 #[derive(Debug, Clone, PartialEq)]
-enum Cell {
+enum EngineValue {
     Null,
     Text(String),
     Integer(i64),
@@ -63,10 +63,10 @@ enum Cell {
     Bytes(Vec<u8>),
 }
 
-struct Table {
+struct CopiedTable {
     name: &'static str,
     at_once: usize,
-    columns: Vec<(String, Kind)>,
+    columns: Vec<(String, ColumnType)>,
 }
 
 /// Moves the rows of the folder `dir`, which no process holds, into an empty database. Reports through `tell` what was
@@ -84,7 +84,7 @@ pub async fn relocate(dir: &Path, url: &PostgresUrl, tell: &mut impl FnMut(Strin
     let mut database = postgres::open_new(url).await?;
     let mut transaction = database.begin().await.map_err(|error| Failure::postgres(error).during(DOING))?;
     refuse_unknown_tables(&mut folder).await?;
-    let mut connection = Connection::Postgres(&mut transaction);
+    let mut connection = StoreConnection::Postgres(&mut transaction);
     let moved = all(&mut folder, &mut connection, tell).await;
     moved.map_err(|failure| failure.during(DOING))?;
     transaction.commit().await.map_err(|error| Failure::postgres(error).during(DOING))?;
@@ -107,7 +107,7 @@ async fn refuse_unknown_tables(folder: &mut SqliteConnection) -> Result<(), Stor
 
 async fn all(
     folder: &mut SqliteConnection,
-    database: &mut Connection<'_>,
+    database: &mut StoreConnection<'_>,
     tell: &mut impl FnMut(String),
 ) -> Result<(), Failure> {
     for (name, _) in TABLES {
@@ -117,7 +117,7 @@ async fn all(
         }
     }
     for (name, at_once) in TABLES {
-        let table = Table { name, at_once, columns: columns(database, name).await? };
+        let table = CopiedTable { name, at_once, columns: columns(database, name).await? };
         let rows = table.copy(folder, database).await?;
         table.go_on(folder, database).await?;
         tell(format!("{name}: {rows} rows moved, each compared"));
@@ -126,19 +126,19 @@ async fn all(
 }
 
 /// Reads the columns of a table from the database.
-async fn columns(database: &mut Connection<'_>, table: &str) -> Result<Vec<(String, Kind)>, Failure> {
+async fn columns(database: &mut StoreConnection<'_>, table: &str) -> Result<Vec<(String, ColumnType)>, Failure> {
     let find = query(
         "SELECT CAST(column_name AS TEXT) AS name, CAST(data_type AS TEXT) AS type FROM information_schema.columns
          WHERE table_schema = current_schema() AND table_name = $1 ORDER BY ordinal_position",
     );
-    let kind = |row: &Row| {
+    let kind = |row: &StoreRow| {
         let (name, kind) = (row.get::<String>("name")?, row.get::<String>("type")?);
         let kind = match kind.as_str() {
-            "text" => Kind::Text,
-            "bigint" => Kind::Integer,
-            "double precision" => Kind::Real,
-            "bytea" => Kind::Bytes,
-            "boolean" => Kind::Boolean,
+            "text" => ColumnType::Text,
+            "bigint" => ColumnType::Integer,
+            "double precision" => ColumnType::Real,
+            "bytea" => ColumnType::Bytes,
+            "boolean" => ColumnType::Boolean,
             other => return Err(Failure::Corrupt(format!("a column of the type {other}"))),
         };
         Ok((name, kind))
@@ -146,16 +146,16 @@ async fn columns(database: &mut Connection<'_>, table: &str) -> Result<Vec<(Stri
     database.rows(find.bind(table)).await?.iter().map(kind).collect()
 }
 
-impl Table {
+impl CopiedTable {
     fn names(&self) -> String {
         self.columns.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     /// Copies every row, compares it with what the database stored, and returns the number of rows.
-    async fn copy(&self, folder: &mut SqliteConnection, database: &mut Connection<'_>) -> Result<usize, Failure> {
+    async fn copy(&self, folder: &mut SqliteConnection, database: &mut StoreConnection<'_>) -> Result<usize, Failure> {
         let select = format!("SELECT {} FROM {}", self.names(), self.name);
         let rows = sqlx::query(AssertSqlSafe(select)).fetch(folder).map_err(Failure::sqlite);
-        let cells = rows.map(|row| self.cells(&Row::Sqlite(row?)));
+        let cells = rows.map(|row| self.cells(&StoreRow::Sqlite(row?)));
         let mut chunks = cells.try_chunks(self.at_once);
         let mut copied = 0;
         while let Some(chunk) = chunks.next().await {
@@ -174,7 +174,7 @@ impl Table {
         }
     }
 
-    fn insert(&self, rows: &[Vec<Cell>]) -> Statement {
+    fn insert(&self, rows: &[Vec<EngineValue>]) -> Statement {
         let names = self.names();
         let mut insert = Statement::of(&format!("INSERT INTO {} ({names}) OVERRIDING SYSTEM VALUE VALUES ", self.name));
         for (place, row) in rows.iter().enumerate() {
@@ -184,16 +184,16 @@ impl Table {
                     insert.and(", ", []);
                 }
                 let value: Value = match cell.clone() {
-                    Cell::Null => {
+                    EngineValue::Null => {
                         insert.and("NULL", []);
                         continue;
                     }
-                    Cell::Text(text) => text.into(),
-                    Cell::Integer(integer) => integer.into(),
-                    Cell::Real(bits) => f64::from_bits(bits).into(),
-                    Cell::Bytes(bytes) => bytes.into(),
+                    EngineValue::Text(text) => text.into(),
+                    EngineValue::Integer(integer) => integer.into(),
+                    EngineValue::Real(bits) => f64::from_bits(bits).into(),
+                    EngineValue::Bytes(bytes) => bytes.into(),
                 };
-                insert.and(if matches!(kind, Kind::Boolean) { "? <> 0" } else { "?" }, [value]);
+                insert.and(if matches!(kind, ColumnType::Boolean) { "? <> 0" } else { "?" }, [value]);
             }
             insert.and(")", []);
         }
@@ -201,12 +201,12 @@ impl Table {
         insert
     }
 
-    fn cells(&self, row: &Row) -> Result<Vec<Cell>, Failure> {
+    fn cells(&self, row: &StoreRow) -> Result<Vec<EngineValue>, Failure> {
         self.columns.iter().map(|(name, kind)| cell(row, name, *kind)).collect()
     }
 
     /// Advances the sequence, so that numbers already used are not used again.
-    async fn go_on(&self, folder: &mut SqliteConnection, database: &mut Connection<'_>) -> Result<(), Failure> {
+    async fn go_on(&self, folder: &mut SqliteConnection, database: &mut StoreConnection<'_>) -> Result<(), Failure> {
         let last = "SELECT seq FROM sqlite_sequence WHERE name = ?";
         let last: Option<i64> =
             sqlx::query_scalar(last).bind(self.name).fetch_optional(folder).await.map_err(Failure::sqlite)?;
@@ -216,13 +216,13 @@ impl Table {
     }
 }
 
-fn cell(row: &Row, name: &str, kind: Kind) -> Result<Cell, Failure> {
+fn cell(row: &StoreRow, name: &str, kind: ColumnType) -> Result<EngineValue, Failure> {
     let cell = match kind {
-        Kind::Text => row.get::<Option<String>>(name)?.map(Cell::Text),
-        Kind::Integer => row.get::<Option<i64>>(name)?.map(Cell::Integer),
-        Kind::Real => row.get::<Option<f64>>(name)?.map(|real| Cell::Real(real.to_bits())),
-        Kind::Bytes => row.get::<Option<Vec<u8>>>(name)?.map(Cell::Bytes),
-        Kind::Boolean => row.get::<Option<bool>>(name)?.map(|is| Cell::Integer(is.into())),
+        ColumnType::Text => row.get::<Option<String>>(name)?.map(EngineValue::Text),
+        ColumnType::Integer => row.get::<Option<i64>>(name)?.map(EngineValue::Integer),
+        ColumnType::Real => row.get::<Option<f64>>(name)?.map(|real| EngineValue::Real(real.to_bits())),
+        ColumnType::Bytes => row.get::<Option<Vec<u8>>>(name)?.map(EngineValue::Bytes),
+        ColumnType::Boolean => row.get::<Option<bool>>(name)?.map(|is| EngineValue::Integer(is.into())),
     };
-    Ok(cell.unwrap_or(Cell::Null))
+    Ok(cell.unwrap_or(EngineValue::Null))
 }

@@ -6,7 +6,7 @@ use super::audit::{Actor, Deed};
 use super::codec::to_sql;
 use super::entries::{self, APPENDING, Append, EntryRow};
 use super::error::Failure;
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::Quotas;
 use super::statement::DUE;
 use super::tenant::Tenant;
@@ -38,7 +38,7 @@ impl Store {
     /// Returns at most `limit` sessions that are due for automatic renewal, in the order they were opened, with their
     /// tenants and sequences. `after` is the sequence of the last session of the page before.
     pub async fn due_sessions(&self, limit: usize, after: i64) -> Result<Vec<(i64, Tenant, String)>, StoreError> {
-        let found = |row: &Row| {
+        let found = |row: &StoreRow| {
             let tenant = Tenant::stored(&row.get::<String>("tenant")?);
             Ok((row.get("sequence")?, tenant, row.get("session")?))
         };
@@ -48,7 +48,7 @@ impl Store {
 }
 
 async fn renew(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     new: EntryRow,
     onto: Onto,
     by: (Quotas, Actor),
@@ -70,7 +70,7 @@ async fn renew(
 
 /// Returns whether the tenant of a session has the policy, which is then locked until this transaction ends. Returns
 /// true if there is no such session.
-async fn may_go_on(connection: &mut Connection<'_>, session: &str, policy: &str) -> Result<bool, Failure> {
+async fn may_go_on(connection: &mut StoreConnection<'_>, session: &str, policy: &str) -> Result<bool, Failure> {
     policies::lock(connection, policy).await?;
     let owned = query(
         "SELECT (SELECT count(*) FROM policy_owners WHERE policy = $2 AND tenant = sessions.tenant) AS owned
@@ -81,7 +81,7 @@ async fn may_go_on(connection: &mut Connection<'_>, session: &str, policy: &str)
 }
 
 /// Stores the row that finds the policy of a renewal without its entry.
-async fn refer(connection: &mut Connection<'_>, new: &EntryRow, onto: &Onto) -> Result<(), Failure> {
+async fn refer(connection: &mut StoreConnection<'_>, new: &EntryRow, onto: &Onto) -> Result<(), Failure> {
     let refer = query("INSERT INTO renewals (session, number, policy, horizon) VALUES ($1, $2, $3, $4)");
     let refer = refer.bind(new.session.as_str()).bind(to_sql(new.number)).bind(onto.policy.as_str());
     connection.execute(refer.bind(to_sql(onto.horizon))).await?;

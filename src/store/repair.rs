@@ -19,7 +19,7 @@ use super::error::{Failure, StoreError};
 use super::keys::KeyRow;
 use super::migrations;
 use super::policies;
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::{ASSET_BYTES, ENTRY_BYTES, Quotas, ROW_BYTES};
 use super::sessions::SessionRow;
 use super::sqlite::opening::{DATABASE, connect, existing, lock, opening, version};
@@ -49,7 +49,7 @@ impl From<Failure> for Refusal {
 }
 
 /// A table whose rows can be put back.
-struct Table {
+struct RepairableTable {
     name: &'static str,
     /// The column with the name of the thing that a row belongs to.
     of: &'static str,
@@ -59,10 +59,10 @@ struct Table {
     columns: &'static [&'static str],
     /// The additional columns that a missing row needs.
     others: &'static [&'static str],
-    verify: fn(&Row) -> Result<(), Failure>,
+    verify: fn(&StoreRow) -> Result<(), Failure>,
 }
 
-const SESSIONS: Table = Table {
+const SESSIONS: RepairableTable = RepairableTable {
     name: "sessions",
     of: "session",
     number: None,
@@ -82,7 +82,7 @@ const SESSIONS: Table = Table {
     others: &["due", "room"],
     verify: |row| SessionRow::from_row(row).map(drop),
 };
-const ENTRIES: Table = Table {
+const ENTRIES: RepairableTable = RepairableTable {
     name: "entries",
     of: "session",
     number: Some("entry"),
@@ -90,7 +90,7 @@ const ENTRIES: Table = Table {
     others: &[],
     verify: |row| EntryRow::from_row(row).map(drop),
 };
-const POLICIES: Table = Table {
+const POLICIES: RepairableTable = RepairableTable {
     name: "policies",
     of: "policy",
     number: None,
@@ -98,7 +98,7 @@ const POLICIES: Table = Table {
     others: &[],
     verify: |row| policies::verify(&row.get::<String>("policy")?, &row.get::<Vec<u8>>("json")?),
 };
-const KEYS: Table = Table {
+const KEYS: RepairableTable = RepairableTable {
     name: "access_keys",
     of: "access_key",
     number: None,
@@ -134,7 +134,7 @@ pub async fn repair(dir: &Path, what: Repair<'_>, now_ms: i64) -> Result<usize, 
 
 async fn in_transaction(connection: &mut SqliteConnection, what: &Repair<'_>, now_ms: i64) -> Result<usize, Refusal> {
     let mut transaction = connection.begin().await.map_err(Failure::sqlite)?;
-    let mut repairs = Repairs { connection: Connection::Sqlite(&mut transaction), rows: 0 };
+    let mut repairs = Repairs { connection: StoreConnection::Sqlite(&mut transaction), rows: 0 };
     let repaired = match what {
         Repair::Totals => repairs.totals(None).await.map_err(Refusal::from),
         Repair::Thing { name, .. } => repairs.thing(name, now_ms).await,
@@ -152,7 +152,7 @@ async fn in_transaction(connection: &mut SqliteConnection, what: &Repair<'_>, no
 
 /// A repair in progress, in one transaction.
 struct Repairs<'c> {
-    connection: Connection<'c>,
+    connection: StoreConnection<'c>,
     rows: usize,
 }
 
@@ -175,11 +175,11 @@ impl Repairs<'_> {
         Ok(())
     }
 
-    async fn is_backed_up(&mut self, table: &Table, name: &str) -> Result<bool, Failure> {
+    async fn is_backed_up(&mut self, table: &RepairableTable, name: &str) -> Result<bool, Failure> {
         Ok(!self.rows_of("backup", table, name).await?.is_empty())
     }
 
-    async fn rows_of(&mut self, store: &str, table: &Table, name: &str) -> Result<Vec<Row>, Failure> {
+    async fn rows_of(&mut self, store: &str, table: &RepairableTable, name: &str) -> Result<Vec<StoreRow>, Failure> {
         let find = format!("SELECT * FROM {store}.{} WHERE {} = $1", table.name, table.of);
         self.connection.rows(query(find).bind(name)).await
     }
@@ -254,8 +254,8 @@ impl Repairs<'_> {
     }
 
     /// Restores the rows of a thing that are damaged or missing and are sound in the backup.
-    async fn put_back(&mut self, table: &Table, name: &str) -> Result<(), Failure> {
-        let number = |row: &Row| table.number.map_or(Ok(0), |number| row.get::<i64>(number));
+    async fn put_back(&mut self, table: &RepairableTable, name: &str) -> Result<(), Failure> {
+        let number = |row: &StoreRow| table.number.map_or(Ok(0), |number| row.get::<i64>(number));
         let mut sound = HashSet::new();
         for row in self.rows_of("main", table, name).await? {
             if (table.verify)(&row).is_ok() {
@@ -272,7 +272,7 @@ impl Repairs<'_> {
     }
 
     /// Copies a row from the backup unchanged.
-    async fn take(&mut self, table: &Table, name: &str, number: i64) -> Result<(), Failure> {
+    async fn take(&mut self, table: &RepairableTable, name: &str, number: i64) -> Result<(), Failure> {
         let mut key = vec![table.of];
         key.extend(table.number);
         let all = [key.as_slice(), table.columns, table.others].concat().join(", ");

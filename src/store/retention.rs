@@ -11,7 +11,7 @@ use super::codec::to_sql;
 use super::error::Failure;
 use super::job::JobRow;
 use super::jobs::find;
-use super::query::{Connection, query};
+use super::query::{StoreConnection, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError};
@@ -28,7 +28,7 @@ pub enum DeleteJob {
 
 /// The space a store takes, in bytes, as far as the engine reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Room {
+pub struct StoreSpace {
     /// Size of the database.
     pub database: u64,
     /// Size of its free pages.
@@ -52,11 +52,11 @@ impl Store {
     }
 
     /// Returns the space the store takes.
-    pub async fn room(&self) -> Result<Room, StoreError> {
+    pub async fn room(&self) -> Result<StoreSpace, StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.room().await,
             Engine::Postgres(database) => {
-                Ok(Room { database: database.size().await?, free: None, log: None, disk_left: None })
+                Ok(StoreSpace { database: database.size().await?, free: None, log: None, disk_left: None })
             }
         }
     }
@@ -72,7 +72,7 @@ impl Store {
 }
 
 async fn delete(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     tenant: Tenant,
     job: String,
     actor: Actor,
@@ -90,7 +90,7 @@ async fn delete(
 }
 
 /// Deletes ended jobs sorted by tenant, so that two concurrent calls lock the totals of tenants in the same order.
-async fn expire(mut connection: Connection<'_>, before_ms: i64, limit: usize) -> Result<usize, Failure> {
+async fn expire(mut connection: StoreConnection<'_>, before_ms: i64, limit: usize) -> Result<usize, Failure> {
     let ended = query("SELECT * FROM jobs WHERE finished_ms < $1 ORDER BY finished_ms LIMIT $2");
     let ended = connection.rows(ended.bind(before_ms).bind(to_sql(limit)).for_update_of_free()).await?;
     let mut ended: Vec<_> = ended.iter().map(JobRow::from_row).collect::<Result<_, _>>()?;
@@ -101,7 +101,7 @@ async fn expire(mut connection: Connection<'_>, before_ms: i64, limit: usize) ->
     Ok(ended.len())
 }
 
-async fn remove(connection: &mut Connection<'_>, row: &JobRow) -> Result<(), Failure> {
+async fn remove(connection: &mut StoreConnection<'_>, row: &JobRow) -> Result<(), Failure> {
     let job = row.job.as_str();
     let report = query("DELETE FROM job_reports WHERE job = $1 RETURNING CAST(octet_length(json) AS BIGINT) AS bytes");
     let report = connection.row(report.bind(job)).await?;

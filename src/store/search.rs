@@ -14,7 +14,7 @@
 //! `tests/operation/lists.rs`.
 
 use super::error::Failure;
-use super::query::{Query, Row, Value};
+use super::query::{Query, StoreRow, Value};
 use super::statement::Statement;
 use super::tenant::Tenant;
 use super::words::{self, Labelled};
@@ -40,24 +40,24 @@ pub(super) enum Among {
     /// This many after the page before, in the order in which they were opened.
     Next(i64),
     /// Those that the index finds by a word; if bounded, this many after the page before.
-    Of(Found, Option<i64>),
+    Of(IndexedWord, Option<i64>),
 }
 
 /// The beginning of a word, and the policies that the index finds by it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct IndexedWord {
     beginning: String,
     policies: Vec<String>,
 }
 
 /// The word of a search that the fewest sessions have, and how many do, up to a bound.
 pub(super) struct Rarest {
-    found: Found,
+    found: IndexedWord,
     count: i64,
 }
 
 /// The order in which sessions were opened, from the point where a page begins.
-pub(super) struct Span {
+pub(super) struct OpeningSpan {
     pub start: i64,
     pub order: &'static str,
     pub beyond: char,
@@ -75,12 +75,12 @@ impl Store {
             return Ok(None);
         }
         let find = policies(tenant, &sought);
-        let found = |rows: &[Row]| found(&sought, rows);
+        let found = |rows: &[StoreRow]| found(&sought, rows);
         let narrowing = self.list("searching policies", find, found).await?;
         if narrowing.is_empty() {
             return Ok(None);
         }
-        let count = |rows: &[Row]| {
+        let count = |rows: &[StoreRow]| {
             let Some(row) = rows.first() else { return Ok(Vec::new()) };
             (0..narrowing.len()).map(|place| row.get::<i64>(&format!("word_{place}"))).collect()
         };
@@ -135,7 +135,12 @@ pub(super) fn matches(statement: &mut Statement, search: &str) {
 
 impl Among {
     /// Adds the condition that a session is one of these.
-    pub(super) fn narrow(&self, statement: &mut Statement, tenant: &Tenant, Span { start, order, beyond }: Span) {
+    pub(super) fn narrow(
+        &self,
+        statement: &mut Statement,
+        tenant: &Tenant,
+        OpeningSpan { start, order, beyond }: OpeningSpan,
+    ) {
         if let Among::All = self {
             statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
             return;
@@ -168,7 +173,7 @@ impl Among {
     }
 }
 
-impl Found {
+impl IndexedWord {
     /// Adds the statement that selects the sessions that the index finds, including those that have since left a
     /// policy.
     fn sequences(&self, statement: &mut Statement, tenant: &Tenant) {
@@ -218,8 +223,9 @@ fn policies(tenant: &Tenant, sought: &[String]) -> Query {
 }
 
 /// Returns the beginnings that narrow the search, each with its policies.
-fn found(sought: &[String], rows: &[Row]) -> Result<Vec<Found>, Failure> {
-    let mut found: Vec<_> = sought.iter().map(|word| Found { beginning: word.clone(), policies: Vec::new() }).collect();
+fn found(sought: &[String], rows: &[StoreRow]) -> Result<Vec<IndexedWord>, Failure> {
+    let mut found: Vec<_> =
+        sought.iter().map(|word| IndexedWord { beginning: word.clone(), policies: Vec::new() }).collect();
     for row in rows {
         let place = row.length("place")?;
         found[place].policies.push(row.get("policy")?);
@@ -229,7 +235,7 @@ fn found(sought: &[String], rows: &[Row]) -> Result<Vec<Found>, Failure> {
 }
 
 /// Counts the sessions that the index finds by each of these, up to a bound.
-fn counting(tenant: &Tenant, narrowing: &[Found]) -> Query {
+fn counting(tenant: &Tenant, narrowing: &[IndexedWord]) -> Query {
     let mut statement = Statement::of("SELECT");
     for (place, found) in narrowing.iter().enumerate() {
         statement.and(if place == 0 { " (" } else { ", (" }, []);

@@ -8,29 +8,29 @@ use super::{Engine, SessionRow, Store, StoreError};
 
 /// The version of a session when it was read, to detect later changes.
 #[derive(Debug, Clone)]
-pub struct Seen {
+pub struct RowVersion {
     pub(super) head: Head,
     /// For a folder: the number of the session's last change that `head` includes.
     pub(super) change: Option<u64>,
 }
 
-impl Seen {
+impl RowVersion {
     /// Number of entries.
     pub fn entries(&self) -> usize {
         self.head.entries
     }
 
     /// Returns the version of the session once `appended` is answered with [`Append::Appended`](super::Append).
-    pub fn followed_by(&self, appended: &EntryRow) -> Seen {
+    pub fn followed_by(&self, appended: &EntryRow) -> RowVersion {
         // Another write in the meantime also raises the number, so that the numbers then differ.
-        Seen { head: appended.head(), change: self.change.map(|change| change + 1) }
+        RowVersion { head: appended.head(), change: self.change.map(|change| change + 1) }
     }
 }
 
 impl Store {
     /// Returns whether a session is unchanged since it was `seen`; needs no read if a folder's session was not written
     /// to.
-    pub async fn is_as_seen(&self, session: &str, seen: &mut Seen) -> Result<bool, StoreError> {
+    pub async fn is_as_seen(&self, session: &str, seen: &mut RowVersion) -> Result<bool, StoreError> {
         let change = self.change(session);
         if change.is_some() && change == seen.change {
             return Ok(true);
@@ -43,8 +43,8 @@ impl Store {
     }
 
     /// Returns the version of a session that is about to be stored, valid until the next write to it.
-    pub fn about_to_open(&self, row: &SessionRow) -> Seen {
-        Seen { change: self.change(&row.session), ..row.as_opened() }
+    pub fn about_to_open(&self, row: &SessionRow) -> RowVersion {
+        RowVersion { change: self.change(&row.session), ..row.as_opened() }
     }
 
     /// Returns a number that changes with every write to `session`; `None` if other processes may write to it.

@@ -16,7 +16,7 @@ use super::error::Failure;
 use super::idempotency::FOR_SESSIONS;
 use super::job::{JobRow, NewJob};
 use super::jobs::{cancel, count, insert};
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::Quotas;
 use super::tenant::Tenant;
 use super::training_names::{OF_SESSION, TrainingRequest, name, next_renewal, of_specification, queued_for_sessions};
@@ -61,7 +61,7 @@ impl Store {
                  AND NOT EXISTS (SELECT 1 FROM idempotency_keys AS request WHERE request.job = jobs.job
                                  AND substr(request.idempotency_key, 1, 8) = $2)",
         );
-        let found = |row: &Row| Ok((row.get("job")?, Tenant::stored(&row.get::<String>("tenant")?)));
+        let found = |row: &StoreRow| Ok((row.get("job")?, Tenant::stored(&row.get::<String>("tenant")?)));
         let find = find.bind(FOR_SESSIONS).bind(OF_SESSION);
         let found: Vec<(String, Tenant)> = self
             .list("finding trainings that no session requests", find, |rows| rows.iter().map(found).collect())
@@ -82,7 +82,7 @@ impl Store {
 
 /// Finds or queues the training. The tenant's turn stays locked, as when a caller queues a job.
 async fn train(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     new: NewJob,
     request: TrainingRequest,
     (quotas, actor): (Quotas, Actor),
@@ -116,7 +116,7 @@ async fn train(
 
 /// Returns whether the session exists and waits for this renewal; it stays so until this transaction ends.
 async fn is_awaited(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     request: &TrainingRequest,
 ) -> Result<bool, Failure> {
@@ -130,7 +130,7 @@ async fn is_awaited(
 
 /// Cancels a job that no session requests. The tenant's turn is locked, so that no session requests it in between.
 async fn cancel_if_unrequested(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     (tenant, job): (Tenant, String),
     actor: Actor,
     now_ms: i64,

@@ -10,9 +10,9 @@ use super::error::Failure;
 use super::head::Head;
 use super::idempotency::{self, RequestKey, Used};
 use super::labels::{self, Relabel};
-use super::query::{Connection, Row, query};
+use super::query::{StoreConnection, StoreRow, query};
 use super::quotas::{self, Quotas, Usage};
-use super::seen::Seen;
+use super::seen::RowVersion;
 use super::tenant::Tenant;
 use super::training_names::withdraw_all;
 use super::words::{self, Labelled, Worded};
@@ -61,7 +61,7 @@ pub struct SessionFacts {
     pub row: SessionRow,
     /// In the order they were recorded.
     pub entries: Vec<EntryRow>,
-    pub seen: Seen,
+    pub seen: RowVersion,
 }
 
 impl Store {
@@ -99,7 +99,7 @@ impl Store {
         let Some(row) = self.session(tenant, session).await? else { return Ok(None) };
         let Some(entries) = self.entries(session).await? else { return Ok(None) };
         let head = entries.last().map_or_else(|| row.head(), EntryRow::head);
-        Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
+        Ok(Some(SessionFacts { row, entries, seen: RowVersion { head, change } }))
     }
 
     /// Returns the bytes that the entries of a session take when they are read; 0 if there is no such session. With
@@ -110,7 +110,7 @@ impl Store {
                         + CASE WHEN octet_length(numbers) > 0 THEN 2 * octet_length(plan_json) ELSE 0 END), 0) AS BIGINT) AS bytes
              FROM entries JOIN sessions ON sessions.session = entries.session WHERE entries.session = $1",
         );
-        let summed = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get("bytes"));
+        let summed = |rows: &[StoreRow]| rows.first().map_or(Ok(0), |row| row.get("bytes"));
         let bytes: i64 = self.read("measuring entries", sum.bind(session), summed).await?;
         Ok(usize::try_from(bytes).unwrap_or_default())
     }
@@ -121,7 +121,7 @@ impl Store {
             "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
              WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
         );
-        let decode = |rows: &[Row]| rows.iter().map(EntryRow::told).collect();
+        let decode = |rows: &[StoreRow]| rows.iter().map(EntryRow::told).collect();
         self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
     }
 
@@ -134,7 +134,7 @@ impl Store {
 
     pub async fn count_sessions(&self) -> Result<u64, StoreError> {
         let count = query("SELECT CAST(coalesce(sum(sessions), 0) AS BIGINT) AS sessions FROM usage");
-        let counted = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get("sessions"));
+        let counted = |rows: &[StoreRow]| rows.first().map_or(Ok(0), |row| row.get("sessions"));
         self.probe("counting sessions", count, counted).await.map(i64::unsigned_abs)
     }
 }
@@ -144,7 +144,7 @@ fn history_seal(history: &[f64]) -> Vec<u8> {
 }
 
 async fn create(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     row: SessionRow,
     labels: Relabel,
     key: Option<RequestKey>,
@@ -182,7 +182,7 @@ async fn create(
 
 /// Returns the answer for an idempotency key that was used before; `None` for a new key.
 async fn repeated(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     key: &RequestKey,
 ) -> Result<Option<CreateSession>, Failure> {
@@ -200,7 +200,7 @@ async fn repeated(
 
 /// Inserts a session and returns its sequence, or the outcome if it cannot be inserted. The policy stays locked until
 /// then, so that it cannot be deleted in between.
-async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Result<i64, CreateSession>, Failure> {
+async fn insert(connection: &mut StoreConnection<'_>, row: &SessionRow) -> Result<Result<i64, CreateSession>, Failure> {
     if !policies::lock(connection, &row.policy).await?
         || !policies::is_owned(connection, &row.tenant, &row.policy).await?
     {
@@ -232,7 +232,7 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Res
 
 /// Deletes a session. The audit records how many entries were deleted with it.
 async fn delete(
-    mut connection: Connection<'_>,
+    mut connection: StoreConnection<'_>,
     tenant: Tenant,
     session: String,
     actor: Actor,
@@ -263,8 +263,8 @@ impl SessionRow {
     }
 
     /// Returns the version of the session before its first entry; only a read shows if it is still current.
-    pub fn as_opened(&self) -> Seen {
-        Seen { head: self.head(), change: None }
+    pub fn as_opened(&self) -> RowVersion {
+        RowVersion { head: self.head(), change: None }
     }
 
     fn seal(&self) -> Seal {
@@ -286,7 +286,7 @@ impl SessionRow {
     }
 
     /// Reads and verifies the start of a session in a list, without its history.
-    pub(super) fn start_of(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn start_of(row: &StoreRow) -> Result<Self, Failure> {
         let start = SessionRow {
             session: row.get("session")?,
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
@@ -305,7 +305,7 @@ impl SessionRow {
         Ok(start)
     }
 
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &StoreRow) -> Result<Self, Failure> {
         let session: String = row.get("session")?;
         let what = || format!("the start of session {session}");
         let history = decode_reals(&row.get::<Vec<u8>>("initial_history")?);

@@ -7,7 +7,7 @@ use super::error::Failure;
 use super::idempotency::FOR_SESSIONS;
 use super::job::{JobKind, JobRow, NewJob};
 use super::job_state::JobState;
-use super::query::{Connection, query};
+use super::query::{StoreConnection, query};
 use super::tenant::Tenant;
 use crate::control::policy::content_hash;
 
@@ -35,7 +35,7 @@ impl TrainingRequest {
 }
 
 /// Returns the number of the next renewal of a session.
-pub(super) async fn next_renewal(connection: &mut Connection<'_>, session: &str) -> Result<usize, Failure> {
+pub(super) async fn next_renewal(connection: &mut StoreConnection<'_>, session: &str) -> Result<usize, Failure> {
     let made = query("SELECT coalesce(max(number), 0) AS made FROM renewals WHERE session = $1").bind(session);
     let made: i64 = connection.row(made).await?.map_or(Ok(0), |row| row.get("made"))?;
     Ok(usize::try_from(made).unwrap_or_default() + 1)
@@ -43,7 +43,7 @@ pub(super) async fn next_renewal(connection: &mut Connection<'_>, session: &str)
 
 /// Finds the job that trains a specification, or that has trained it if its policy still exists. Prefers the latter.
 pub(super) async fn of_specification(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     specification: &str,
 ) -> Result<Option<JobRow>, Failure> {
@@ -60,7 +60,7 @@ pub(super) async fn of_specification(
     found.as_ref().map(JobRow::from_row).transpose()
 }
 
-pub(super) async fn queued_for_sessions(connection: &mut Connection<'_>, tenant: &Tenant) -> Result<i64, Failure> {
+pub(super) async fn queued_for_sessions(connection: &mut StoreConnection<'_>, tenant: &Tenant) -> Result<i64, Failure> {
     let queued = query(
         "SELECT count(*) AS queued FROM jobs WHERE tenant = $1 AND state = $2
              AND EXISTS (SELECT 1 FROM idempotency_keys WHERE idempotency_keys.job = jobs.job
@@ -71,7 +71,7 @@ pub(super) async fn queued_for_sessions(connection: &mut Connection<'_>, tenant:
 }
 
 /// Names a training that a caller queued by its specification.
-pub(super) async fn name_training(connection: &mut Connection<'_>, new: &NewJob) -> Result<(), Failure> {
+pub(super) async fn name_training(connection: &mut StoreConnection<'_>, new: &NewJob) -> Result<(), Failure> {
     if new.kind != JobKind::Train {
         return Ok(());
     }
@@ -81,7 +81,7 @@ pub(super) async fn name_training(connection: &mut Connection<'_>, new: &NewJob)
 
 /// Gives a job a name, which no other job has from then on.
 pub(super) async fn name(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     job: &str,
     key: &str,
@@ -95,7 +95,7 @@ pub(super) async fn name(
 
 /// Withdraws the requests of a session for its next renewal, because it is deleted or about to be renewed.
 pub(super) async fn withdraw(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     session: &str,
     renewal: usize,
@@ -112,7 +112,7 @@ pub(super) async fn withdraw(
 
 /// Withdraws the requests of a session that is about to be deleted, and locks it against a renewal in between.
 pub(super) async fn withdraw_all(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
     session: &str,
 ) -> Result<(), Failure> {

@@ -14,18 +14,18 @@
 use super::error::Failure;
 use super::job::JobRow;
 use super::job_state::JobState;
-use super::query::{Connection, query};
+use super::query::{StoreConnection, query};
 use super::tenant::Tenant;
 
 /// Adds a tenant to those that take turns, and locks its turn: no other transaction queues for it until this one ends.
-pub(super) async fn enter(connection: &mut Connection<'_>, tenant: &Tenant) -> Result<(), Failure> {
+pub(super) async fn enter(connection: &mut StoreConnection<'_>, tenant: &Tenant) -> Result<(), Failure> {
     let place = query("INSERT INTO turns (tenant, turn) VALUES ($1, 0) ON CONFLICT (tenant) DO NOTHING");
     connection.execute(place.bind(tenant.as_str())).await?;
     connection.lock(query("SELECT turn FROM turns WHERE tenant = $1").bind(tenant.as_str()).for_update()).await
 }
 
 /// Finds the queued job whose turn it is and locks it for this transaction; its tenant goes to the end of the order.
-pub(super) async fn take(connection: &mut Connection<'_>) -> Result<Option<JobRow>, Failure> {
+pub(super) async fn take(connection: &mut StoreConnection<'_>) -> Result<Option<JobRow>, Failure> {
     let queued = JobState::Queued.as_str();
     // A subquery of one row is looked up for each tenant; `EXISTS` may become a join over all queued jobs.
     let next = query(

@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use super::error::Failure;
-use super::query::Connection;
+use super::query::StoreConnection;
 use super::quotas;
 use super::statement::Statement;
 use super::tenant::Tenant;
@@ -63,7 +63,7 @@ impl Labelled {
 
 /// Adds the rows of these words.
 pub(super) async fn add<'w>(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     of: Worded<'_>,
     words: impl IntoIterator<Item = &'w str>,
 ) -> Result<(), Failure> {
@@ -83,7 +83,7 @@ pub(super) async fn add<'w>(
 
 /// Removes the rows of these words.
 pub(super) async fn remove<'w>(
-    connection: &mut Connection<'_>,
+    connection: &mut StoreConnection<'_>,
     of: Worded<'_>,
     words: impl IntoIterator<Item = &'w str>,
 ) -> Result<(), Failure> {

@@ -6,7 +6,7 @@ use std::process::{Child, Command};
 use std::time::Duration;
 
 use crate::support::App;
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::service::memory::MemoryLimit;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -295,5 +295,5 @@ async fn policies_of_one_seed_share_their_bridges() {
 
 #[test]
 fn what_is_kept_for_the_library_holds_the_factor_of_the_largest_design() {
-    assert!(Kept::default().heaviest() >= 10_000 * 10_000 * 8);
+    assert!(Cache::default().heaviest() >= 10_000 * 10_000 * 8);
 }

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 
 use crate::support::policies::advisor;
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
@@ -197,7 +197,7 @@ fn another_program_finds_the_bridge_radius_with_random_numbers_of_its_own() {
         let mut request = policy("adaptive", json!({ "kind": "log" }), bridge.clone(), json!({}));
         request["problem"]["horizon"] = json!(2);
         request["problem"]["learning"] = learning.clone();
-        let specification = crate::support::policies::specification(request).resolved(&Kept::default());
+        let specification = crate::support::policies::specification(request).resolved(&Cache::default());
         let problem = ballast::control::bellman::problem::Problem::new(&specification);
         let law = problem.specification.problem.learning.law(&HISTORY);
         let measure = problem.sets.measure(&law);

@@ -3,7 +3,7 @@
 use crate::support::App;
 use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::FrontierReport;
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::progress::Watch;
 use ballast::control::request::frontier::FrontierRequest;
 use ballast::control::request::specification::ProblemSpecification;
@@ -25,7 +25,7 @@ fn problem(history: &[f64]) -> Value {
 
 fn report(request: &Value) -> FrontierReport {
     let question = serde_json::from_value::<FrontierRequest>(request.clone()).unwrap().question().unwrap();
-    Frontier::new(question, Kept::default()).run(&Watch::unwatched()).unwrap()
+    Frontier::new(question, Cache::default()).run(&Watch::unwatched()).unwrap()
 }
 
 /// The advice of `POST /advise` at this multiple of the radius.

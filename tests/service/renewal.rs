@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::support::patience::until;
 use crate::support::{App, specification};
 use ballast::control::evaluation::account::keep;
-use ballast::control::evaluation::rolling::{Period, Strategy, WalkForward};
+use ballast::control::evaluation::rolling::{ActualPeriod, Strategy, WalkForward};
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
@@ -341,13 +341,13 @@ async fn what_cannot_be_renewed_by_itself_is_refused_by_name() {
 }
 
 /// The bundled months from the start of `year`, the window before it among them.
-fn months(year: u32, window: usize, lived: usize) -> Vec<Period> {
+fn months(year: u32, window: usize, lived: usize) -> Vec<ActualPeriod> {
     let file = include_str!("../../data/us_market_monthly.csv");
     let rows: Vec<&str> = file.lines().skip(1).collect();
     let first = rows.iter().position(|row| row.starts_with(&format!("{year}-01"))).unwrap();
     let period = |row: &&str| {
         let cells: Vec<f64> = row.split(',').skip(1).map(|cell| cell.parse().unwrap()).collect();
-        Period { log_return: cells[0].ln_1p(), bank_return: cells[1] }
+        ActualPeriod { log_return: cells[0].ln_1p(), bank_return: cells[1] }
     };
     rows[first - window..first + lived].iter().map(period).collect()
 }

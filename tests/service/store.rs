@@ -6,8 +6,8 @@ use crate::support::place::Place;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
-    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, Seen, SessionQuery, SessionRow, Store,
-    StoreError, StoredKeys, Successor, Tenant,
+    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotation, RowVersion, SessionQuery, SessionRow,
+    Store, StoreError, StoredKeys, Successor, Tenant,
 };
 use futures_util::future::join_all;
 
@@ -78,7 +78,7 @@ async fn claimed(store: &Store, now_ms: i64) -> (String, i64) {
 }
 
 /// Opens a session, and gives what it was seen as before anybody could write to it.
-async fn with_session(store: &Store, session: &str, history: &[f64]) -> Seen {
+async fn with_session(store: &Store, session: &str, history: &[f64]) -> RowVersion {
     let policy = content_hash(POLICY);
     store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
     let new = SessionRow {
@@ -857,15 +857,15 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     assert_eq!((rows[0].hash, &rows[0].tenant, rows[0].revoked_ms), (new.hash, &new.tenant, None));
     assert_eq!(rows[0].roles.to_string(), "read,operate");
     let successor = Successor { key: "key_2".into(), hash: [8; 32], created_ms: 5, expires_ms: None };
-    let Rotate::Rotated { old, new } = ring.rotate("key_1", successor.clone(), 50).await.unwrap() else { panic!() };
+    let Rotation::Rotated { old, new } = ring.rotate("key_1", successor.clone(), 50).await.unwrap() else { panic!() };
     assert_eq!((old.expires_ms, new.expires_ms), (Some(50), Some(105)), "as long as the one before was made for");
     assert_eq!((&new.tenant, &new.roles), (&old.tenant, &old.roles));
     assert_eq!(store.keys().await.unwrap().sound, [*old, *new.clone()]);
     let again = |created_ms| Successor { key: format!("key_{created_ms}"), created_ms, ..successor.clone() };
     assert!(ring.rotate("key_1", again(6), 60).await.is_err(), "two keys of one text");
     assert_eq!(ring.list().await.unwrap().sound[0].expires_ms, Some(50), "all of a rotation or nothing");
-    assert_eq!(ring.rotate("key_1", again(50), 60).await.unwrap(), Rotate::Ended);
-    assert_eq!(ring.rotate("key_9", again(6), 60).await.unwrap(), Rotate::Absent);
+    assert_eq!(ring.rotate("key_1", again(50), 60).await.unwrap(), Rotation::Ended);
+    assert_eq!(ring.rotate("key_9", again(6), 60).await.unwrap(), Rotation::Absent);
     assert!(!ring.revoke("key_3", 4).await.unwrap());
     assert!(ring.revoke("key_1", 4).await.unwrap() && ring.revoke("key_1", 5).await.unwrap());
     assert_eq!(store.keys().await.unwrap().sound[0].revoked_ms, Some(4));

@@ -9,7 +9,7 @@ use ballast::control::request::specification::{Specification, UtilitySpecificati
 use ballast::control::training::Training;
 use ballast::numerics::bridge::Quantile;
 use ballast::numerics::fund_bridges::{FundBridges, fund_returns};
-use ballast::numerics::levelling::{Ground, inverse_volatility};
+use ballast::numerics::levelling::{GroundMetric, inverse_volatility};
 use ballast::numerics::streams::stream;
 use ballast::numerics::wasserstein::WassersteinBall;
 use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolveOutcome};
@@ -24,10 +24,10 @@ fn rows(value: &Value) -> Vec<Vec<f64>> {
     serde_json::from_value(value.clone()).unwrap()
 }
 
-fn ground(name: &str, returns: &[Vec<f64>]) -> Ground {
+fn ground(name: &str, returns: &[Vec<f64>]) -> GroundMetric {
     match name {
-        "sup" => Ground::Sup,
-        _ => Ground::Weighted(inverse_volatility(returns)),
+        "sup" => GroundMetric::Sup,
+        _ => GroundMetric::Weighted(inverse_volatility(returns)),
     }
 }
 
@@ -93,7 +93,7 @@ fn sample(assets: usize, dates: usize, seed: usize) -> Vec<Vec<f64>> {
 const POWER: RelativeUtility = RelativeUtility::Power { eta: 3.0 };
 const UTILITIES: [RelativeUtility; 3] = [POWER, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }];
 
-fn step(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64, floor: f64) -> AssetsStep {
+fn step(returns: &[Vec<f64>], ground: &GroundMetric, utility: RelativeUtility, radius: f64, floor: f64) -> AssetsStep {
     AssetsStep::new(
         AssetsLaw { returns, radius, floors: vec![floor; returns[0].len()] },
         ground.clone(),
@@ -103,7 +103,7 @@ fn step(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius:
     )
 }
 
-fn without_floor(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64) -> AssetsStep {
+fn without_floor(returns: &[Vec<f64>], ground: &GroundMetric, utility: RelativeUtility, radius: f64) -> AssetsStep {
     step(returns, ground, utility, radius, f64::NEG_INFINITY)
 }
 
@@ -115,8 +115,8 @@ fn identical_columns_are_one_asset() {
         let history: Vec<f64> = serde_json::from_value(case["history"].clone()).unwrap();
         for assets in [1, 3] {
             let returns: Vec<Vec<f64>> = history.iter().map(|z| vec![*z; assets]).collect();
-            let even = Ground::Weighted(vec![1.0 / assets as f64; assets]);
-            for ground in [Ground::Sup, even] {
+            let even = GroundMetric::Weighted(vec![1.0 / assets as f64; assets]);
+            for ground in [GroundMetric::Sup, even] {
                 let radius = case["radius"].as_f64().unwrap();
                 let law = AssetsLaw { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
                 let rate = case["rate_per_step"].as_f64().unwrap();
@@ -148,7 +148,7 @@ fn a_static_policy_promises_the_gain_of_one_step_for_every_period_left() {
     for (utility, relative) in
         [(json!({ "kind": "power", "risk_aversion": 3.0 }), POWER), (json!({ "kind": "log" }), RelativeUtility::Log)]
     {
-        let solution = without_floor(&returns, &Ground::Sup, relative, 0.003).solve(None);
+        let solution = without_floor(&returns, &GroundMetric::Sup, relative, 0.003).solve(None);
         certified(&solution);
         let total: f64 = solution.allocation.iter().sum();
         assert!(solution.value > BP && total < 1.0, "{solution:?}");
@@ -177,9 +177,10 @@ fn the_order_of_assets_and_those_not_held_change_nothing() {
     let turned = |row: &[f64]| order.map(|asset| row[asset]).to_vec();
     let turned_returns: Vec<Vec<f64>> = returns.iter().map(|row| turned(row)).collect();
     for utility in UTILITIES {
-        for (ground, other) in
-            [(Ground::Sup, Ground::Sup), (Ground::Weighted(weights.clone()), Ground::Weighted(turned(&weights)))]
-        {
+        for (ground, other) in [
+            (GroundMetric::Sup, GroundMetric::Sup),
+            (GroundMetric::Weighted(weights.clone()), GroundMetric::Weighted(turned(&weights))),
+        ] {
             let one = without_floor(&returns, &ground, utility, 0.004).solve(None);
             let two = without_floor(&turned_returns, &other, utility, 0.004).solve(None);
             certified(&one);
@@ -189,9 +190,10 @@ fn the_order_of_assets_and_those_not_held_change_nothing() {
         }
         // The first two alone, and with two that are not held.
         let fewer: Vec<Vec<f64>> = returns.iter().map(|row| row[..2].to_vec()).collect();
-        for (ground, less) in
-            [(Ground::Sup, Ground::Sup), (Ground::Weighted(weights.clone()), Ground::Weighted(weights[..2].to_vec()))]
-        {
+        for (ground, less) in [
+            (GroundMetric::Sup, GroundMetric::Sup),
+            (GroundMetric::Weighted(weights.clone()), GroundMetric::Weighted(weights[..2].to_vec())),
+        ] {
             let all = without_floor(&returns, &ground, utility, 0.004).worth(&[0.2, 0.3, 0.0, 0.0]);
             let two = without_floor(&fewer, &less, utility, 0.004).worth(&[0.2, 0.3]);
             // Sums of the same numbers.
@@ -211,7 +213,7 @@ fn another_asset_never_lowers_the_value_and_a_wider_ball_never_raises_it() {
         for sup in [true, false] {
             let value = |assets: usize, radius: f64| {
                 let some: Vec<Vec<f64>> = returns.iter().map(|row| row[..assets].to_vec()).collect();
-                let ground = if sup { Ground::Sup } else { Ground::Weighted(weights[..assets].to_vec()) };
+                let ground = if sup { GroundMetric::Sup } else { GroundMetric::Weighted(weights[..assets].to_vec()) };
                 let solution = without_floor(&some, &ground, utility, radius).solve(None);
                 certified(&solution);
                 solution.value
@@ -229,7 +231,7 @@ fn another_asset_never_lowers_the_value_and_a_wider_ball_never_raises_it() {
 /// and place, solved by a library. The masses of an atom sum to its own, and their distances to the radius at most.
 fn by_programme(
     returns: &[Vec<f64>],
-    ground: &Ground,
+    ground: &GroundMetric,
     utility: RelativeUtility,
     radius: f64,
     allocation: &[f64],
@@ -241,8 +243,8 @@ fn by_programme(
         for &first in &offsets {
             for &second in offsets.iter().step_by(4).chain([&first]) {
                 let cost = match ground {
-                    Ground::Sup => first.abs().max(second.abs()),
-                    Ground::Weighted(weights) => weights[0] * first.abs() + weights[1] * second.abs(),
+                    GroundMetric::Sup => first.abs().max(second.abs()),
+                    GroundMetric::Weighted(weights) => weights[0] * first.abs() + weights[1] * second.abs(),
                 };
                 let growth = |z: f64, down: f64| (z - down).exp() / 1.002 - 1.0;
                 let wealth = 1.0 + allocation[0] * growth(row[0], first) + allocation[1] * growth(row[1], second);
@@ -271,10 +273,10 @@ fn by_programme(
 fn what_an_allocation_is_worth_agrees_with_the_transport_programme() {
     let returns = sample(2, 3, 3);
     for (ground, utility) in [
-        (Ground::Sup, POWER),
-        (Ground::Weighted(vec![0.6, 0.4]), POWER),
-        (Ground::Weighted(vec![0.3, 0.7]), RelativeUtility::Log),
-        (Ground::Weighted(vec![0.5, 0.5]), RelativeUtility::Exponential { k: 2.0 }),
+        (GroundMetric::Sup, POWER),
+        (GroundMetric::Weighted(vec![0.6, 0.4]), POWER),
+        (GroundMetric::Weighted(vec![0.3, 0.7]), RelativeUtility::Log),
+        (GroundMetric::Weighted(vec![0.5, 0.5]), RelativeUtility::Exponential { k: 2.0 }),
     ] {
         let worth = without_floor(&returns, &ground, utility, 0.02).worth(&[0.25, 0.3]);
         assert!((worth.primal - worth.value).abs() < 1e-9, "{worth:?}");
@@ -288,7 +290,7 @@ fn what_an_allocation_is_worth_agrees_with_the_transport_programme() {
 #[test]
 fn all_in_is_worth_nothing_to_power_utility_and_the_radius_less_to_log_utility() {
     let returns = sample(2, 20, 6);
-    let worth = |utility| without_floor(&returns, &Ground::Sup, utility, 0.02).worth(&[0.4, 0.6]).value;
+    let worth = |utility| without_floor(&returns, &GroundMetric::Sup, utility, 0.02).worth(&[0.4, 0.6]).value;
     assert_eq!(worth(POWER), f64::NEG_INFINITY);
     let fund = |row: &Vec<f64>| (0.4 * row[0].exp() + 0.6 * row[1].exp()).ln();
     let mean = returns.iter().map(fund).sum::<f64>() / returns.len() as f64;
@@ -307,7 +309,8 @@ fn whatever_the_risk_aversion_the_best_is_found_or_the_answer_warns() {
         let (assets, dates) = (draw(2.0, 8.99) as usize, draw(12.0, 120.0) as usize);
         let (eta, scale) = (draw(2.0, 200.0), draw(0.1, 3.0));
         let returns = sample(assets, dates, 100 + case);
-        let ground = if case % 2 == 0 { Ground::Sup } else { Ground::Weighted(inverse_volatility(&returns)) };
+        let ground =
+            if case % 2 == 0 { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(&returns)) };
         let utility =
             if case % 3 == 0 { RelativeUtility::Exponential { k: eta } } else { RelativeUtility::Power { eta } };
         let step = without_floor(&returns, &ground, utility, scale * 0.05 / (dates as f64).sqrt());
@@ -333,7 +336,7 @@ fn whatever_the_risk_aversion_the_best_is_found_or_the_answer_warns() {
 #[test]
 fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
     let returns = sample(3, 50, 4);
-    let ground = Ground::Weighted(inverse_volatility(&returns));
+    let ground = GroundMetric::Weighted(inverse_volatility(&returns));
     let total = ActionInterval { lowest: 0.3, highest: 0.7 };
     for floor in [-0.3, f64::NEG_INFINITY] {
         for utility in UTILITIES {
@@ -370,7 +373,7 @@ fn a_window_at_which_the_crash_comes_and_goes_is_certified() {
         (returns.iter().map(|row| (row[asset] - mean).powi(2)).sum::<f64>() / 240.0).sqrt()
     };
     let radius = 1.3 * (0..12).map(deviation).sum::<f64>() / 12.0 / 240.0_f64.sqrt();
-    for ground in [Ground::Weighted(inverse_volatility(returns)), Ground::Sup] {
+    for ground in [GroundMetric::Weighted(inverse_volatility(returns)), GroundMetric::Sup] {
         let law = AssetsLaw { returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
         let solution = AssetsStep::new(law, ground, POWER, 0.003, WHOLE).solve(None);
         certified(&solution);
@@ -385,7 +388,7 @@ fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
     let total = ActionInterval { lowest: 0.2, highest: 0.2 };
     let apart = |radius: f64| {
         let law = AssetsLaw { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
-        let step = AssetsStep::new(law, Ground::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
+        let step = AssetsStep::new(law, GroundMetric::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
         let solution = step.solve(None);
         certified(&solution);
         let apart = |(share, weight): (&f64, &f64)| (share / 0.2 - weight).abs();
@@ -403,7 +406,7 @@ fn a_premium_that_is_just_above_what_is_told_apart_is_taken() {
     let kelly = 0.5 / down - 0.5 / up;
     let best = 0.5 * (kelly * up).ln_1p() + 0.5 * (-kelly * down).ln_1p();
     assert!((7.9e-8..8.1e-8).contains(&best), "{best}");
-    let solution = without_floor(&returns, &Ground::Sup, RelativeUtility::Log, 0.0).solve(None);
+    let solution = without_floor(&returns, &GroundMetric::Sup, RelativeUtility::Log, 0.0).solve(None);
     // A search ends where its bounds are 1e-8 apart.
     assert!((solution.value - best).abs() < 2e-8 && solution.allocation[0] > 0.0, "{best} {solution:?}");
 }
@@ -426,7 +429,7 @@ fn extremes_are_answered_with_bounds_in_order() {
             ] {
                 for (radius, floor) in [(0.0, f64::NEG_INFINITY), (10.0, f64::NEG_INFINITY), (1e-9, -5.0), (10.0, -5.0)]
                 {
-                    for ground in [Ground::Sup, Ground::Weighted(inverse_volatility(returns))] {
+                    for ground in [GroundMetric::Sup, GroundMetric::Weighted(inverse_volatility(returns))] {
                         let told = step(returns, &ground, utility, radius, floor).solve(None);
                         let total: f64 = told.allocation.iter().sum();
                         assert!(told.value >= 0.0 && told.bound >= told.value && told.bound < 6.0, "{told:?}");

@@ -1,7 +1,7 @@
 //! Levels of caution against plain simulation with the robust step itself.
 
-use ballast::control::caution::{AllocationCurve, Investor};
-use ballast::control::kept::Kept;
+use ballast::control::caution::{AllocationCurve, OnePeriodInvestor};
+use ballast::control::kept::Cache;
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::radius_rule::RadiusRule;
@@ -23,7 +23,7 @@ fn drawn(seed: usize, count: usize, mean: f64, deviation: f64) -> Vec<f64> {
 
 fn advised(problem: ProblemSpecification) -> f64 {
     let specification = Specification::of(problem, 1).completed().unwrap();
-    OnePeriod::new(&specification, Kept::default()).advise(0.0).unwrap().0.allocation
+    OnePeriod::new(&specification, Cache::default()).advise(0.0).unwrap().0.allocation
 }
 
 /// The robust step is certified by duality, and shares no line with the curve.
@@ -52,7 +52,7 @@ fn the_curve_is_the_advice_of_the_robust_step_at_every_radius() {
             };
             let centre = Centring::of(&problem).centre(&EmpiricalDistribution::new(&history));
             let utility = RelativeUtility::new(utility, 100.0 * 1.002);
-            let curve = AllocationCurve::of(&centre, Investor { bank: 1.002, utility, highest, support });
+            let curve = AllocationCurve::of(&centre, OnePeriodInvestor { bank: 1.002, utility, highest, support });
             for radius in [0.0, 0.0002, 0.0005, 0.001, 0.002, 0.004, 0.008, 0.016] {
                 let exact =
                     advised(ProblemSpecification { radius: Some(RadiusRule::Fixed { radius }), ..problem.clone() });
@@ -81,7 +81,7 @@ fn nothing_is_held_where_no_premium_is_left() {
             ..ProblemSpecification::of(history, 0.002)
         };
         let specification = Specification::of(problem, 1).completed().unwrap();
-        let investor = OnePeriod::new(&specification, Kept::default());
+        let investor = OnePeriod::new(&specification, Cache::default());
         let (advice, _) = investor.advise(0.0).unwrap();
         let Some(why) = investor.why_nothing(0.0, &advice).unwrap() else {
             assert!(advice.allocation > 0.0);
@@ -158,7 +158,7 @@ fn a_level_has_the_least_worst_regret_of_a_plain_simulation() {
             ..ProblemSpecification::of(history.clone(), 0.002)
         };
         let specification = Specification::of(problem, 1).completed().unwrap();
-        let levels = specification.levels(&Kept::default());
+        let levels = specification.levels(&Cache::default());
         let losses = simulated(&history, 0.002, 3.0);
         // Linear between the shares simulated.
         let at = |losses: &[f64; 12], scale: f64| {
@@ -202,7 +202,7 @@ fn a_level_has_the_least_worst_regret_of_a_plain_simulation() {
         }
         // What each costs is in the order of their caution.
         assert!(levels.bold.scale <= levels.balanced.scale && levels.balanced.scale <= levels.cautious.scale);
-        assert_eq!(specification.levels(&Kept::new(1 << 30)), levels);
+        assert_eq!(specification.levels(&Cache::new(1 << 30)), levels);
     }
 }
 
@@ -246,7 +246,8 @@ fn the_curve_is_the_advice_on_problems_drawn_at_random() {
         }
         let centre = Centring::of(&problem).centre(&EmpiricalDistribution::new(&history));
         let relative = RelativeUtility::new(utility, 100.0 * (1.0 + rate));
-        let curve = AllocationCurve::of(&centre, Investor { bank: 1.0 + rate, utility: relative, highest, support });
+        let curve =
+            AllocationCurve::of(&centre, OnePeriodInvestor { bank: 1.0 + rate, utility: relative, highest, support });
         let radius = deviation * uniform(0.003_f64.ln(), 1.0_f64.ln()).exp();
         let exact = advised(ProblemSpecification { radius: Some(RadiusRule::Fixed { radius }), ..problem.clone() });
         let read = curve.at(radius);

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use crate::support::policies::{advisor, specification, train};
 use ballast::control::bellman::problem::Problem;
 use ballast::control::error::TrainError;
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
@@ -96,7 +96,7 @@ fn the_bridge_quantile_of_decaying_weights_agrees_with_a_million_paths() {
         let request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.0, "history": case["returns"],
             "learning": { "kind": "decay", "half_life": case["half_life"] },
             "radius": { "rule": "bridge", "alpha": case["alpha"] } } });
-        let problem = Problem::new(&specification(request).resolved(&Kept::default()));
+        let problem = Problem::new(&specification(request).resolved(&Cache::default()));
         let history = &problem.specification.problem.history;
         let law = problem.specification.problem.learning.law(history);
         assert!((law.effective_size() / number("effective_size") - 1.0).abs() < 1e-13);

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use crate::support::{App, specification};
 use ballast::control::evaluation::coverage::{CoverageQuestion, DrawnLaw, coverage};
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::request::centre::CentreSpecification;
@@ -113,7 +113,7 @@ async fn a_calibrated_policy_keeps_its_factor_wherever_it_goes() {
     let start = advisor.initial_state(None, None).unwrap();
     request["problem"]["radius"]["rule"] = json!("bridge");
     let problem = serde_json::from_value::<Specification>(request).unwrap().completed().unwrap();
-    let bridge = RadiusEstimator::new(&problem, Kept::default());
+    let bridge = RadiusEstimator::new(&problem, Cache::default());
     let (mut returns, mut factor) = (Vec::new(), None);
     for period in 1..=4 {
         let (_, action) = app.action().await;

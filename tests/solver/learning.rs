@@ -4,7 +4,7 @@ use crate::support::App;
 use crate::support::policies::{advisor, specification};
 use ballast::control::bellman::BellmanStep;
 use ballast::control::bellman::next_value::NextValue;
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
@@ -132,7 +132,7 @@ async fn trained(horizon: usize) -> App {
 
 /// The radius and the moments of a record, by the rules of the policy.
 fn measured(record: &[f64]) -> (f64, f64, f64) {
-    let asked = specification(request(1, bridge(), decay())).resolved(&Kept::default());
+    let asked = specification(request(1, bridge(), decay())).resolved(&Cache::default());
     let law = asked.problem.learning.law(record);
     let problem = ballast::control::bellman::problem::Problem::new(&asked);
     (problem.sets.measure(&law).radius, law.raw_moments(1)[0], law.effective_size())
@@ -191,7 +191,7 @@ async fn a_policy_is_exported_taken_back_and_asked_as_any_other() {
     // Ten returns of this half-life weigh like fewer, and the caution says so.
     assert!(advised["caution"][0]["sentence"].as_str().unwrap().contains("weigh like"), "{advised}");
     let present = advised["sensitivity"]["premium"]["present"].as_f64().unwrap();
-    let asked = specification(request(1, bridge(), decay())).resolved(&Kept::default());
+    let asked = specification(request(1, bridge(), decay())).resolved(&Cache::default());
     let law = asked.problem.learning.law(&HISTORY);
     let mean: f64 =
         law.atoms().iter().zip(law.weights()).map(|(z, weight)| weight / law.total_weight() * z.exp_m1()).sum();

@@ -1,7 +1,7 @@
 //! How near an advice is to changing, against asking again: with the record changed by hand, and by closed forms.
 
 use crate::support::{App, policies, specification};
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::problem::state::State;
@@ -47,10 +47,10 @@ fn by_record(problem: &Value) -> impl Fn(&[f64]) -> f64 {
     let own: ProblemSpecification = serde_json::from_value(problem.clone()).unwrap();
     let own = ProblemSpecification { horizon: 1, ..own };
     let completed = |problem| Specification::of(problem, default_seed()).completed().unwrap();
-    let radius = completed(own.clone()).resolved(&Kept::default()).problem.radius;
+    let radius = completed(own.clone()).resolved(&Cache::default()).problem.radius;
     move |record| {
         let other = completed(ProblemSpecification { history: record.to_vec(), radius, ..own.clone() });
-        OnePeriod::new(&other, Kept::default()).advise(0.1).unwrap().0.allocation
+        OnePeriod::new(&other, Cache::default()).advise(0.1).unwrap().0.allocation
     }
 }
 

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use ballast::control::error::TrainError;
 use ballast::control::evaluation::account::keep;
-use ballast::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
-use ballast::control::kept::Kept;
+use ballast::control::evaluation::rolling::{ActualPeriod, Decision, Strategy, WalkForward};
+use ballast::control::kept::Cache;
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::pool::TrainingPool;
@@ -32,12 +32,12 @@ const WALK: WalkForward = WalkForward {
 };
 
 /// Returns that pay enough beyond the bank to be held at a wide level.
-fn periods(count: usize) -> Vec<Period> {
+fn periods(count: usize) -> Vec<ActualPeriod> {
     let log_return = |k: usize| 0.02 + 0.03 * (1.7 * k as f64).sin();
-    (0..count).map(|k| Period { log_return: log_return(k), bank_return: 0.002 }).collect()
+    (0..count).map(|k| ActualPeriod { log_return: log_return(k), bank_return: 0.002 }).collect()
 }
 
-fn decide(walk: &WalkForward, strategies: &[Strategy], periods: &[Period], threads: usize) -> Vec<Vec<Decision>> {
+fn decide(walk: &WalkForward, strategies: &[Strategy], periods: &[ActualPeriod], threads: usize) -> Vec<Vec<Decision>> {
     let watch = Watch::unwatched();
     let solved = AtomicUsize::new(0);
     let pool = TrainingPool::new(threads).unwrap();
@@ -113,7 +113,7 @@ fn a_period_at_the_volatility_of_now_is_that_of_advice_alone() {
     for (start, decision) in decisions.iter().enumerate() {
         let past = &periods[start..start + walk.window];
         let specification = walk.specification(Framework::Adaptive, 0.9, past).completed().unwrap();
-        let (advice, _) = OnePeriod::new(&specification, Kept::default()).resolved().advise(0.0).unwrap();
+        let (advice, _) = OnePeriod::new(&specification, Cache::default()).resolved().advise(0.0).unwrap();
         assert!(
             (decision.band.high - advice.allocation).abs() < 1e-9 && decision.radius == advice.radius,
             "{decision:?} {advice:?}"
@@ -145,7 +145,7 @@ fn a_stop_and_a_bad_past_are_errors() {
     let stopped = Watch { stop: &AtomicBool::new(true), progress: &|_| {} };
     let outcome = WALK.decide(&[Strategy::PlugIn], &periods(40), &stopped, &|| {});
     assert_eq!(outcome, Err(TrainError::Stopped));
-    let constant = vec![Period { log_return: 0.01, bank_return: 0.0 }; 40];
+    let constant = vec![ActualPeriod { log_return: 0.01, bank_return: 0.0 }; 40];
     let watch = Watch::unwatched();
     let refused = WALK.decide(&[Strategy::PlugIn], &constant, &watch, &|| {});
     assert!(

@@ -13,7 +13,7 @@ pub mod random;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use ballast::http::{self, Running};
+use ballast::http::{self, RunningServer};
 use ballast::service::clock::Clock;
 use ballast::service::config::{Config, StoreLocation};
 use ballast::service::keys;
@@ -34,7 +34,7 @@ pub struct App {
     folder: TempDir,
     /// The store of the service that runs in this process.
     store: Option<StoreLocation>,
-    running: Option<Running>,
+    running: Option<RunningServer>,
 }
 
 /// Runs each test over a folder, and over a database that replicas share.
@@ -163,7 +163,7 @@ fn config(folder: &Path) -> Config {
     Config { listen: ([127, 0, 0, 1], 0).into(), body_limit_bytes: 1 << 20, ..Config::new(folder) }
 }
 
-async fn start(config: Config) -> Running {
+async fn start(config: Config) -> RunningServer {
     http::serve(config, Shutdown::new()).await.expect("the service starts")
 }
 

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use ballast::control::error::FieldError;
 use ballast::control::policy::advice::{Advice, AdviceSource};
-use ballast::control::policy::sensitivity::{NextAdvice, Return, Sensitivity};
+use ballast::control::policy::sensitivity::{NextAdvice, ReturnAndLog, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
 use ballast::numerics::digits;
 use ballast::service::advise::Advised;
@@ -66,10 +66,10 @@ fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: 
     let [low, high] = [next_return.low, next_return.high].map(|next: NextAdvice| percent(next.simple_return, 1));
     let [then_low, then_high] = apart([next_return.low, next_return.high].map(|next| next.allocation), 1);
     told.push(format!("After a next return of {low} it would be {then_low}, after one of {high} {then_high}."));
-    let crossing = |to: Option<Return>, what: &str| {
+    let crossing = |to: Option<ReturnAndLog>, what: &str| {
         to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
     };
-    let leaves = |to: Return| {
+    let leaves = |to: ReturnAndLog| {
         format!("The next {noun} must return more than {} before it leaves the bank.", percent(to.simple_return, 1))
     };
     told.extend(match advice.allocation {

@@ -6,25 +6,25 @@ use ballast::control::progress::Watch;
 use ballast::report::FileError;
 
 use super::progress::Parts;
-use super::{BacktestArgs, BacktestError, Read, Window, page, refused};
+use super::{BacktestArgs, BacktestError, ReportOfRecord, Window, page, refused};
 use crate::command::returns::SeveralReturns;
 
 pub mod files;
 
 /// Everything the page is made from.
-pub struct Shown {
+pub struct AssetsBacktestPage {
     pub walked: AssetsWalked,
     pub report: AssetsBacktestReport,
     /// Sentence on the returns that were read.
     pub read: String,
 }
 
-impl Shown {
+impl AssetsBacktestPage {
     /// Renders the report as a page.
     pub fn page(&self) -> Result<String, FileError> {
         let (report, read) = (&self.report, &self.read);
         let name = format!("Backtest of {} assets", report.assets.len());
-        page("backtest.js", &name, &report.dates, &Read { report, read }, &report.sentences)
+        page("backtest.js", &name, &report.dates, &ReportOfRecord { report, read }, &report.sentences)
     }
 }
 
@@ -85,12 +85,12 @@ impl BacktestArgs {
 }
 
 /// Decides every period, and computes the accounts and the figures.
-pub fn walk(args: &BacktestArgs, returns: SeveralReturns) -> Result<Shown, BacktestError> {
+pub fn walk(args: &BacktestArgs, returns: SeveralReturns) -> Result<AssetsBacktestPage, BacktestError> {
     let SeveralReturns { record, sentence } = returns;
     let backtest = args.of_assets(record)?;
     let parts = Parts::new(backtest.parts(), "stretches");
     let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| parts.one_more()))?;
     parts.finish();
     let report = AssetsBacktestReport::new(&walked);
-    Ok(Shown { walked, report, read: sentence })
+    Ok(AssetsBacktestPage { walked, report, read: sentence })
 }

@@ -7,12 +7,12 @@ use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEs
 use ballast::report::Csv;
 use serde::Serialize;
 
-use super::{BacktestError, Shown, file};
+use super::{BacktestError, BacktestPage, file};
 
 pub const PAGE: &str = "report.html";
 
 /// A figure of a strategy, with its interval if it has one.
-pub type Figure = (&'static str, f64, Option<[f64; 2]>);
+pub type StrategyFigure = (&'static str, f64, Option<[f64; 2]>);
 
 pub fn write(
     folder: &Path,
@@ -29,16 +29,16 @@ pub fn write(
     file(folder, "periods.csv", periods)
 }
 
-pub fn estimated(name: &'static str, estimate: BootstrapEstimate) -> Figure {
+pub fn estimated(name: &'static str, estimate: BootstrapEstimate) -> StrategyFigure {
     (name, estimate.value, Some(estimate.interval))
 }
 
-pub fn plain(name: &'static str, value: f64) -> Figure {
+pub fn plain(name: &'static str, value: f64) -> StrategyFigure {
     (name, value, None)
 }
 
 /// Returns one line per strategy and figure.
-pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> String {
+pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<StrategyFigure>)>) -> String {
     let mut csv = Csv::new(&["strategy", "figure", "value", "low", "high"]);
     for (strategy, figures) in strategies {
         for (name, value, interval) in figures {
@@ -51,7 +51,7 @@ pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> S
 }
 
 /// Returns the figures of a strategy's variation, its trades, and its losses in bad years.
-pub fn of_returns(performance: &Performance) -> [Figure; 6] {
+pub fn of_returns(performance: &Performance) -> [StrategyFigure; 6] {
     [
         estimated("annual_mean", performance.annual_mean),
         estimated("annual_volatility", performance.annual_volatility),
@@ -63,7 +63,7 @@ pub fn of_returns(performance: &Performance) -> [Figure; 6] {
 }
 
 /// Returns the figures of a strategy's wealth and holdings.
-pub fn of_wealth(performance: &Performance) -> [Figure; 3] {
+pub fn of_wealth(performance: &Performance) -> [StrategyFigure; 3] {
     [
         plain("max_drawdown", performance.max_drawdown),
         plain("final_wealth", performance.final_wealth),
@@ -88,7 +88,7 @@ pub fn strategies(strategies: &[BacktestFigures]) -> String {
 }
 
 /// Returns one line per period and strategy; wealth and drawdown at its end.
-pub fn periods(shown: &Shown) -> String {
+pub fn periods(shown: &BacktestPage) -> String {
     let mut csv =
         Csv::new(&["date", "strategy", "allocation", "low", "high", "radius", "traded", "wealth", "drawdown"]);
     for line in &shown.walked.lines {

@@ -43,19 +43,19 @@ pub async fn run(bench: &ActionBench) -> Result<(), Box<dyn Error>> {
 }
 
 /// The training specification, and the returns reported for a session's first period.
-struct Case {
+struct ActionCase {
     specification: Value,
     returns: Vec<Value>,
 }
 
-impl Case {
+impl ActionCase {
     fn of(bench: &ActionBench) -> Result<Self, Box<dyn Error>> {
         if bench.assets == 1 {
             let specification = paper::specification(20, bench.horizon, bench.count, InitialLaws::Given);
             // Returns spread evenly over the range that holds nine in ten draws of the mixture.
             let spread = |call: usize| -0.15 + 0.3 * (call as f64 * 0.618_033_988_75).fract();
             let returns = (0..bench.calls).map(|call| json!({ "log_return": spread(call), "confirm": true })).collect();
-            return Ok(Case { specification: serde_json::to_value(&specification)?, returns });
+            return Ok(ActionCase { specification: serde_json::to_value(&specification)?, returns });
         }
         let rows = assets::read(&bench.file)?;
         let later = rows.len().saturating_sub(MONTHS);
@@ -75,7 +75,7 @@ impl Case {
             "rate_per_step": assets::RATE,
             "utility": { "kind": "power", "risk_aversion": assets::RISK_AVERSION },
         });
-        Ok(Case {
+        Ok(ActionCase {
             specification: json!({ "problem": problem, "design": { "count": bench.count }, "seed": 1 }),
             returns: (0..bench.calls).map(|call| json!({ "log_returns": named(call), "confirm": true })).collect(),
         })
@@ -83,7 +83,7 @@ impl Case {
 }
 
 async fn measure(api: &ApiClient, bench: &ActionBench) -> Result<(), Box<dyn Error>> {
-    let case = Case::of(bench)?;
+    let case = ActionCase::of(bench)?;
     println!("training {} design points, {} steps", bench.count, bench.horizon);
     let job = api.post("/train", &case.specification).await?;
     let mut events = api.events(&format!("/jobs/{}/events", text(&job, "job")?)).await?;

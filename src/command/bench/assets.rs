@@ -9,7 +9,7 @@ use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
 use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::specification::UtilitySpecification;
-use ballast::numerics::levelling::{Ground, inverse_volatility};
+use ballast::numerics::levelling::{GroundMetric, inverse_volatility};
 use clap::Args;
 use serde::Serialize;
 
@@ -43,7 +43,7 @@ const RADIUS: f64 = 1.3;
 
 /// The measurements over the windows.
 #[derive(Debug, Serialize)]
-struct Found {
+struct WindowFindings {
     ground_norm: &'static str,
     assets: usize,
     months: usize,
@@ -78,7 +78,7 @@ pub fn run(bench: &AssetsBench) -> Result<(), Box<dyn Error>> {
                     println!("{}", serde_json::to_string(&found)?);
                     continue;
                 }
-                let Found { ground_norm, cold, warm, gap, .. } = found;
+                let WindowFindings { ground_norm, cold, warm, gap, .. } = found;
                 println!("{ground_norm:<12}{assets:>8}{months:>8}{:>12.2}{:>12.2}{gap:>16.4}", 1e3 * cold, 1e3 * warm);
             }
         }
@@ -104,7 +104,7 @@ fn measure(
     sup: bool,
     assets: usize,
     months: usize,
-) -> Result<Found, Box<dyn Error>> {
+) -> Result<WindowFindings, Box<dyn Error>> {
     let columns = rows.first().map_or(0, Vec::len);
     if assets == 0 || assets > columns || months < 2 || bench.windows == 0 || rows.len() + 1 < months + bench.windows {
         let found = format!("{assets} assets, {months} months and {} windows", bench.windows);
@@ -134,7 +134,7 @@ fn measure(
         last = Some((found, radius));
     }
     let Some((AssetsSolution { allocation, value, .. }, radius)) = last else { return Err("no window".into()) };
-    Ok(Found {
+    Ok(WindowFindings {
         ground_norm: if sup { "sup" } else { "scaled_one" },
         assets,
         months,
@@ -158,7 +158,7 @@ fn step(window: &[Vec<f64>], sup: bool) -> (AssetsStep, f64) {
     };
     let assets = window.first().map_or(0, Vec::len);
     let radius = RADIUS * (0..assets).map(deviation).sum::<f64>() / assets as f64 / count.sqrt();
-    let ground = if sup { Ground::Sup } else { Ground::Weighted(inverse_volatility(window)) };
+    let ground = if sup { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(window)) };
     let utility = RelativeUtility::new(UtilitySpecification::relative(RISK_AVERSION), 1.0);
     let law = AssetsLaw { returns: window, radius, floors: vec![f64::NEG_INFINITY; assets] };
     (AssetsStep::new(law, ground, utility, RATE, ActionInterval { lowest: 0.0, highest: 1.0 }), radius)

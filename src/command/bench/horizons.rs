@@ -42,7 +42,7 @@ const KAPPAS: [f64; 5] = [0.0, 0.02, 0.05, 0.1, 0.15];
 const SAMPLE_SIZE: usize = 20;
 
 /// The result at the start: log certainty equivalent over all-bank, and the allocation.
-struct Start {
+struct StartResult {
     gain: f64,
     allocation: f64,
 }
@@ -54,7 +54,7 @@ pub fn run(bench: &HorizonsBench) -> Result<(), Box<dyn Error>> {
         "history", "T", "kappa", "gain bp", "error bp", "allocation", "error"
     );
     let mut worst: [f64; 2] = [0.0; 2];
-    let mut row = |name: &str, horizon: usize, kappa: f64, found: &Start, truth: &Start| {
+    let mut row = |name: &str, horizon: usize, kappa: f64, found: &StartResult, truth: &StartResult| {
         let errors = [BASIS_POINTS * (found.gain - truth.gain), found.allocation - truth.allocation];
         println!(
             "{name:>7} {horizon:>2} {kappa:>6}  {:>9.3} {:>9.3}  {:>10.4} {:>7.4}",
@@ -87,7 +87,7 @@ pub fn run(bench: &HorizonsBench) -> Result<(), Box<dyn Error>> {
     for case in references["cases"].as_array().into_iter().flatten() {
         let Some(kappa) = case["radius_times_sqrt_sample_size"].as_f64() else { continue };
         let specification = specification_of(case, bench.count)?;
-        let truth = Start {
+        let truth = StartResult {
             gain: number(case, "log_certainty_equivalent_over_bank")?,
             allocation: number(case, "allocation")?,
         };
@@ -98,20 +98,20 @@ pub fn run(bench: &HorizonsBench) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn trained(specification: &Specification) -> Result<Start, TrainError> {
+fn trained(specification: &Specification) -> Result<StartResult, TrainError> {
     let watch = Watch::unwatched();
     let advisor = Advisor::new(Training::new(specification)?.run(&watch)?);
     let advice = advisor.advise(0, &advisor.initial_state(None, None)?, AdviceMode::Surrogate);
-    Ok(Start { gain: (advice.certainty_equivalent / advice.floor).ln(), allocation: advice.allocation })
+    Ok(StartResult { gain: (advice.certainty_equivalent / advice.floor).ln(), allocation: advice.allocation })
 }
 
 /// Solves the first of two steps by brute force.
-fn nested(specification: &Specification) -> Result<Start, TrainError> {
+fn nested(specification: &Specification) -> Result<StartResult, TrainError> {
     let problem = &specification.problem;
     let state = State::new(&problem.history, problem.initial_wealth, problem.learning)?;
     let next = exact_last_value(specification);
     let solution = BellmanStep { problem: &Problem::new(specification), step: 0, next: &next }.solve(&state);
-    Ok(Start { gain: solution.floor_gain, allocation: solution.action })
+    Ok(StartResult { gain: solution.floor_gain, allocation: solution.action })
 }
 
 fn number(case: &Value, field: &str) -> Result<f64, Box<dyn Error>> {

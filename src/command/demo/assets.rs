@@ -8,7 +8,7 @@ use ballast::returns::Choices;
 use serde_json::json;
 
 use super::DemoError;
-use super::calls::{AssetsAdvice, WorstMean, advice, observe, open_session, train};
+use super::calls::{DemoAssetsAdvice, DemoWorstMean, advice, observe, open_session, train};
 use super::past::{HISTORY, INITIAL_WEALTH};
 use super::story::{FIRST_MONTH, HORIZON, YEAR, tell_worst_case};
 use crate::command::api_client::ApiClient;
@@ -39,7 +39,7 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     });
     let policy = train(api, known, HORIZON, count).await?;
     let session = open_session(api, &policy).await?;
-    let first: AssetsAdvice = advice(api, &session, true).await?;
+    let first: DemoAssetsAdvice = advice(api, &session, true).await?;
     tell_first(&first, record.bank[start - 1]);
     live_through(api, &session, &record, start, &first).await
 }
@@ -58,7 +58,7 @@ fn by_name(shares: &BTreeMap<String, f64>) -> String {
     shares.iter().map(told).collect::<Vec<String>>().join(", ")
 }
 
-fn tell_first(told: &AssetsAdvice, rate: f64) {
+fn tell_first(told: &DemoAssetsAdvice, rate: f64) {
     println!("\nTold for {FIRST_MONTH}: hold {:.0} % in all, {}.", 100.0 * told.total, by_name(&told.allocation));
     println!(
         "That counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}. The radius, {:.4}, holds for all funds",
@@ -68,7 +68,7 @@ fn tell_first(told: &AssetsAdvice, rate: f64) {
         "of the four at once. The average log-return of a month, as seen and under the worst law, with {:.2} % of the bank:",
         100.0 * rate
     );
-    for (name, WorstMean { seen, worst }) in &told.one_step.worst_means {
+    for (name, DemoWorstMean { seen, worst }) in &told.one_step.worst_means {
         println!("  {name:<10} {:>6.2} % {:>6.2} %", 100.0 * seen, 100.0 * worst);
     }
     tell_worst_case("this", told.worst_case.as_ref());
@@ -80,7 +80,7 @@ async fn live_through(
     session: &str,
     record: &AssetsRecord,
     start: usize,
-    first: &AssetsAdvice,
+    first: &DemoAssetsAdvice,
 ) -> Result<(), DemoError> {
     println!("\nThe year {YEAR}, month by month, with the share of wealth in each:");
     let names: String = record.assets.iter().map(|name| format!(" {name:>10}")).collect();
@@ -88,7 +88,7 @@ async fn live_through(
     println!("{:<8}{names} {:>8} {:>9} {equal_shares:>13}", "month", "in all", "wealth");
     let (mut wealth, mut equal, mut traded) = (INITIAL_WEALTH, INITIAL_WEALTH, 0.0);
     for month in start..start + HORIZON {
-        let told: AssetsAdvice = advice(api, session, false).await?;
+        let told: DemoAssetsAdvice = advice(api, session, false).await?;
         let returns: BTreeMap<&String, f64> =
             record.assets.iter().zip(&record.rows[month]).map(|(name, z)| (name, z.exp_m1())).collect();
         wealth = observe(api, session, told.period, ("simple_returns", json!(returns))).await?;

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::DemoError;
 use super::past::{ALPHA, INITIAL_WEALTH, RISK_AVERSION};
-use super::progress::{Job, ProgressView};
+use super::progress::{DemoJob, ProgressView};
 use crate::command::api_client::ApiClient;
 
 /// Pause before an event stream that ended early is opened again.
@@ -17,19 +17,19 @@ const BEFORE_REOPENING: Duration = Duration::from_millis(250);
 
 /// Fields that the demo reads from `GET /action`.
 #[derive(Debug, Clone, Deserialize)]
-pub struct Advice {
+pub struct DemoAdvice {
     pub period: usize,
     pub allocation: f64,
     pub radius: f64,
     pub sample_size: usize,
     pub certainty_equivalent: f64,
     pub floor: f64,
-    pub worst_case: Option<WorstCase>,
+    pub worst_case: Option<DemoWorstCase>,
 }
 
 /// Fields for several assets, by their names.
 #[derive(Debug, Clone, Deserialize)]
-pub struct AssetsAdvice {
+pub struct DemoAssetsAdvice {
     pub period: usize,
     pub allocation: BTreeMap<String, f64>,
     pub trade: BTreeMap<String, f64>,
@@ -37,36 +37,36 @@ pub struct AssetsAdvice {
     pub radius: f64,
     pub certainty_equivalent: f64,
     pub floor: f64,
-    pub one_step: OneStep,
-    pub worst_case: Option<WorstCase>,
+    pub one_step: DemoOneStep,
+    pub worst_case: Option<DemoWorstCase>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-pub struct OneStep {
-    pub worst_means: BTreeMap<String, WorstMean>,
+pub struct DemoOneStep {
+    pub worst_means: BTreeMap<String, DemoWorstMean>,
 }
 
 /// Mean of an asset's log-return, estimated and under the worst law.
 #[derive(Debug, Clone, Deserialize)]
-pub struct WorstMean {
+pub struct DemoWorstMean {
     pub seen: f64,
     pub worst: f64,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-pub struct WorstCase {
+pub struct DemoWorstCase {
     pub sentence: String,
-    pub transport: Vec<Move>,
+    pub transport: Vec<DemoMove>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
-pub struct Move {
+pub struct DemoMove {
     pub atom: f64,
     pub moved_to: f64,
     pub mass: f64,
 }
 
-impl Move {
+impl DemoMove {
     /// Returns the move's share of the radius.
     pub fn cost(&self) -> f64 {
         self.mass * (self.moved_to - self.atom).abs()
@@ -92,7 +92,7 @@ pub async fn train(api: &ApiClient, record: Value, horizon: usize, count: usize)
         problem.extend(record);
     }
     let request = json!({ "problem": problem, "design": { "count": count } });
-    let mut job: Job = read("POST /train", api.post("/train", &request).await?)?;
+    let mut job: DemoJob = read("POST /train", api.post("/train", &request).await?)?;
     let path = format!("/jobs/{}", job.job);
     let mut view = ProgressView::new(horizon);
     while !job.is_over() {
@@ -116,10 +116,10 @@ pub async fn train(api: &ApiClient, record: Value, horizon: usize, count: usize)
 
 pub async fn open_session(api: &ApiClient, policy: &str) -> Result<String, DemoError> {
     #[derive(Deserialize)]
-    struct Session {
+    struct DemoSession {
         session: String,
     }
-    let session: Session = read("POST /sessions", api.post("/sessions", &json!({ "policy": policy })).await?)?;
+    let session: DemoSession = read("POST /sessions", api.post("/sessions", &json!({ "policy": policy })).await?)?;
     Ok(session.session)
 }
 
@@ -137,10 +137,10 @@ pub async fn observe(
     (name, returns): (&str, Value),
 ) -> Result<f64, DemoError> {
     #[derive(Deserialize)]
-    struct Observed {
+    struct DemoObserved {
         wealth: f64,
     }
     let report = json!({ "session": session, "period": period, name: returns, "confirm": true });
-    let observed: Observed = read("POST /observe", api.post("/observe", &report).await?)?;
+    let observed: DemoObserved = read("POST /observe", api.post("/observe", &report).await?)?;
     Ok(observed.wealth)
 }

@@ -8,17 +8,17 @@ use serde_json::Value;
 
 /// Fields that the demo reads of a job, from `GET /jobs/{id}` and from each of its events.
 #[derive(Debug, Clone, Deserialize)]
-pub struct Job {
+pub struct DemoJob {
     pub job: String,
     pub state: String,
-    pub progress: Option<Progress>,
+    pub progress: Option<DemoProgress>,
     pub policy: Option<String>,
     pub error: Option<Value>,
 }
 
 /// Steps finished, and progress of the running one, which is absent between two steps.
 #[derive(Debug, Clone, Deserialize)]
-pub struct Progress {
+pub struct DemoProgress {
     pub steps_done: usize,
     pub step: Option<usize>,
     pub points_done: Option<usize>,
@@ -26,7 +26,7 @@ pub struct Progress {
     pub seconds_left: Option<f64>,
 }
 
-impl Job {
+impl DemoJob {
     pub fn is_over(&self) -> bool {
         matches!(self.state.as_str(), "succeeded" | "failed" | "cancelled")
     }
@@ -60,7 +60,7 @@ impl ProgressView {
     }
 
     /// Shows one event.
-    pub fn show(&mut self, progress: &Progress) {
+    pub fn show(&mut self, progress: &DemoProgress) {
         match self {
             ProgressView::Bar(bar) => {
                 bar.set_position(position(progress) as u64);
@@ -81,14 +81,14 @@ impl ProgressView {
     }
 }
 
-fn position(progress: &Progress) -> usize {
+fn position(progress: &DemoProgress) -> usize {
     let (done, total) = (progress.points_done.unwrap_or(0), progress.points_total.unwrap_or(1));
     progress.steps_done * TICKS_PER_STEP + done * TICKS_PER_STEP / total.max(1)
 }
 
 /// Describes the progress of the running step; `None` between two steps.
-fn sentence(progress: &Progress) -> Option<String> {
-    let Progress { step, seconds_left, .. } = progress;
+fn sentence(progress: &DemoProgress) -> Option<String> {
+    let DemoProgress { step, seconds_left, .. } = progress;
     let (done, total) = (progress.points_done.unwrap_or(0), progress.points_total.unwrap_or(0));
     let left = seconds_left.map_or(String::new(), |seconds| format!(", about {seconds:.0} s left"));
     step.map(|step| format!("step {step}, design point {done} of {total}{left}"))
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn the_bar_moves_by_steps_and_by_design_points_within() {
         let at = |steps_done, step, done, total| {
-            position(&Progress {
+            position(&DemoProgress {
                 steps_done,
                 step,
                 points_done: Some(done),

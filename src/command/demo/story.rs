@@ -4,7 +4,7 @@ use ballast::control::evaluation::names::StrategyKind;
 use serde_json::json;
 
 use super::DemoError;
-use super::calls::{Advice, Move, WorstCase, advice, observe, open_session, train};
+use super::calls::{DemoAdvice, DemoMove, DemoWorstCase, advice, observe, open_session, train};
 use super::past::{ALPHA, HISTORY, INITIAL_WEALTH, Past, RISK_AVERSION};
 use crate::command::api_client::ApiClient;
 use crate::command::returns::{Returns, Row};
@@ -31,7 +31,7 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let policy = train(api, past.record(), HORIZON, count).await?;
     let session = open_session(api, &policy).await?;
     println!("Policy {policy:.12} is trained; session {session} starts with wealth {INITIAL_WEALTH}.");
-    let first: Advice = advice(api, &session, true).await?;
+    let first: DemoAdvice = advice(api, &session, true).await?;
     tell_why(&past, &first);
     tell_worst_case("this", first.worst_case.as_ref());
     compare_januaries(api, &market, count).await?;
@@ -43,7 +43,7 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     Ok(())
 }
 
-fn tell_why(past: &Past, advice: &Advice) {
+fn tell_why(past: &Past, advice: &DemoAdvice) {
     println!(
         "\nTold for {}: hold {:.0} % in stocks (allocation {:.2}, radius {:.4}).",
         past.month,
@@ -83,7 +83,7 @@ async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> R
         let past = Past::before(market, month)?;
         let policy = train(api, past.record(), 1, count).await?;
         let session = open_session(api, &policy).await?;
-        let Advice { radius, allocation, .. } = advice(api, &session, false).await?;
+        let DemoAdvice { radius, allocation, .. } = advice(api, &session, false).await?;
         let (edge, reason) = (past.edge(), reason(past.edge(), radius));
         println!("{month:<8} {radius:>8.4} {allocation:>11.3}  {:.2} % a month: {reason}", 100.0 * edge);
     }
@@ -91,7 +91,12 @@ async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> R
 }
 
 /// Prints one line per month, and returns the explained advice of the last month.
-async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row]) -> Result<Option<Advice>, DemoError> {
+async fn live_through(
+    api: &ApiClient,
+    session: &str,
+    past: &Past,
+    year: &[Row],
+) -> Result<Option<DemoAdvice>, DemoError> {
     println!("\nThe year {YEAR}, month by month (the bank pays {:.2} % throughout):", 100.0 * past.rate);
     println!(
         "{:<8} {:>8} {:>11} {:>10} {:>9} {:>16} {:>14}",
@@ -105,7 +110,7 @@ async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row])
     );
     let (mut all_bank, mut all_stock, mut last) = (INITIAL_WEALTH, INITIAL_WEALTH, None);
     for (index, month) in year.iter().enumerate() {
-        let told: Advice = advice(api, session, index + 1 == year.len()).await?;
+        let told: DemoAdvice = advice(api, session, index + 1 == year.len()).await?;
         let wealth = observe(api, session, told.period, ("simple_return", json!(month.risky_return))).await?;
         all_bank *= 1.0 + past.rate;
         all_stock *= 1.0 + month.risky_return;
@@ -122,11 +127,11 @@ async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row])
 }
 
 /// Prints the worst law behind an advice in words, with its largest moves.
-pub fn tell_worst_case(whose: &str, worst_case: Option<&WorstCase>) {
+pub fn tell_worst_case(whose: &str, worst_case: Option<&DemoWorstCase>) {
     let Some(worst_case) = worst_case else { return };
     println!("The worst law for {whose} advice:");
     wrapped(&worst_case.sentence, LINE_WIDTH).iter().for_each(|line| println!("{line}"));
-    for Move { atom, moved_to, mass } in largest_moves(&worst_case.transport) {
+    for DemoMove { atom, moved_to, mass } in largest_moves(&worst_case.transport) {
         println!(
             "  a month of {:+.2} % turns into one of {:+.2} %, with probability {:.2} %",
             100.0 * atom.exp_m1(),
@@ -152,8 +157,8 @@ fn wrapped(sentence: &str, width: usize) -> Vec<String> {
 }
 
 /// Returns the moves that use most of the radius, largest first.
-fn largest_moves(transport: &[Move]) -> Vec<Move> {
-    let mut moves: Vec<Move> = transport.iter().filter(|one| one.cost() > 0.0).cloned().collect();
+fn largest_moves(transport: &[DemoMove]) -> Vec<DemoMove> {
+    let mut moves: Vec<DemoMove> = transport.iter().filter(|one| one.cost() > 0.0).cloned().collect();
     moves.sort_by(|one, other| other.cost().total_cmp(&one.cost()));
     moves.truncate(MOVES_TOLD);
     moves
@@ -165,7 +170,7 @@ mod tests {
 
     #[test]
     fn the_largest_moves_are_told_first_and_still_mass_not_at_all() {
-        let one = |atom, moved_to, mass| Move { atom, moved_to, mass };
+        let one = |atom, moved_to, mass| DemoMove { atom, moved_to, mass };
         let transport =
             [one(0.1, 0.1, 0.5), one(0.1, 0.0, 0.1), one(0.2, -0.6, 0.1), one(0.0, -0.1, 0.2), one(0.1, 0.05, 0.1)];
         let told: Vec<f64> = largest_moves(&transport).iter().map(|one| one.moved_to).collect();

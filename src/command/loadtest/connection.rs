@@ -17,13 +17,13 @@ pub enum ConnectionError {
     Refused { status: u16, request: String, body: String },
 }
 
-pub struct Connection {
+pub struct LoadConnection {
     stream: TcpStream,
     received: Vec<u8>,
 }
 
 /// The position of an answer's body in the received bytes.
-struct Extent {
+struct BodyExtent {
     status: u16,
     head: usize,
     end: usize,
@@ -38,13 +38,13 @@ pub fn post(path: &str, body: &str) -> Vec<u8> {
     format!("{head}content-length: {}\r\n\r\n{body}", body.len()).into_bytes()
 }
 
-impl Connection {
+impl LoadConnection {
     pub async fn open(address: SocketAddr) -> Result<Self, ConnectionError> {
         let stream = TcpStream::connect(address).await;
         let stream = stream.map_err(|source| ConnectionError::Socket { doing: "connecting", source })?;
         let set = stream.set_nodelay(true);
         set.map_err(|source| ConnectionError::Socket { doing: "setting TCP_NODELAY", source })?;
-        Ok(Connection { stream, received: Vec::with_capacity(4096) })
+        Ok(LoadConnection { stream, received: Vec::with_capacity(4096) })
     }
 
     /// Sends a request and reads the body of its answer.
@@ -100,7 +100,7 @@ impl Connection {
 }
 
 /// Locates the body; `None` until the head has arrived.
-fn extent(received: &[u8]) -> Result<Option<Extent>, ConnectionError> {
+fn extent(received: &[u8]) -> Result<Option<BodyExtent>, ConnectionError> {
     let Some(end) = received.windows(4).position(|four| four == b"\r\n\r\n") else { return Ok(None) };
     let head = String::from_utf8_lossy(&received[..end]);
     let mut lines = head.split("\r\n");
@@ -110,7 +110,7 @@ fn extent(received: &[u8]) -> Result<Option<Extent>, ConnectionError> {
         name.eq_ignore_ascii_case("content-length").then(|| value.trim().parse::<usize>().ok())?
     });
     match (status, length) {
-        (Some(status), Some(length)) => Ok(Some(Extent { status, head: end + 4, end: end + 4 + length })),
+        (Some(status), Some(length)) => Ok(Some(BodyExtent { status, head: end + 4, end: end + 4 + length })),
         _ => Err(ConnectionError::Unreadable { head: head.into_owned() }),
     }
 }

@@ -7,14 +7,14 @@ use serde::Serialize;
 use super::load::Load;
 
 #[derive(Debug, Default, Serialize)]
-pub struct Report {
-    figures: Vec<Figure>,
+pub struct LoadReport {
+    figures: Vec<LoadFigure>,
     notes: Vec<String>,
 }
 
 /// One line of the table.
 #[derive(Debug, Serialize)]
-struct Figure {
+struct LoadFigure {
     what: String,
     /// Rate per second.
     rate: Option<f64>,
@@ -23,22 +23,22 @@ struct Figure {
     max_ms: Option<f64>,
     /// Microseconds of the service's processors per operation.
     processor_us: Option<f64>,
-    bounds: Vec<Bound>,
+    bounds: Vec<LoadBound>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct Bound {
+pub struct LoadBound {
     rule: String,
     met: bool,
 }
 
-impl Bound {
+impl LoadBound {
     pub fn at_least(value: f64, bound: f64, unit: &str) -> Self {
-        Bound { rule: format!("at least {bound} {unit}"), met: value >= bound }
+        LoadBound { rule: format!("at least {bound} {unit}"), met: value >= bound }
     }
 
     pub fn below(value: f64, bound: f64, unit: &str) -> Self {
-        Bound { rule: format!("below {bound} {unit}"), met: value < bound }
+        LoadBound { rule: format!("below {bound} {unit}"), met: value < bound }
     }
 }
 
@@ -49,12 +49,12 @@ pub struct Must {
     pub p99_ms: Option<f64>,
 }
 
-impl Report {
+impl LoadReport {
     pub fn load(&mut self, what: impl Into<String>, load: &Load, must: Must) {
         let [p50, p99, max] = load.latency([0.5, 0.99, 1.0]);
-        let rate = must.rate.map(|bound| Bound::at_least(load.rate(), bound, "a second"));
-        let latency = must.p99_ms.map(|bound| Bound::below(p99, bound, "ms p99"));
-        self.figures.push(Figure {
+        let rate = must.rate.map(|bound| LoadBound::at_least(load.rate(), bound, "a second"));
+        let latency = must.p99_ms.map(|bound| LoadBound::below(p99, bound, "ms p99"));
+        self.figures.push(LoadFigure {
             what: what.into(),
             rate: Some(load.rate()),
             p50_ms: Some(p50),
@@ -71,7 +71,7 @@ impl Report {
     }
 
     /// Adds a figure whose text its bound refers to.
-    pub fn bounded(&mut self, what: impl Into<String>, bound: Bound) {
+    pub fn bounded(&mut self, what: impl Into<String>, bound: LoadBound) {
         self.line(what, None, vec![bound]);
     }
 
@@ -79,13 +79,13 @@ impl Report {
         self.notes.push(note.into());
     }
 
-    fn line(&mut self, what: impl Into<String>, rate: Option<f64>, bounds: Vec<Bound>) {
+    fn line(&mut self, what: impl Into<String>, rate: Option<f64>, bounds: Vec<LoadBound>) {
         let (p50_ms, p99_ms, max_ms, processor_us) = (None, None, None, None);
-        self.figures.push(Figure { what: what.into(), rate, p50_ms, p99_ms, max_ms, processor_us, bounds });
+        self.figures.push(LoadFigure { what: what.into(), rate, p50_ms, p99_ms, max_ms, processor_us, bounds });
     }
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for LoadReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{:<56}{:>10}", "", "a second")?;
         ["p50 ms", "p99 ms", "max ms", "CPU us"].iter().try_for_each(|title| write!(out, "{title:>9}"))?;
@@ -97,7 +97,7 @@ impl fmt::Display for Report {
                 write!(out, "{:>9}", number(milliseconds, 2))?;
             }
             write!(out, "{:>9}", number(figure.processor_us, 0))?;
-            let met = |bound: &Bound| format!("{}: {}", bound.rule, if bound.met { "met" } else { "NOT MET" });
+            let met = |bound: &LoadBound| format!("{}: {}", bound.rule, if bound.met { "met" } else { "NOT MET" });
             let bounds: Vec<String> = figure.bounds.iter().map(met).collect();
             writeln!(out, "  {}", bounds.join("; "))?;
         }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use futures_util::future::{join_all, try_join_all};
 
-use super::connection::{Connection, ConnectionError};
+use super::connection::{ConnectionError, LoadConnection};
 use super::server::Server;
 
 /// Milliseconds from the first byte sent to the last received, one per request.
@@ -80,7 +80,7 @@ pub async fn saturate<R: Iterator<Item = Vec<u8>>>(
     clients: usize,
     requests: impl Fn(usize) -> R,
 ) -> Result<Load, ConnectionError> {
-    let connecting = addresses.iter().cycle().take(clients).map(|&address| Connection::open(address));
+    let connecting = addresses.iter().cycle().take(clients).map(|&address| LoadConnection::open(address));
     let mut connections = try_join_all(connecting).await?;
     let started = Instant::now();
     let clients = connections.iter_mut().zip(0..).map(|(connection, client)| one_by_one(connection, requests(client)));
@@ -89,7 +89,7 @@ pub async fn saturate<R: Iterator<Item = Vec<u8>>>(
 }
 
 async fn one_by_one(
-    connection: &mut Connection,
+    connection: &mut LoadConnection,
     requests: impl Iterator<Item = Vec<u8>>,
 ) -> Result<Vec<f64>, ConnectionError> {
     let mut milliseconds = Vec::new();
@@ -99,7 +99,7 @@ async fn one_by_one(
     Ok(milliseconds)
 }
 
-async fn timed(connection: &mut Connection, request: &[u8]) -> Result<f64, ConnectionError> {
+async fn timed(connection: &mut LoadConnection, request: &[u8]) -> Result<f64, ConnectionError> {
     let sent = Instant::now();
     connection.exchange(request).await?;
     Ok(1e3 * sent.elapsed().as_secs_f64())
@@ -115,7 +115,7 @@ pub async fn paced(
     time: Duration,
     request: impl Fn(usize) -> Vec<u8>,
 ) -> Result<Load, ConnectionError> {
-    let mut connections = try_join_all((0..PACED).map(|_| Connection::open(address))).await?;
+    let mut connections = try_join_all((0..PACED).map(|_| LoadConnection::open(address))).await?;
     let between = Duration::from_secs_f64(1.0 / rate);
     let rounds = (time.as_secs_f64() * rate / f64::from(PACED)).ceil() as u32;
     let started = Instant::now();
@@ -139,7 +139,7 @@ pub async fn bodies(
     clients: usize,
     requests: &[Vec<u8>],
 ) -> Result<Vec<Vec<u8>>, ConnectionError> {
-    let mut connections = try_join_all((0..clients).map(|_| Connection::open(address))).await?;
+    let mut connections = try_join_all((0..clients).map(|_| LoadConnection::open(address))).await?;
     let parts = requests.chunks(requests.len().div_ceil(clients).max(1));
     let clients = connections.iter_mut().zip(parts).map(|(connection, part)| async move {
         let mut answers = Vec::with_capacity(part.len());

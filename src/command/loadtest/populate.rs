@@ -9,12 +9,12 @@ use ballast::control::progress::Watch;
 use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::service::error::ServiceError;
-use ballast::service::plan::Plan;
+use ballast::service::plan::SessionPlan;
 use ballast::store::{CreateSession, Relabel, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
 
-use super::connection::{Connection, get, post};
+use super::connection::{LoadConnection, get, post};
 use super::load::bodies;
 use super::server::Server;
 use super::{LoadTest, tell};
@@ -51,7 +51,7 @@ impl World {
         let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
         let trained = pool.install(|| training.run(&watch))?;
         let import = post("/policies/import", &String::from_utf8(trained.to_json()?)?);
-        let imported = Connection::open(server.addresses[0]).await?.exchange(&import).await?.to_vec();
+        let imported = LoadConnection::open(server.addresses[0]).await?.exchange(&import).await?.to_vec();
         let policy = text(&serde_json::from_slice(&imported)?, "policy")?;
         let specification = trained.specification().clone();
         Ok(World { policy, horizon, specification, returns: paper::history(RETURNS, 2) })
@@ -116,7 +116,7 @@ impl World {
             initial_holding: 0.0,
             initial_history: problem.history.clone(),
             horizon: self.horizon,
-            plan_json: Plan::once(problem).json()?,
+            plan_json: SessionPlan::once(problem).json()?,
             due: None,
             assets: 0,
             created_ms: 0,

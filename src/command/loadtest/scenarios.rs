@@ -5,7 +5,7 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use super::connection::get;
-use super::figures::{Bound, Must, Report};
+use super::figures::{LoadBound, LoadReport, Must};
 use super::load::{Load, paced, saturate};
 use super::populate::{World, long_training, periods};
 use super::server::Server;
@@ -25,7 +25,7 @@ const LOW_RATE: f64 = 200.0;
 /// Number of turns that two loads take in one comparison.
 const TURNS: u32 = 6;
 
-pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut LoadReport) -> Result<(), Box<dyn Error>> {
     let time = Duration::from_secs_f64(arguments.seconds);
     if let Some(folder) = server.folder() {
         tell("syncing the disk");
@@ -89,7 +89,7 @@ impl Test<'_> {
         Ok(load.asking(sessions.len() * periods.clone().count()))
     }
 
-    async fn observe(&self, server: &Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+    async fn observe(&self, server: &Server, report: &mut LoadReport) -> Result<(), Box<dyn Error>> {
         let (count, horizon, batch) = (self.arguments.sessions, self.world.horizon, self.arguments.batch.into());
         let (mut load, mut growth) = (Load::default(), Growth::default());
         for _ in 0..self.arguments.rounds {
@@ -112,7 +112,12 @@ impl Test<'_> {
         Ok(())
     }
 
-    async fn actions(&self, server: &Server, report: &mut Report, sessions: &[String]) -> Result<(), Box<dyn Error>> {
+    async fn actions(
+        &self,
+        server: &Server,
+        report: &mut LoadReport,
+        sessions: &[String],
+    ) -> Result<(), Box<dyn Error>> {
         if self.arguments.runs(Scenario::ActionVsLivez) {
             self.against_livez(server, report, sessions).await?;
         }
@@ -143,7 +148,7 @@ impl Test<'_> {
     async fn against_livez(
         &self,
         server: &Server,
-        report: &mut Report,
+        report: &mut LoadReport,
         sessions: &[String],
     ) -> Result<(), Box<dyn Error>> {
         tell("asking for advice and for life, in turns");
@@ -163,7 +168,7 @@ impl Test<'_> {
         let share = asked.rate() / livez.rate();
         report.bounded(
             format!("action-vs-livez: {share:.2} of its rate"),
-            Bound::at_least(share, SHARE_OF_LIVEZ, "of /livez"),
+            LoadBound::at_least(share, SHARE_OF_LIVEZ, "of /livez"),
         );
         Ok(())
     }
@@ -173,7 +178,7 @@ impl Test<'_> {
         requests.take_while(move |_| Instant::now() < end)
     }
 
-    async fn many(&self, server: &mut Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+    async fn many(&self, server: &mut Server, report: &mut LoadReport) -> Result<(), Box<dyn Error>> {
         let count = self.arguments.live_sessions;
         let mut sessions = Vec::new();
         let world = &self.world;
@@ -189,7 +194,7 @@ impl Test<'_> {
         };
         report.note(format!("the {count} sessions were written through the library's store, not over HTTP"));
         let seconds = ready.as_secs_f64();
-        let start = Bound::below(seconds, START_SECONDS, "s");
+        let start = LoadBound::below(seconds, START_SECONDS, "s");
         report.bounded(format!("sessions-100k: {seconds:.2} s from start to ready"), start);
         tell(&format!("{count} sessions observe and are advised"));
         let observed = self.observed(server, &sessions, 1..=1, 1).await?;
@@ -202,7 +207,7 @@ impl Test<'_> {
         let must = Must { p99_ms: Some(IDLE_P99_MS), ..Must::default() };
         report.load("sessions-100k: action-idle", &load, must);
         if let Some(memory) = server.peak_memory_mb() {
-            let bound = Bound::below(memory, MEMORY_MB, "MB");
+            let bound = LoadBound::below(memory, MEMORY_MB, "MB");
             report.bounded(format!("sessions-100k: {memory:.0} MB resident at most"), bound);
         }
         Ok(())

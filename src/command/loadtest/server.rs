@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use thiserror::Error;
 
-use super::connection::{Connection, get};
+use super::connection::{LoadConnection, get};
 use super::tunnel::{self, TunnelError};
 use crate::command::host::{DataFolder, HostError};
 
@@ -162,7 +162,7 @@ impl Server {
 }
 
 async fn is_ready(address: SocketAddr) -> bool {
-    let Ok(mut connection) = Connection::open(address).await else { return false };
+    let Ok(mut connection) = LoadConnection::open(address).await else { return false };
     connection.exchange(&get("/readyz")).await.is_ok()
 }
 

@@ -5,7 +5,7 @@ use std::error::Error;
 use sqlx::postgres::PgConnection;
 use sqlx::{AssertSqlSafe, Connection};
 
-use super::figures::Report;
+use super::figures::LoadReport;
 use super::server::Server;
 
 /// Growth of the store by sessions and by observations.
@@ -51,7 +51,7 @@ impl Growth {
     }
 
     /// Reports the bytes per session and per observation, if the store is known.
-    pub fn tell(&self, sessions: usize, observations: usize, report: &mut Report) {
+    pub fn tell(&self, sessions: usize, observations: usize, report: &mut LoadReport) {
         if self.last > 0 {
             let [session, observation] = [(self.sessions, sessions), (self.observations, observations)]
                 .map(|(bytes, count)| bytes as f64 / count.max(1) as f64);

@@ -8,7 +8,7 @@ use ballast::numerics::digits::fixed;
 use ballast::numerics::summary::Estimate;
 use serde::Serialize;
 
-use super::Plan;
+use super::ReproductionPlan;
 use super::printed::{LOW_QUANTILE, MEAN_QUANTILE, QUANTILES, TABLES};
 use super::runs::{CLOSENESS, Quantiles, Section, Slope, Study};
 
@@ -102,7 +102,7 @@ fn shown(estimate: Estimate) -> String {
 }
 
 /// Returns every statement, in the order of the paper; none if the run is too small for a verdict.
-pub fn all(section: &Section, study: &Study, plan: &Plan) -> Vec<Finding> {
+pub fn all(section: &Section, study: &Study, plan: &ReproductionPlan) -> Vec<Finding> {
     let mut findings = compared(section, study);
     if !plan.decides() {
         findings.iter_mut().for_each(|finding| finding.verdict = Verdict::Undecided);

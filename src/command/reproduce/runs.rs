@@ -5,7 +5,7 @@ use std::error::Error;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::evaluation::paths::{Evaluation, Follower};
 use ballast::control::evaluation::report::EvaluationReport;
-use ballast::control::kept::Kept;
+use ballast::control::kept::Cache;
 use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::problem::utility::utility;
@@ -20,7 +20,7 @@ use rand::RngExt;
 use serde::Serialize;
 use serde_json::json;
 
-use super::Plan;
+use super::ReproductionPlan;
 use super::printed::{QUANTILES, TABLES};
 use crate::command::bench::paper;
 use crate::command::compare::Workshop;
@@ -65,7 +65,11 @@ pub struct Section {
 }
 
 /// Returns the request of the paper's problem, for drawn histories of `sample_size` returns.
-pub fn request(plan: &Plan, sample_size: usize, frameworks: &[Framework]) -> Result<EvaluationRequest, Box<dyn Error>> {
+pub fn request(
+    plan: &ReproductionPlan,
+    sample_size: usize,
+    frameworks: &[Framework],
+) -> Result<EvaluationRequest, Box<dyn Error>> {
     let mut request = json!({
         "problem": paper::problem(sample_size, plan.horizon),
         "design": { "sampling_law": paper::mixture(), "count": plan.count },
@@ -76,7 +80,7 @@ pub fn request(plan: &Plan, sample_size: usize, frameworks: &[Framework]) -> Res
     Ok(serde_json::from_value(request)?)
 }
 
-pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Error>> {
+pub fn section(plan: &ReproductionPlan, workshop: &Workshop) -> Result<Section, Box<dyn Error>> {
     let request = request(plan, SAMPLE_SIZE, &[Framework::Adaptive, Framework::KnownLaw, Framework::Static])?;
     let evaluation = Evaluation::new(request.clone())?;
     let (quantiles, close) =
@@ -94,14 +98,14 @@ pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Erro
 
 /// Draws histories until each table has enough of its own or the limit is reached. Returns the quantiles of all, and
 /// the histories.
-fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
+fn seek(plan: &ReproductionPlan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
     let specification = request.specification(Framework::Adaptive, None);
     let sets = Problem::new(&specification).sets;
     let law = continuous_law(&paper::mixture(), &request.problem);
     // A history belongs to a table by the bridges of its policy. For the law of Q each group of histories has its own
     // bridges, and is the unit of the intervals.
-    let kept = Kept::default();
+    let kept = Cache::default();
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
@@ -137,7 +141,7 @@ fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2])
 }
 
 fn case(
-    plan: &Plan,
+    plan: &ReproductionPlan,
     workshop: &Workshop,
     request: &EvaluationRequest,
     followers: &[Follower],
@@ -184,7 +188,7 @@ pub struct Slope {
     pub last: Estimate,
 }
 
-pub fn study(plan: &Plan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> {
+pub fn study(plan: &ReproductionPlan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> {
     let mut rows = Vec::new();
     for &sample_size in &plan.study_sizes {
         rows.extend(study_size(plan, workshop, sample_size)?);
@@ -222,7 +226,11 @@ fn last_slope(gaps: &[(f64, Estimate)]) -> Estimate {
     Estimate { value, low: value - reach, high: value + reach }
 }
 
-fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Vec<StudyRow>, Box<dyn Error>> {
+fn study_size(
+    plan: &ReproductionPlan,
+    workshop: &Workshop,
+    sample_size: usize,
+) -> Result<Vec<StudyRow>, Box<dyn Error>> {
     let sized = |frameworks: &[Framework], count: usize| -> Result<EvaluationReport, Box<dyn Error>> {
         let mut request = request(plan, sample_size, frameworks)?;
         request.design.count = Some(count);

@@ -14,7 +14,7 @@ use crate::control::request::caution::{CautionLevel, CautionLevels};
 use crate::control::request::fund::CompositionRule;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
-use crate::control::request::support::{Extent, Support};
+use crate::control::request::support::{LawExtent, Support};
 use crate::numerics::fund_bridges::FundBridges;
 
 /// Paths of the joint factor: its relative standard error is then a hundredth.
@@ -47,7 +47,7 @@ pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f6
 /// Returns the log-return of each asset below which no move goes.
 pub fn floors(support: Support, rows: &[Vec<f64>]) -> Vec<f64> {
     let of = |asset: usize| {
-        let extent = || Extent::of(rows.iter().map(|row| row[asset]));
+        let extent = || LawExtent::of(rows.iter().map(|row| row[asset]));
         support.around(extent).map_or(f64::NEG_INFINITY, |support| support.min)
     };
     (0..rows.first().map_or(0, Vec::len)).map(of).collect()

@@ -10,7 +10,7 @@
 use super::AssetsStep;
 use crate::control::problem::utility::RelativeUtility;
 use crate::numerics::interruption;
-use crate::numerics::levelling::{Levelling, Phase};
+use crate::numerics::levelling::{FillingPhase, Levelling};
 
 /// Largest number of Newton steps for a local minimum; they approach it from one side, and double the digits from about
 /// the third on.
@@ -179,7 +179,7 @@ struct Inside {
 /// and allocation, and U and U' there if they are known. `slope` is U' if nothing is moved. Returns false if there is
 /// no minimum because the payoff falls without bound.
 fn local_minima(
-    phases: &[Phase],
+    phases: &[FillingPhase],
     utility: RelativeUtility,
     price: f64,
     mut slope: f64,
@@ -189,7 +189,7 @@ fn local_minima(
     // The loss per unit of distance just before a phase starts; the first one starts at the atom itself.
     let mut before = None;
     for phase in phases.iter().rev() {
-        let &Phase { fixed, speed, rate, high, low } = phase;
+        let &FillingPhase { fixed, speed, rate, high, low } = phase;
         let start = slope * speed * high / rate;
         if before.is_some_and(|before| before > price && start <= price) {
             found(high, false, None);
@@ -227,8 +227,8 @@ fn local_minima(
 
 /// Returns the y below `peak` at which `U'(b + y) y / rate` is the price. Newton's method in ln y runs from the left on
 /// the logarithms, whose difference is concave there.
-fn inside(phase: &Phase, utility: RelativeUtility, price: f64, peak: f64) -> f64 {
-    let &Phase { fixed, speed, rate, low, .. } = phase;
+fn inside(phase: &FillingPhase, utility: RelativeUtility, price: f64, peak: f64) -> f64 {
+    let &FillingPhase { fixed, speed, rate, low, .. } = phase;
     let target = price * rate;
     let mut moving = if matches!(utility, RelativeUtility::Log) {
         // y / (b + y) = target.

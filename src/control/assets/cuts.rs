@@ -258,7 +258,7 @@ mod tests {
     use crate::control::assets::AssetsLaw;
     use crate::control::problem::actions::ActionInterval;
     use crate::control::problem::utility::RelativeUtility;
-    use crate::numerics::levelling::{Ground, inverse_volatility};
+    use crate::numerics::levelling::{GroundMetric, inverse_volatility};
     use crate::numerics::streams::stream;
 
     /// Compares with branches found anew at each point, and with differences of the move's own payoffs.
@@ -270,7 +270,8 @@ mod tests {
         for case in 0..60 {
             let returns: Vec<Vec<f64>> =
                 (0..20).map(|_| (0..ASSETS).map(|_| 0.3 * random.random::<f64>() - 0.14).collect()).collect();
-            let ground = if case % 2 == 0 { Ground::Sup } else { Ground::Weighted(inverse_volatility(&returns)) };
+            let ground =
+                if case % 2 == 0 { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(&returns)) };
             let utility =
                 [RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }]
                     [case % 3];

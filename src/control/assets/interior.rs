@@ -58,13 +58,13 @@ const LEAST_ROOM: f64 = 1e-6;
 
 /// `offset + direction . (a, gamma) >= 0`, with its multiplier.
 #[derive(Debug, Clone)]
-pub(super) struct Bound {
+pub(super) struct BarrierConstraint {
     pub direction: Vec<f64>,
     offset: f64,
     pub multiplier: f64,
 }
 
-impl Bound {
+impl BarrierConstraint {
     pub fn slack(&self, point: &[f64]) -> f64 {
         self.offset + dot(&self.direction, point)
     }
@@ -80,7 +80,7 @@ pub(super) struct Interior<'a> {
     pub entering: Vec<usize>,
     /// The shares, then the price gamma, then the trade in each asset if trading costs.
     pub point: Vec<f64>,
-    pub bounds: Vec<Bound>,
+    pub bounds: Vec<BarrierConstraint>,
     /// Barrier of a bound, over that of all atoms.
     pub bound_weight: f64,
     pub barrier: f64,
@@ -159,8 +159,10 @@ impl<'a> Interior<'a> {
                 lines.push((line, -sign * held));
             }
         }
-        let bounds =
-            lines.into_iter().map(|(direction, offset)| Bound { direction, offset, multiplier: 0.0 }).collect();
+        let bounds = lines
+            .into_iter()
+            .map(|(direction, offset)| BarrierConstraint { direction, offset, multiplier: 0.0 })
+            .collect();
         let mut interior = Interior {
             step,
             whole,

@@ -3,7 +3,7 @@
 //!   max_a  min_F { E_F[ U(w(a, Z)) ] : W1(F, F^) <= radius },   w = (1 - sum a_i)(1 + r) + sum a_i e^(z_i),
 //!
 //! a_i >= 0 are the shares of wealth, with a sum in an interval. The ground cost of W1 is the largest |dz_i|
-//! (`Ground::Sup`) or `sum k_i |dz_i|` (`Ground::Weighted`). No move up helps the adversary, so an atom that is moved
+//! (`GroundMetric::Sup`) or `sum k_i |dz_i|` (`GroundMetric::Weighted`). No move up helps the adversary, so an atom that is moved
 //! by D moves along its water-filling path (`numerics/levelling.rs`). With the price gamma of distance
 //!
 //!   the step  =  max_(a, gamma >= 0)  sum_j p_j min_D [ U(w_j(D; a)) + gamma D ]  -  gamma radius,
@@ -15,7 +15,7 @@
 //!   the step  <=  E_F[ U(w(a, Z)) ] + max_v (v - a) . E_F[ U'(w(a, Z)) (e^Z / (1 + r) - 1) ].
 //!
 //! `value` reports the first and `bound` the second, both in log certainty equivalent over the bank. They hold however
-//! the search found them. Under `Ground::Sup` without a floor the step is that of one asset whose log-return is
+//! the search found them. Under `GroundMetric::Sup` without a floor the step is that of one asset whose log-return is
 //! `ln(sum theta_i e^(z_i))`, theta = a / sum a. Source of the ball: paper (2.5); of the reduction, the water filling.
 
 pub mod advice;
@@ -36,7 +36,7 @@ use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::MOST_ASSETS;
-use crate::numerics::levelling::Ground;
+use crate::numerics::levelling::GroundMetric;
 
 /// Gap between the bounds at which a search ends, in relative utility.
 const TOLERANCE: f64 = 1e-8;
@@ -61,7 +61,7 @@ pub struct AssetsStep {
     masses: Vec<f64>,
     /// The growth over the bank of each asset below which no move goes; 0 without a floor.
     least_growths: Vec<f64>,
-    ground: Ground,
+    ground: GroundMetric,
     radius: f64,
     utility: RelativeUtility,
     total: ActionInterval,
@@ -108,7 +108,7 @@ impl AssetsStep {
     /// `total`. `utility` is relative to the wealth that the bank makes.
     pub fn new(
         law: AssetsLaw<'_>,
-        ground: Ground,
+        ground: GroundMetric,
         utility: RelativeUtility,
         rate_per_step: f64,
         total: ActionInterval,
@@ -149,7 +149,7 @@ impl AssetsStep {
     }
 
     /// Returns the assets that a search begins with: those held or in the warm start; if there are none, the one of
-    /// highest mean under `Ground::Sup`, and otherwise all.
+    /// highest mean under `GroundMetric::Sup`, and otherwise all.
     fn first_held(&self, near: Option<&AssetsSolution>) -> Vec<usize> {
         let counts =
             |asset: usize| self.trading.holding(asset) > 0.0 || near.is_some_and(|near| near.allocation[asset] > 0.0);
@@ -239,8 +239,8 @@ impl AssetsStep {
             masses: self.masses.clone(),
             trading: self.trading.among(held),
             ground: match &self.ground {
-                Ground::Sup => Ground::Sup,
-                Ground::Weighted(weights) => Ground::Weighted(of(weights)),
+                GroundMetric::Sup => GroundMetric::Sup,
+                GroundMetric::Weighted(weights) => GroundMetric::Weighted(of(weights)),
             },
             ..*self
         }

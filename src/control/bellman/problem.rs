@@ -5,14 +5,14 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use crate::control::error::FieldError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
-use crate::control::request::support::{Extent, Support};
+use crate::control::request::support::{LawExtent, Support};
 use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
@@ -53,11 +53,11 @@ struct Frozen {
 impl Problem {
     /// Builds the problem of a completed specification.
     pub fn new(specification: &Specification) -> Self {
-        Problem::with(specification, Kept::default())
+        Problem::with(specification, Cache::default())
     }
 
     /// Builds the problem with `kept` as the cache of recomputable results.
-    pub fn with(specification: &Specification, kept: Kept) -> Self {
+    pub fn with(specification: &Specification, kept: Cache) -> Self {
         let sets = RadiusEstimator::new(specification, kept);
         let selection = FeatureSelection::new(specification, sets.varies());
         let periods = Dynamics::of(&specification.problem);
@@ -280,17 +280,17 @@ impl Problem {
     }
 
     /// Returns the least return to which a seen return may be moved.
-    fn lowest_return(&self, law: impl FnOnce() -> Extent) -> f64 {
+    fn lowest_return(&self, law: impl FnOnce() -> LawExtent) -> f64 {
         self.specification.problem.support_rule().around(law).map_or(f64::NEG_INFINITY, |support| support.min)
     }
 }
 
 /// Returns the extent of a law of these moments, including one more return if there is one.
-fn extent(law: &EmpiricalDistribution, moments: CentralMoments, added: Option<f64>) -> Extent {
+fn extent(law: &EmpiricalDistribution, moments: CentralMoments, added: Option<f64>) -> LawExtent {
     let atoms = law.atoms();
     let seen = [atoms.first(), atoms.last()].map(|end| end.copied().or(added).unwrap_or_default());
     let ends = added.map_or(seen, |z| [seen[0].min(z), seen[1].max(z)]);
-    Extent { ends, mean: moments.mean(), variance: moments.variance() }
+    LawExtent { ends, mean: moments.mean(), variance: moments.variance() }
 }
 
 /// Returns the floor gain from `step` of the highest allocation if every period earns `best_return`:

@@ -40,7 +40,7 @@ pub struct AllocationCurve {
 
 /// An investor over one period with no holdings before.
 #[derive(Debug, Clone, Copy)]
-pub struct Investor {
+pub struct OnePeriodInvestor {
     /// 1 + r.
     pub bank: f64,
     /// Utility of wealth over the bank's.
@@ -61,12 +61,12 @@ struct Sums<'a> {
     utilities: Vec<f64>,
     lowest: f64,
     allocation: f64,
-    investor: Investor,
+    investor: OnePeriodInvestor,
 }
 
 impl AllocationCurve {
     /// Computes the curve of a law. Cost: 24 allocations times its atoms.
-    pub fn of(centre: &Centre, investor: Investor) -> Self {
+    pub fn of(centre: &Centre, investor: OnePeriodInvestor) -> Self {
         let growths: Vec<f64> = centre.atoms.iter().map(|z| z.exp() / investor.bank).collect();
         let lowest = investor.support.around(|| centre.extent()).map_or(-LIMIT, |support| support.min);
         let (mut allocations, mut radii): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
@@ -112,7 +112,7 @@ impl AllocationCurve {
 }
 
 impl<'a> Sums<'a> {
-    fn new(centre: &'a Centre, growths: &[f64], lowest: f64, allocation: f64, investor: Investor) -> Self {
+    fn new(centre: &'a Centre, growths: &[f64], lowest: f64, allocation: f64, investor: OnePeriodInvestor) -> Self {
         let count = centre.atoms.len();
         let [mut mass, mut moment, mut slopes, mut utilities] = [(); 4].map(|()| Vec::with_capacity(count + 1));
         let (mut total, mut first, mut slope) = (0.0, 0.0, 0.0);

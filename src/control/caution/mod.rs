@@ -19,9 +19,9 @@ mod curve;
 
 use sha2::{Digest, Sha256};
 
-pub use self::curve::{AllocationCurve, Investor};
+pub use self::curve::{AllocationCurve, OnePeriodInvestor};
 use crate::control::bellman::problem::Problem;
-use crate::control::kept::{Kept, Key};
+use crate::control::kept::{Cache, Key};
 use crate::control::pool;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::annualised::premium;
@@ -58,7 +58,7 @@ impl Specification {
     /// its levels if its caution is one of them. Cost: that of [`RadiusEstimator::found_correction`], 600 radii and
     /// 43,200 sums over the returns, fewer for long records: 0.25 s at 240 returns.
     #[must_use]
-    pub fn resolved(mut self, kept: &Kept) -> Self {
+    pub fn resolved(mut self, kept: &Cache) -> Self {
         // Earlier results are computed again, by the whole radius.
         self.problem.levels = None;
         let found = RadiusEstimator::new(&self, kept.clone()).found_correction();
@@ -71,7 +71,7 @@ impl Specification {
     }
 
     /// Returns the levels of a completed specification that has levels, from `kept` if they are cached there.
-    pub fn levels(&self, kept: &Kept) -> CautionLevels {
+    pub fn levels(&self, kept: &Cache) -> CautionLevels {
         let base = ProblemSpecification {
             horizon: 1,
             caution: Some(CautionLevel::Paper),
@@ -90,7 +90,7 @@ impl Specification {
         kept.get_or_make(&key, size_of::<CautionLevels>(), || found).as_ref().clone()
     }
 
-    fn found(&self, kept: &Kept) -> CautionLevels {
+    fn found(&self, kept: &Cache) -> CautionLevels {
         let history = record(&self.problem.history, &self.problem);
         let problem = Problem::with(self, kept.clone());
         let worlds = Worlds::of(&history, &self.problem);
@@ -106,14 +106,14 @@ struct Worlds {
     premiums: [f64; 3],
     /// Shifts of the log-returns.
     shifts: [f64; 3],
-    investor: Investor,
+    investor: OnePeriodInvestor,
 }
 
 /// Mean loss in one world at every share of the radius.
 type Losses = Vec<f64>;
 
 /// Losses in the three worlds, over all records and with each of [`GROUPS`] groups left out.
-struct Simulated {
+struct SimulatedLosses {
     all: [Losses; 3],
     without: Vec<[Losses; 3]>,
 }
@@ -128,7 +128,7 @@ impl Worlds {
             standard_error,
             premiums,
             shifts: premiums.map(|premium| ((bank + premium) / (bank + premium_seen)).ln()),
-            investor: Investor {
+            investor: OnePeriodInvestor {
                 bank,
                 utility: RelativeUtility::new(problem.utility, problem.initial_wealth * bank),
                 highest: problem.action_interval[1],
@@ -137,7 +137,7 @@ impl Worlds {
         }
     }
 
-    fn losses(&self, problem: &Problem, history: &[f64], seed: u64) -> Simulated {
+    fn losses(&self, problem: &Problem, history: &[f64], seed: u64) -> SimulatedLosses {
         let count = (RETURNS / history.len()).clamp(LEAST_RECORDS, RECORDS);
         let learning = problem.specification.problem.learning;
         let draw = |index: usize| {
@@ -178,10 +178,10 @@ impl Worlds {
             let sum = |world: usize, scale: usize| kept().map(|(_, losses)| losses[world][scale]).sum::<f64>();
             std::array::from_fn(|world| (0..=SCALES).map(|scale| sum(world, scale) / counted).collect())
         };
-        Simulated { all: mean(None), without: (0..GROUPS).map(|group| mean(Some(group))).collect() }
+        SimulatedLosses { all: mean(None), without: (0..GROUPS).map(|group| mean(Some(group))).collect() }
     }
 
-    fn levels(&self, simulated: &Simulated) -> CautionLevels {
+    fn levels(&self, simulated: &SimulatedLosses) -> CautionLevels {
         let regrets = Regrets::of(&simulated.all);
         let without: Vec<Regrets> = simulated.without.iter().map(Regrets::of).collect();
         let priced = |scale: usize, standard_error: f64| CautionScale {
@@ -247,8 +247,8 @@ struct Worth {
 }
 
 impl Worth {
-    fn of(history: &[f64], shift: f64, investor: Investor) -> Self {
-        let Investor { bank, utility, highest, .. } = investor;
+    fn of(history: &[f64], shift: f64, investor: OnePeriodInvestor) -> Self {
+        let OnePeriodInvestor { bank, utility, highest, .. } = investor;
         let growths: Vec<f64> = history.iter().map(|z| (z + shift).exp() / bank).collect();
         let worth = |part: usize| {
             let allocation = highest * part as f64 / WORTHS as f64;

@@ -1,6 +1,6 @@
 //! Wealth accounts of strategies, and the figures computed from them.
 
-use crate::control::evaluation::rolling::Period;
+use crate::control::evaluation::rolling::ActualPeriod;
 use crate::control::problem::actions::Band;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::annualised::compounded;
@@ -19,7 +19,12 @@ pub struct Account {
 /// Computes the account of a strategy. At the start of a period the holding, which the last return moved, is brought
 /// into the strategy's band. A trade costs `cost` of the amount traded, paid at once ([`Dynamics`]). Wealth starts in
 /// the bank, and the interest rate is the rate that the bank paid.
-pub fn keep(bands: impl IntoIterator<Item = Band>, periods: &[Period], cost: f64, initial_wealth: f64) -> Account {
+pub fn keep(
+    bands: impl IntoIterator<Item = Band>,
+    periods: &[ActualPeriod],
+    cost: f64,
+    initial_wealth: f64,
+) -> Account {
     let (mut wealth, mut traded) = (vec![initial_wealth], Vec::with_capacity(periods.len()));
     let (mut allocations, mut now, mut holding) = (Vec::with_capacity(periods.len()), initial_wealth, 0.0);
     for (band, period) in bands.into_iter().zip(periods) {
@@ -108,7 +113,7 @@ pub fn uncounted_periods(periods: usize, year: usize) -> usize {
 
 /// Terminal wealth of a strategy on a path, and its largest fall on the way.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ended {
+pub struct PathOutcome {
     /// Terminal wealth.
     pub wealth: f64,
     /// The largest fall below the highest value so far, as a share of it. Contributions and withdrawals are neither
@@ -118,28 +123,28 @@ pub struct Ended {
     level: f64,
 }
 
-impl Ended {
+impl PathOutcome {
     /// Returns the state at the start.
     pub fn at(wealth: f64) -> Self {
-        Ended { wealth, fall: 0.0, level: 1.0 }
+        PathOutcome { wealth, fall: 0.0, level: 1.0 }
     }
 
     /// Returns the state after a period that ends with `wealth`, of which `added` is a contribution.
     #[must_use]
     pub fn after(self, wealth: f64, added: f64) -> Self {
         let level = f64::min(1.0, self.level * (wealth - added) / self.wealth);
-        Ended { wealth, fall: self.fall.max(1.0 - level), level }
+        PathOutcome { wealth, fall: self.fall.max(1.0 - level), level }
     }
 }
 
 /// Returns terminal wealth and largest fall of a constant mix.
-pub fn mix_ended(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &[f64]) -> Ended {
-    let step = |(ended, holding): (Ended, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
+pub fn mix_ended(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &[f64]) -> PathOutcome {
+    let step = |(ended, holding): (PathOutcome, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
         let allocation = dynamics.highest_action(ended.wealth, mix);
         let (wealth, holding) = dynamics.next(ended.wealth, holding, allocation, log_return);
         (ended.after(wealth, dynamics.contribution), holding)
     };
-    periods.iter().zip(returns).fold((Ended::at(initial_wealth), 0.0), step).0
+    periods.iter().zip(returns).fold((PathOutcome::at(initial_wealth), 0.0), step).0
 }
 
 /// Mean, volatility and Sharpe ratio per year, from per-period returns. The mean is compounded, the ratio's excess over
@@ -189,7 +194,7 @@ mod tests {
     ///   month 3: 0.5 - 0.45/0.955 bought, then the factor 0.5 * 1.01 + 0.5 * 1.05 = 1.03
     #[test]
     fn three_months_agree_with_pencil_and_paper() {
-        let period = |simple: f64| Period { log_return: simple.ln_1p(), bank_return: 0.01 };
+        let period = |simple: f64| ActualPeriod { log_return: simple.ln_1p(), bank_return: 0.01 };
         let account = keep([Band::of(&[0.5]); 3], &[period(0.2), period(-0.1), period(0.05)], 0.01, 100.0);
         let traded = [0.5, 0.042_986_425_339_366_5, 0.028_795_811_518_324_6];
         let second = 109.9475 * (1.0 - 0.000_429_864_253_393_665) * 0.955;
@@ -221,7 +226,7 @@ mod tests {
         let returns = [0.2, -0.1, 0.05].map(f64::ln_1p);
         let rows = returns.map(|z| vec![z, z]);
         let (bank, one) = ([0.01; 3], [0.4, 0.3, 0.6]);
-        let periods = returns.map(|log_return| Period { log_return, bank_return: 0.01 });
+        let periods = returns.map(|log_return| ActualPeriod { log_return, bank_return: 0.01 });
         let expected = keep(one.map(|share| Band::of(&[share])), &periods, 0.01, 100.0);
         let held = one.map(|share| vec![0.25 * share, 0.75 * share]);
         let found = keep_assets(&held, &rows, &bank, 0.01, 100.0);
@@ -240,10 +245,13 @@ mod tests {
     #[test]
     fn what_is_added_or_withdrawn_is_neither_gain_nor_fall() {
         let course = [(130.0, 10.0), (87.5, -10.0), (105.0, 0.0), (52.5, 0.0)];
-        let ended = course.iter().fold(Ended::at(100.0), |ended, &(wealth, added)| ended.after(wealth, added));
+        let ended = course.iter().fold(PathOutcome::at(100.0), |ended, &(wealth, added)| ended.after(wealth, added));
         assert!((ended.fall - 0.55).abs() < 1e-12 && ended.wealth == 52.5, "{ended:?}");
         // With all wealth in the bank, withdrawals alone make no fall.
-        assert_eq!([(60.0, -41.0), (10.0, -50.5)].iter().fold(Ended::at(100.0), |e, &(w, a)| e.after(w, a)).fall, 0.0);
+        assert_eq!(
+            [(60.0, -41.0), (10.0, -50.5)].iter().fold(PathOutcome::at(100.0), |e, &(w, a)| e.after(w, a)).fall,
+            0.0
+        );
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use crate::control::evaluation::account::{Account, keep, uncounted_periods};
 use crate::control::evaluation::backtest_report::BacktestFigures;
 use crate::control::evaluation::names::{StrategyKind, own_mix_name};
-use crate::control::evaluation::resampling::{Resampled, Series};
-use crate::control::evaluation::rolling::{Decision, Period};
+use crate::control::evaluation::resampling::{ResampledFigures, StrategySeries};
+use crate::control::evaluation::rolling::{ActualPeriod, Decision};
 use crate::control::evaluation::yearly_worth::{
     INITIAL_WEALTH, MixBooks, Scale, YearlyWorth, at_once, present_at_once,
 };
@@ -12,7 +12,7 @@ use crate::control::problem::actions::Band;
 use crate::numerics::long_run_mean::LongRunMean;
 
 /// One strategy with its decisions and its account.
-pub struct Line {
+pub struct StrategyLine {
     /// Name of the strategy.
     pub name: String,
     /// Kind of the strategy.
@@ -33,11 +33,16 @@ pub struct Analysis {
     pub uncounted_periods: usize,
 }
 
-impl Line {
+impl StrategyLine {
     /// Computes the account that follows from the decisions; `cost` is the share of each trade that is lost.
-    pub fn new((kind, name): (StrategyKind, String), decisions: Vec<Decision>, periods: &[Period], cost: f64) -> Self {
+    pub fn new(
+        (kind, name): (StrategyKind, String),
+        decisions: Vec<Decision>,
+        periods: &[ActualPeriod],
+        cost: f64,
+    ) -> Self {
         let account = keep(decisions.iter().map(|decision| decision.band), periods, cost, INITIAL_WEALTH);
-        Line { name, kind, decisions, account }
+        StrategyLine { name, kind, decisions, account }
     }
 
     /// Returns true if the strategy was chosen with knowledge of the whole record.
@@ -46,14 +51,14 @@ impl Line {
     }
 
     /// Returns the constant mix of this line's average share, against which its timing is measured.
-    pub fn hindsight(&self, periods: &[Period], cost: f64) -> Line {
+    pub fn hindsight(&self, periods: &[ActualPeriod], cost: f64) -> StrategyLine {
         let share = self.account.mean_allocation();
-        Line::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost)
+        StrategyLine::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost)
     }
 
-    fn constant(named: (StrategyKind, String), share: f64, periods: &[Period], cost: f64) -> Line {
+    fn constant(named: (StrategyKind, String), share: f64, periods: &[ActualPeriod], cost: f64) -> StrategyLine {
         let decision = Decision { band: Band::of(&[share]), radius: 0.0, source: None };
-        Line::new(named, vec![decision; periods.len()], periods, cost)
+        StrategyLine::new(named, vec![decision; periods.len()], periods, cost)
     }
 
     /// Returns true if the line holds one share throughout, and so has no timing.
@@ -65,17 +70,18 @@ impl Line {
 
 impl Analysis {
     /// Compares the other lines with line `main`; all trade at `cost`.
-    pub fn of(lines: &[Line], main: usize, periods: &[Period], cost: f64, scale: &Scale) -> Self {
+    pub fn of(lines: &[StrategyLine], main: usize, periods: &[ActualPeriod], cost: f64, scale: &Scale) -> Self {
         let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
-        let own_mix =
-            |share: f64| Line::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost).account;
+        let own_mix = |share: f64| {
+            StrategyLine::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost).account
+        };
         let year = scale.periods_per_year;
-        let series: Vec<Series> = lines.iter().map(|line| Series::of(&line.account, year)).collect();
-        let resampled = Resampled::of(&series, &bank, scale);
+        let series: Vec<StrategySeries> = lines.iter().map(|line| StrategySeries::of(&line.account, year)).collect();
+        let resampled = ResampledFigures::of(&series, &bank, scale);
         let worths: Vec<YearlyWorth> =
             lines.iter().map(|line| YearlyWorth::new(scale.utility, &line.account.yearly_growth(year))).collect();
         let ahead: Vec<LongRunMean> = worths.iter().map(|worth| worths[main].beyond(worth)).collect();
-        let beyond = |(line, worth): (&Line, &YearlyWorth)| {
+        let beyond = |(line, worth): (&StrategyLine, &YearlyWorth)| {
             let mix = (!line.is_constant()).then(|| MixBooks::new(line.account.mean_allocation(), own_mix))?;
             Some(worth.beyond_own_mix(&line.account, &mix, scale))
         };

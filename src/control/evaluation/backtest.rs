@@ -3,9 +3,9 @@
 use jiff::civil::Date;
 
 use crate::control::error::{FieldError, TrainError};
-use crate::control::evaluation::analysis::{Analysis, Line};
+use crate::control::evaluation::analysis::{Analysis, StrategyLine};
 use crate::control::evaluation::names::{StrategyKind, at_level, mix_name};
-use crate::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
+use crate::control::evaluation::rolling::{ActualPeriod, Decision, Strategy, WalkForward};
 use crate::control::evaluation::yearly_worth::Scale;
 use crate::control::progress::Watch;
 use crate::control::request::backtest::BacktestRequest;
@@ -28,7 +28,7 @@ pub struct Backtest {
     /// Periods in a year.
     pub periods_per_year: usize,
     /// The whole record.
-    pub periods: Vec<Period>,
+    pub periods: Vec<ActualPeriod>,
     /// Strategies with their kinds and names: the adaptive ones first, in the order of their levels.
     pub strategies: Vec<((StrategyKind, String), Strategy)>,
     days: Vec<Date>,
@@ -39,7 +39,7 @@ pub struct Walked {
     /// The walk-forward that was run.
     pub backtest: Backtest,
     /// Strategies in their order, then the mix against which the timing of the main one is measured.
-    pub lines: Vec<Line>,
+    pub lines: Vec<StrategyLine>,
     /// The figures.
     pub analysis: Analysis,
 }
@@ -66,11 +66,11 @@ impl Backtest {
             seed: request.seed,
         };
         let (field, returns) = request.returns();
-        let period = |(index, &value): (usize, &f64)| Period {
+        let period = |(index, &value): (usize, &f64)| ActualPeriod {
             log_return: request.log_return(value),
             bank_return: request.rate.at(index),
         };
-        let periods: Vec<Period> = returns.iter().enumerate().map(period).collect();
+        let periods: Vec<ActualPeriod> = returns.iter().enumerate().map(period).collect();
         for stretch in 0..walk.stretches(periods.len()) {
             let start = stretch * walk.every;
             let past: Vec<f64> = periods[start..start + walk.window].iter().map(|period| period.log_return).collect();
@@ -94,7 +94,7 @@ impl Backtest {
     }
 
     /// Returns the periods that are decided, after the first window.
-    pub fn lived(&self) -> &[Period] {
+    pub fn lived(&self) -> &[ActualPeriod] {
         &self.periods[self.walk.window..]
     }
 
@@ -154,8 +154,8 @@ impl Backtest {
     pub fn walked(self, decisions: Vec<Vec<Decision>>) -> Walked {
         let (cost, main, lived) = (self.request.trading_cost, self.main_line(), self.lived());
         let names = self.strategies.iter().map(|(name, _)| name.clone());
-        let mut lines: Vec<Line> =
-            names.zip(decisions).map(|(name, decisions)| Line::new(name, decisions, lived, cost)).collect();
+        let mut lines: Vec<StrategyLine> =
+            names.zip(decisions).map(|(name, decisions)| StrategyLine::new(name, decisions, lived, cost)).collect();
         lines.push(lines[main].hindsight(lived, cost));
         let (periods_per_year, seed) = (self.periods_per_year, self.walk.seed);
         let scale = Scale { periods_per_year, utility: self.walk.utility(), seed };

@@ -15,7 +15,7 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 use crate::control::error::FieldError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::centre::CentreSpecification;
@@ -176,7 +176,7 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
     // Each group of records has its own bridges and is the unit of the intervals. If all records shared one set, all
     // radii would err alike, and no interval over records would show it.
     let groups = GROUPS.rev().find(|count| question.records.is_multiple_of(*count)).unwrap_or(question.records);
-    let kept = Kept::default();
+    let kept = Cache::default();
     let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {
         let record = prepared.record(question, index);
         // Stream: (seed, "coverage radius", n, group).

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::control::error::{FieldError, TrainError};
-use crate::control::evaluation::account::{Ended, mix_ended};
-use crate::control::kept::Kept;
+use crate::control::evaluation::account::{PathOutcome, mix_ended};
+use crate::control::kept::Cache;
 use crate::control::policy::advice::AdviceSource;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::problem::dynamics::Dynamics;
@@ -37,7 +37,7 @@ pub struct Evaluation {
     /// The log-returns that each group of paths starts from.
     pub histories: Vec<Vec<f64>>,
     law: ContinuousLaw,
-    kept: Kept,
+    kept: Cache,
 }
 
 /// One step of a framework on one path.
@@ -57,7 +57,7 @@ pub struct Lived {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Results strategy by strategy: frameworks, then constant mixes.
-    pub ended: Vec<Ended>,
+    pub ended: Vec<PathOutcome>,
     /// Steps of each framework, one framework after another.
     pub lived: Vec<Lived>,
 }
@@ -104,11 +104,11 @@ impl Evaluation {
             InitialHistories::Given => vec![request.problem.history.clone()],
             InitialHistories::Drawn { count } => (0..count).map(|index| drawn_history(&request, &law, index)).collect(),
         };
-        Ok(Evaluation { request, histories, law, kept: Kept::default() })
+        Ok(Evaluation { request, histories, law, kept: Cache::default() })
     }
 
     /// Uses the cache `kept`.
-    pub fn keeping(self, kept: Kept) -> Self {
+    pub fn keeping(self, kept: Cache) -> Self {
         Evaluation { kept, ..self }
     }
 
@@ -127,7 +127,7 @@ impl Evaluation {
                 return Err(FieldError::new(format!("histories[{index}]"), value, rule));
             }
         }
-        Ok(Evaluation { law: true_law(&request), request, histories, kept: Kept::default() })
+        Ok(Evaluation { law: true_law(&request), request, histories, kept: Cache::default() })
     }
 
     /// Returns a framework with its policy, trained on the current pool, or without one if each history has its own.
@@ -301,11 +301,11 @@ impl Simulator<'_> {
         distances: &[f64],
         lived: &mut Vec<Lived>,
         seconds: &mut f64,
-    ) -> Result<Ended, TrainError> {
+    ) -> Result<PathOutcome, TrainError> {
         let start = advisor.initial_state(Some(&self.evaluation.histories[history]), None)?;
         let moves = advisor.specification().problem.framework.learns();
         let mut walk = advisor.walk(start, returns);
-        let mut ended = Ended::at(walk.state.wealth);
+        let mut ended = PathOutcome::at(walk.state.wealth);
         for (step, dynamics) in self.periods.iter().enumerate().take(returns.len()) {
             self.watch.go_on()?;
             let started = (self.clock)();

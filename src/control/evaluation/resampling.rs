@@ -13,7 +13,7 @@ pub const RESAMPLES: usize = 2000;
 /// Share of the years that count as the worst.
 const WORST: f64 = 0.05;
 /// The series of one strategy that are resampled.
-pub struct Series<'a> {
+pub struct StrategySeries<'a> {
     returns: Vec<f64>,
     traded: &'a [f64],
     /// Returns over the years that begin with every period, ascending, each with its first period.
@@ -21,7 +21,7 @@ pub struct Series<'a> {
 }
 
 /// The figures of one strategy on one resample of the periods and rolling years.
-pub struct Measured {
+pub struct StrategyFigures {
     /// Mean, volatility and Sharpe ratio.
     pub annual: Annual,
     /// Share of wealth that is traded per year.
@@ -33,9 +33,9 @@ pub struct Measured {
 }
 
 /// The figures of all strategies on the record and on every resample of it.
-pub struct Resampled {
-    whole: Vec<Measured>,
-    resampled: Vec<Vec<Measured>>,
+pub struct ResampledFigures {
+    whole: Vec<StrategyFigures>,
+    resampled: Vec<Vec<StrategyFigures>>,
     /// Length of the record in years, which is its number of blocks of a year.
     years: f64,
 }
@@ -51,23 +51,23 @@ pub fn intervals(periods_per_year: usize, comparisons: usize) -> BacktestInterva
     }
 }
 
-impl<'a> Series<'a> {
+impl<'a> StrategySeries<'a> {
     /// Returns the series in the account of a strategy.
     pub fn of(account: &'a Account, periods_per_year: usize) -> Self {
         let rolling = account.rolling_growth(periods_per_year).enumerate();
         let mut years: Vec<(f64, usize)> = rolling.map(|(start, growth)| (growth - 1.0, start)).collect();
         years.sort_by(|one, other| one.0.total_cmp(&other.0));
-        Series { years, returns: account.returns(), traded: &account.traded }
+        StrategySeries { years, returns: account.returns(), traded: &account.traded }
     }
 
-    fn measure(&self, bank: &[f64], drawn: &Drawn, scale: &Scale) -> Measured {
+    fn measure(&self, bank: &[f64], drawn: &Drawn, scale: &Scale) -> StrategyFigures {
         let Drawn { periods, rolling } = drawn;
         let pick =
             |values: &[f64], indices: &[usize]| -> Vec<f64> { indices.iter().map(|&index| values[index]).collect() };
         let per_year = scale.periods_per_year as f64;
         let traded: f64 = periods.iter().map(|&period| self.traded[period]).sum();
         let (lost, worst) = self.losses(rolling);
-        Measured {
+        StrategyFigures {
             annual: Annual::of(&pick(&self.returns, periods), &pick(bank, periods), per_year),
             turnover: per_year * traded / periods.len() as f64,
             chance_of_loss: lost,
@@ -117,16 +117,16 @@ impl Drawn {
     }
 }
 
-impl Resampled {
+impl ResampledFigures {
     /// Resamples periods and rolling years; `bank` is the interest the bank paid in each period.
-    pub fn of(series: &[Series], bank: &[f64], scale: &Scale) -> Self {
+    pub fn of(series: &[StrategySeries], bank: &[f64], scale: &Scale) -> Self {
         let whole = Drawn::whole(bank.len(), scale.periods_per_year);
-        let measure = |drawn: &Drawn| -> Vec<Measured> {
+        let measure = |drawn: &Drawn| -> Vec<StrategyFigures> {
             series.iter().map(|series| series.measure(bank, drawn, scale)).collect()
         };
         let resample = |draw| measure(&Drawn::again(&whole, scale, draw));
         let years = bank.len() as f64 / scale.periods_per_year as f64;
-        Resampled { whole: measure(&whole), resampled: (0..RESAMPLES).map(resample).collect(), years }
+        ResampledFigures { whole: measure(&whole), resampled: (0..RESAMPLES).map(resample).collect(), years }
     }
 
     /// Returns the worth and variation of strategy `index`, whose account is `account`.
@@ -157,7 +157,7 @@ impl Resampled {
     }
 
     /// Returns a figure of the record, with an interval from its resamples in blocks of `block` years.
-    fn estimate(&self, block: usize, of: impl Fn(&[Measured]) -> f64) -> BootstrapEstimate {
+    fn estimate(&self, block: usize, of: impl Fn(&[StrategyFigures]) -> f64) -> BootstrapEstimate {
         let values: Vec<f64> = self.resampled.iter().map(|measured| of(measured)).collect();
         let tail = tail(self.years / block as f64);
         BootstrapEstimate { value: of(&self.whole), interval: [quantile(&values, tail), quantile(&values, 1.0 - tail)] }
@@ -202,11 +202,11 @@ mod tests {
                 let account = Account { allocations: vec![1.0; 4 * years], traded: vec![0.0; 4 * years], wealth };
                 let bank = vec![0.0; 4 * years];
                 let whole = Drawn::whole(4 * years, 4);
-                let series = Series::of(&account, 4);
+                let series = StrategySeries::of(&account, 4);
                 let measure = |drawn: &Drawn| vec![series.measure(&bank, drawn, &scale)];
                 let again = |draw| measure(&Drawn::again(&whole, &scale, draw));
                 let resampled = (0..300).map(again).collect();
-                let found = Resampled { whole: measure(&whole), resampled, years: years as f64 };
+                let found = ResampledFigures { whole: measure(&whole), resampled, years: years as f64 };
                 let figures =
                     [found.estimate(1, |all| all[0].annual.mean), found.estimate(1, |all| all[0].annual.volatility)];
                 for ((held, BootstrapEstimate { interval: [low, high], .. }), truth) in

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::control::error::TrainError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::advice::{Advice, AdviceSource};
 use crate::control::policy::advisor::Advisor;
 use crate::control::pool;
@@ -28,7 +28,7 @@ use crate::control::training::{Summaries, Training};
 
 /// Returns of one actual period.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Period {
+pub struct ActualPeriod {
     /// Log-return of the risky asset.
     pub log_return: f64,
     /// Simple return of the bank.
@@ -118,14 +118,14 @@ impl Strategy {
 }
 
 /// Work shared by the trainings of one block of periods; no bit of a decision depends on it.
-pub struct Common {
-    kept: Kept,
+pub struct SharedWork {
+    kept: Cache,
     measured: Arc<Summaries>,
 }
 
-impl Common {
+impl SharedWork {
     /// Prepares the shared work, with the cache `kept`.
-    pub fn of(strategies: &[Strategy], kept: Kept) -> Self {
+    pub fn of(strategies: &[Strategy], kept: Cache) -> Self {
         let mut alphas: Vec<f64> = Vec::new();
         for strategy in strategies {
             if let Some((Framework::Adaptive, alpha)) = strategy.framework()
@@ -134,7 +134,7 @@ impl Common {
                 alphas.push(alpha);
             }
         }
-        Common { kept, measured: Arc::new(Summaries::at(alphas)) }
+        SharedWork { kept, measured: Arc::new(Summaries::at(alphas)) }
     }
 }
 
@@ -150,18 +150,18 @@ impl WalkForward {
     }
 
     /// Returns the number of trainings in [`Self::decide`]: one per trained strategy and block of periods.
-    pub fn trainings(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
+    pub fn trainings(&self, strategies: &[Strategy], periods: &[ActualPeriod]) -> usize {
         self.stretches(periods.len()) * strategies.iter().filter(|strategy| strategy.is_trained()).count()
     }
 
     /// Returns the number of steps of all these trainings.
-    pub fn steps(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
+    pub fn steps(&self, strategies: &[Strategy], periods: &[ActualPeriod]) -> usize {
         self.trainings(strategies, periods) * self.horizon
     }
 
     /// Returns the training request of one block from the periods before it. The bank is assumed to keep paying its
     /// last rate.
-    pub fn specification(&self, framework: Framework, alpha: f64, past: &[Period]) -> Specification {
+    pub fn specification(&self, framework: Framework, alpha: f64, past: &[ActualPeriod]) -> Specification {
         Specification {
             problem: ProblemSpecification {
                 framework,
@@ -192,12 +192,12 @@ impl WalkForward {
     pub fn decide(
         &self,
         strategies: &[Strategy],
-        periods: &[Period],
+        periods: &[ActualPeriod],
         watch: &Watch,
         solved: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<Decision>>, TrainError> {
         let decided = |stretch: usize| -> Result<Vec<Vec<Decision>>, TrainError> {
-            let common = Common::of(strategies, Kept::default());
+            let common = SharedWork::of(strategies, Cache::default());
             let decided =
                 |strategy: Strategy| self.decide_stretch(strategy, periods, stretch, &common, (watch, solved));
             pool::map(strategies.to_vec(), decided).into_iter().collect()
@@ -218,9 +218,9 @@ impl WalkForward {
     pub fn decide_stretch(
         &self,
         strategy: Strategy,
-        periods: &[Period],
+        periods: &[ActualPeriod],
         stretch: usize,
-        common: &Common,
+        common: &SharedWork,
         (watch, solved): (&Watch, &(dyn Fn() + Sync)),
     ) -> Result<Vec<Decision>, TrainError> {
         let start = self.window + stretch * self.every;

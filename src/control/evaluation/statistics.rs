@@ -47,7 +47,7 @@ impl EvaluationReport {
         let utilities: Vec<Vec<f64>> = wealth.iter().map(|wealth| wealth.iter().map(value).collect()).collect();
         let (edges, wealth_edges) = (edges(&utilities), edges(&wealth));
         let reference = request.frameworks.iter().position(|&framework| framework == Framework::Adaptive).unwrap_or(0);
-        let table = Table {
+        let table = SimulationTable {
             evaluation,
             followers,
             outcomes,
@@ -106,7 +106,7 @@ fn binned(values: impl Iterator<Item = f64>, edges: &[f64]) -> Vec<usize> {
 }
 
 /// Everything simulated, strategy by strategy.
-struct Table<'a> {
+struct SimulationTable<'a> {
     evaluation: &'a Evaluation,
     followers: &'a [Follower],
     outcomes: &'a Outcomes,
@@ -118,7 +118,7 @@ struct Table<'a> {
     reference: usize,
 }
 
-impl Table<'_> {
+impl SimulationTable<'_> {
     fn strategy(&self, index: usize) -> serde_json::Result<StrategyReport> {
         let request = &self.evaluation.request;
         let follower = self.followers.get(index);

@@ -1,6 +1,6 @@
 //! Sentences about the figures, flattering or not, by rules that treat all strategies alike; and the report of both.
 
-use crate::control::evaluation::analysis::Line;
+use crate::control::evaluation::analysis::StrategyLine;
 use crate::control::evaluation::backtest::{Backtest, Walked};
 use crate::control::evaluation::backtest_report::{
     BacktestChoices, BacktestFigures, BacktestPeriods, BacktestReport, BootstrapEstimate, FORMAT,
@@ -181,7 +181,7 @@ fn drawdown(figures: &[BacktestFigures], main: usize) -> Option<String> {
 }
 
 /// Describes how often the surrogate could not be trusted and the step was solved.
-fn guard(line: &Line, noun: &str) -> String {
+fn guard(line: &StrategyLine, noun: &str) -> String {
     let decisions = &line.decisions;
     let resolved = decisions.iter().filter(|one| one.source == Some(AdviceSource::ResolvedOutsideDesign)).count();
     format!(
@@ -237,7 +237,7 @@ impl BacktestReport {
 }
 
 impl BacktestPeriods {
-    fn new(line: &Line) -> Self {
+    fn new(line: &StrategyLine) -> Self {
         let decided = |of: fn(&Decision) -> f64| line.decisions.iter().map(of).collect();
         BacktestPeriods {
             strategy: line.name.clone(),

@@ -122,7 +122,7 @@ mod tests {
 
     use super::*;
     use crate::control::evaluation::account::keep;
-    use crate::control::evaluation::rolling::Period;
+    use crate::control::evaluation::rolling::ActualPeriod;
     use crate::control::problem::actions::Band;
     use crate::numerics::streams::stream;
 
@@ -163,10 +163,10 @@ mod tests {
         let mut record = |years: usize| {
             let shares: Vec<f64> = (0..years).map(|_| f64::from(u8::from(generator.random::<f64>() < 0.5))).collect();
             let normal = |_| 0.06 + 0.15 * generator.sample::<f64, _>(StandardNormal);
-            let periods = (0..years).map(normal).map(|log_return| Period { log_return, bank_return: 0.01 });
-            (shares, periods.collect::<Vec<Period>>())
+            let periods = (0..years).map(normal).map(|log_return| ActualPeriod { log_return, bank_return: 0.01 });
+            (shares, periods.collect::<Vec<ActualPeriod>>())
         };
-        let beyond = |(shares, periods): (Vec<f64>, Vec<Period>)| {
+        let beyond = |(shares, periods): (Vec<f64>, Vec<ActualPeriod>)| {
             let kept = |shares: &[f64]| keep(shares.iter().map(|share| Band::of(&[*share])), &periods, 0.0, 100.0);
             let account = kept(&shares);
             let mix = MixBooks::new(account.mean_allocation(), |share| kept(&vec![share; shares.len()]));

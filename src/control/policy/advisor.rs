@@ -11,7 +11,7 @@ use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
 use crate::control::error::FieldError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
 use crate::control::problem::state::{Realised, State};
@@ -36,11 +36,11 @@ pub struct Advisor {
     policy: Policy,
     problem: Problem,
     prepared: Vec<OnceLock<PreparedStep>>,
-    kept: Kept,
+    kept: Cache,
 }
 
 /// The inputs of an advice.
-struct Asked<'a> {
+struct AdviceInputs<'a> {
     step: usize,
     state: &'a State,
     radius: f64,
@@ -64,11 +64,11 @@ struct Prediction {
 impl Advisor {
     /// Prepares a policy, with the process-wide cache.
     pub fn new(policy: Policy) -> Self {
-        Advisor::with(policy, Kept::default())
+        Advisor::with(policy, Cache::default())
     }
 
     /// Prepares a policy, with the cache `kept`.
-    pub fn with(policy: Policy, kept: Kept) -> Self {
+    pub fn with(policy: Policy, kept: Cache) -> Self {
         let problem = policy.problem(kept.clone());
         let prepared = policy.steps().iter().map(|_| OnceLock::new()).collect();
         let advisor = Advisor { policy, problem, prepared, kept };
@@ -134,7 +134,7 @@ impl Advisor {
         let radius = self.radius(state);
         match mode {
             AdviceMode::Resolve => {
-                let asked = Asked { step, state, radius, source: AdviceSource::Resolved };
+                let asked = AdviceInputs { step, state, radius, source: AdviceSource::Resolved };
                 self.resolved(&asked, &self.predict(step, state, radius)).0
             }
             AdviceMode::Surrogate => self
@@ -160,7 +160,7 @@ impl Advisor {
     /// outside the design.
     pub fn advise_outside(&self, step: usize, state: &State, outside: &OutsideDesign) -> Advice {
         let OutsideDesign { radius, predicted } = outside;
-        let asked = Asked { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
+        let asked = AdviceInputs { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
         self.resolved(&asked, predicted).0
     }
 
@@ -197,7 +197,7 @@ impl Advisor {
     }
 
     fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
-        let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
+        let asked = AdviceInputs { step, state, radius, source: AdviceSource::PolicySurrogate };
         self.advice(&asked, predicted.band, predicted.floor_gain, predicted)
     }
 
@@ -217,7 +217,7 @@ impl Advisor {
     pub(super) fn explain_knowing(&self, step: usize, state: &State, own: f64, radius: f64) -> (Advice, WorstCase) {
         let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
         let predicted = self.predict(step, state, own);
-        let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);
+        let (advice, solution) = self.resolved(&AdviceInputs { step, state, radius, source }, &predicted);
         let (centre, scale) = (&self.specification().problem.centre, self.problem.utility_at_floor(step, state));
         let worst =
             solution.map_or_else(WorstCase::unknown, |solution| WorstCase::of(&solution, &advice, centre, scale));
@@ -235,7 +235,7 @@ impl Advisor {
         (band.nearest(state.holding), floor_gain)
     }
 
-    fn resolved(&self, asked: &Asked, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
+    fn resolved(&self, asked: &AdviceInputs, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
         if self.pays(asked.step, asked.state) {
             let after = self.policy.steps().get(asked.step + 1).map(|after| &after.solution);
             let next = NextValue::new(self.specification(), asked.step + 1, after);
@@ -246,7 +246,7 @@ impl Advisor {
             }
         }
         // Keeping all wealth in the bank is feasible, and no law can hurt it.
-        let unsolved = Asked { source: AdviceSource::Unsolved, ..*asked };
+        let unsolved = AdviceInputs { source: AdviceSource::Unsolved, ..*asked };
         (self.advice(&unsolved, Band::of(&[0.0]), 0.0, predicted), None)
     }
 
@@ -255,7 +255,7 @@ impl Advisor {
         self.problem.floor(step, state) > 0.0
     }
 
-    fn advice(&self, asked: &Asked, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
+    fn advice(&self, asked: &AdviceInputs, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
         let floor = self.problem.floor(asked.step, asked.state);
         let holding = asked.state.holding;
         let allocation = band.nearest(holding);

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::control::bellman::problem::{Problem, largest_gain};
 use crate::control::error::{FieldError, PolicyError};
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::problem::actions::Band;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::caution::CautionLevel;
@@ -20,7 +20,7 @@ use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates
 /// policy.
 pub fn periods_per_year(json: &[u8]) -> Option<f64> {
     #[derive(Deserialize)]
-    struct Document {
+    struct PolicyDocument {
         specification: Specified,
     }
     #[derive(Deserialize)]
@@ -31,7 +31,9 @@ pub fn periods_per_year(json: &[u8]) -> Option<f64> {
     struct Problem {
         periods_per_year: Option<f64>,
     }
-    serde_json::from_slice::<Document>(json).ok().and_then(|document| document.specification.problem.periods_per_year)
+    serde_json::from_slice::<PolicyDocument>(json)
+        .ok()
+        .and_then(|document| document.specification.problem.periods_per_year)
 }
 
 /// The completed specification and the solution of every step, in ascending order of step.
@@ -65,7 +67,7 @@ impl Policy {
     }
 
     /// Returns the problem it solves, with the cache `kept`.
-    pub fn problem(&self, kept: Kept) -> Problem {
+    pub fn problem(&self, kept: Cache) -> Problem {
         Problem::with(&self.specification, kept)
     }
 
@@ -112,7 +114,7 @@ impl Policy {
         if self.steps.len() != horizon {
             return Err(FieldError::new("steps", self.steps.len(), format!("must hold horizon = {horizon} steps")));
         }
-        let feature_count = self.problem(Kept::default()).selection.names().len();
+        let feature_count = self.problem(Cache::default()).selection.names().len();
         for (index, step) in self.steps.iter().enumerate() {
             if step.step != index {
                 return Err(FieldError::new(format!("steps[{index}].step"), step.step, format!("must be {index}")));

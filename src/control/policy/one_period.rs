@@ -8,7 +8,7 @@ use super::levels::{LevelsAdvised, WhyNothing};
 use super::sensitivity::{Sensitivity, check_learning};
 use super::worst_case::WorstCase;
 use crate::control::error::FieldError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::problem::state::State;
 use crate::control::request::annualised::premium;
 use crate::control::request::caution::CautionLevel;
@@ -20,12 +20,12 @@ use crate::control::uncertainty::radius::RadiusEstimator;
 /// An investor whose horizon is the end of this period.
 pub struct OnePeriod {
     advisor: Advisor,
-    kept: Kept,
+    kept: Cache,
 }
 
 impl OnePeriod {
     /// Prepares a completed specification of horizon 1, with the cache `kept`.
-    pub fn new(specification: &Specification, kept: Kept) -> Self {
+    pub fn new(specification: &Specification, kept: Cache) -> Self {
         let policy = Policy::new(specification.clone(), vec![StepSolution::unsolved(0)]);
         OnePeriod { advisor: Advisor::with(policy, kept.clone()), kept }
     }

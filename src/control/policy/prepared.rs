@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::document::Policy;
-use crate::control::kept::{Kept, Key};
+use crate::control::kept::{Cache, Key};
 use crate::control::request::specification::Specification;
 use crate::control::surrogate::fitted::{Surrogate, ValueSurrogate};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
@@ -52,12 +52,12 @@ impl Factor {
     }
 
     /// Returns true if the factor is in the cache.
-    pub fn is_in(&self, kept: &Kept) -> bool {
+    pub fn is_in(&self, kept: &Cache) -> bool {
         kept.has(&self.0)
     }
 
     /// Returns the process; `None` if the matrix does not factor.
-    pub fn process(&self, kept: &Kept, stored: &StepSurrogates) -> Arc<Option<GaussianProcess>> {
+    pub fn process(&self, kept: &Cache, stored: &StepSurrogates) -> Arc<Option<GaussianProcess>> {
         kept.get_or_make(&self.0, factor_bytes(stored), || {
             let zeros = vec![0.0; stored.count()];
             GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::numerics::levelling::{Ground, inverse_volatility};
+use crate::numerics::levelling::{GroundMetric, inverse_volatility};
 
 /// The data of a policy for several assets, beside the problem of their fund. The shares of that fund are proportional
 /// to inverse volatilities.
@@ -53,10 +53,10 @@ pub enum GroundNorm {
 
 impl GroundNorm {
     /// Returns the ground cost for a history.
-    pub fn at(self, rows: &[Vec<f64>]) -> Ground {
+    pub fn at(self, rows: &[Vec<f64>]) -> GroundMetric {
         match self {
-            GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(rows)),
-            GroundNorm::Sup => Ground::Sup,
+            GroundNorm::ScaledOne => GroundMetric::Weighted(inverse_volatility(rows)),
+            GroundNorm::Sup => GroundMetric::Sup,
         }
     }
 }

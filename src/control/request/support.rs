@@ -53,7 +53,7 @@ impl Default for Support {
 
 /// The statistics of a law from which a support is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
+pub struct LawExtent {
     /// The lowest and the highest log-return.
     pub ends: [f64; 2],
     /// Mean of the log-returns, weighted by their masses.
@@ -62,14 +62,14 @@ pub struct Extent {
     pub variance: f64,
 }
 
-impl Extent {
+impl LawExtent {
     /// Computes the extent of log-returns of equal mass.
     pub fn of(log_returns: impl Iterator<Item = f64> + Clone) -> Self {
         let count = log_returns.clone().count().max(1) as f64;
         let mean = log_returns.clone().sum::<f64>() / count;
         let variance = log_returns.clone().map(|z| (z - mean).powi(2)).sum::<f64>() / count;
         let ends = [log_returns.clone().fold(f64::INFINITY, f64::min), log_returns.fold(f64::NEG_INFINITY, f64::max)];
-        Extent { ends, mean, variance }
+        LawExtent { ends, mean, variance }
     }
 }
 
@@ -77,7 +77,7 @@ impl Support {
     /// Returns the interval around a law of this extent; `None` if every return is allowed. The extent is computed only
     /// if it is needed.
     /// Checked by: `tests::twice_the_worst_or_five_deviations`.
-    pub fn around(self, law: impl FnOnce() -> Extent) -> Option<Interval> {
+    pub fn around(self, law: impl FnOnce() -> LawExtent) -> Option<Interval> {
         match self {
             Support::WorstSeen { factor } => {
                 let law = law();
@@ -112,7 +112,7 @@ mod tests {
     /// By hand: the mean of -0.1, 0.02 and 0.05 is -0.01 and the variance is 0.0042.
     #[test]
     fn twice_the_worst_or_five_deviations() {
-        let law = Extent::of([-0.1, 0.02, 0.05].into_iter());
+        let law = LawExtent::of([-0.1, 0.02, 0.05].into_iter());
         assert!((law.mean + 0.01).abs() < 1e-15 && (law.variance - 0.0042).abs() < 1e-15);
         let reach = 5.0 * 0.0042_f64.sqrt();
         let ends = |support: Support| support.around(|| law).map(|Interval { min, max }| [min, max]).unwrap();
@@ -121,10 +121,10 @@ mod tests {
         let [min, max] = ends(Support::WorstSeen { factor: 8.0 });
         assert!((min + 0.8).abs() < 1e-12 && (max - 0.4).abs() < 1e-12);
         // A record that never fell, and one whose worst return is further from the mean than five deviations.
-        let rose = Support::default().around(|| Extent::of([0.3, 0.30001].into_iter())).unwrap();
+        let rose = Support::default().around(|| LawExtent::of([0.3, 0.30001].into_iter())).unwrap();
         assert!(rose.min < 0.3 && rose.min > 0.2999 && rose.max > 0.6);
         let crash = [-0.5].into_iter().chain((0..99).map(|k| if k % 2 == 0 { 0.01 } else { -0.01 }));
-        assert!((Support::default().around(|| Extent::of(crash)).unwrap().min + 1.0).abs() < 1e-12);
+        assert!((Support::default().around(|| LawExtent::of(crash)).unwrap().min + 1.0).abs() < 1e-12);
         assert_eq!(Support::None {}.around(|| law), None);
         assert_eq!(ends(Support::Between { min: -0.3, max: 0.2 }), [-0.3, 0.2]);
     }

@@ -76,7 +76,7 @@ pub struct Fitting<'a> {
 }
 
 /// Both surrogates of a design, with the figures that describe them.
-pub struct Fit {
+pub struct SurrogateFit {
     /// The surrogates in the form stored.
     pub stored: StepSurrogates,
     /// Deviations of the value target, predicted at each state that set the guard, in units of the value's `scale`.
@@ -182,7 +182,7 @@ impl Fitting<'_> {
         solved: &[DesignPoint],
         start: &StartingScales,
         guards: &[Features],
-    ) -> Result<Fit, TrainError> {
+    ) -> Result<SurrogateFit, TrainError> {
         let total = solved.len();
         (self.watch.progress)(StepProgress { step: self.step, phase: Phase::Fitting, done: total, total });
         self.watch.go_on()?;
@@ -210,7 +210,7 @@ impl Fitting<'_> {
             value: value.stored,
             policy: policy.stored,
         };
-        Ok(Fit { stored, deviations, value: of_value, policy: of_policy })
+        Ok(SurrogateFit { stored, deviations, value: of_value, policy: of_policy })
     }
 
     fn inputs(&self, solved: &[DesignPoint]) -> DMatrix<f64> {

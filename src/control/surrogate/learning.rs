@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::accuracy::{Aim, Checks};
 use super::features::Features;
 use super::fitted::ValueSurrogate;
-use super::fitting::{DesignPoint, Fit, Fitting};
+use super::fitting::{DesignPoint, Fitting, SurrogateFit};
 use super::scaling::Scaling;
 use super::stored::{Solution, StepSurrogates};
 use crate::control::error::TrainError;
@@ -93,7 +93,7 @@ impl Counts {
 }
 
 /// The fitting of the surrogates of one step.
-pub struct Learning<'a> {
+pub struct DesignFitting<'a> {
     /// The completed specification.
     pub specification: &'a Specification,
     /// Names of all features.
@@ -110,7 +110,7 @@ pub struct Learning<'a> {
 
 /// The data of a step as its design grows.
 #[derive(Default)]
-struct Known {
+struct StepData {
     /// Features of the candidates so far.
     features: Vec<Features>,
     /// Candidates that are design points.
@@ -120,7 +120,7 @@ struct Known {
 }
 
 /// The parts of a fit that are judged.
-struct Found {
+struct JudgedFit {
     served: ValueSurrogate,
     /// Deviations predicted at the fresh states, and the largest at which the surrogate is used.
     deviations: Vec<f64>,
@@ -129,7 +129,7 @@ struct Found {
     before: usize,
 }
 
-impl Learning<'_> {
+impl DesignFitting<'_> {
     /// Solves the design, and fits both surrogates to it; the search for their scales is warm-started from those of the
     /// step after.
     ///
@@ -139,19 +139,19 @@ impl Learning<'_> {
     pub fn run(&self, states: &impl Candidates, after: Option<&Solution>) -> Result<StepSolution, TrainError> {
         let (step, most) = (self.step, self.counts.design);
         let mut wanted = self.aim.as_ref().map_or(most, |aim| aim.first.min(most));
-        let (mut known, mut round) = (Known::default(), 0);
+        let (mut known, mut round) = (StepData::default(), 0);
         let after = after.and_then(Solution::surrogates);
         let mut last: Option<StepSurrogates> = None;
         loop {
             let fresh = self.counts.guards(round);
             let guards = self.features(states, fresh.clone())?;
-            let Fit { stored, deviations, value, policy } =
+            let SurrogateFit { stored, deviations, value, policy } =
                 self.round(states, &mut known, wanted, last.as_ref().or(after), &guards)?;
             let mut diagnostics =
                 StepDiagnostics { value: Some(value), policy: Some(policy), ..diagnostics(step, &known.solved) };
             if let Some(aim) = &self.aim {
                 let served = ValueSurrogate::new(self.specification, step, &stored);
-                let found = Found { served, deviations, limit: stored.deviation_limit, before: known.solved.len() };
+                let found = JudgedFit { served, deviations, limit: stored.deviation_limit, before: known.solved.len() };
                 let (own, checked) = self.judge(states, aim, &found, (fresh, &guards), round)?;
                 if !aim.is_met_by(own) && known.solved.len() < most {
                     wanted = aim.next(known.solved.len(), own).min(most);
@@ -171,11 +171,11 @@ impl Learning<'_> {
         &self,
         states: &impl Candidates,
         aim: &Aim,
-        found: &Found,
+        found: &JudgedFit,
         (fresh, guards): (Range<usize>, &[Features]),
         round: usize,
     ) -> Result<(f64, Vec<DesignPoint>), TrainError> {
-        let Found { served, deviations, limit, before } = found;
+        let JudgedFit { served, deviations, limit, before } = found;
         let (mut errors, mut numbers, mut solved) = (Vec::with_capacity(SETS), Vec::new(), Vec::new());
         let last = *before >= self.counts.design;
         for set in 0..SETS {
@@ -205,12 +205,12 @@ impl Learning<'_> {
     fn round(
         &self,
         states: &impl Candidates,
-        known: &mut Known,
+        known: &mut StepData,
         wanted: usize,
         before: Option<&StepSurrogates>,
         guards: &[Features],
-    ) -> Result<Fit, TrainError> {
-        let Known { features, chosen, solved } = known;
+    ) -> Result<SurrogateFit, TrainError> {
+        let StepData { features, chosen, solved } = known;
         features.extend(self.features(states, features.len()..self.counts.candidates(wanted))?);
         let scaling = Scaling::of(features);
         let (specification, names, step, watch) = (self.specification, self.names, self.step, self.watch);

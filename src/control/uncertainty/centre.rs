@@ -5,7 +5,7 @@ use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::ProblemSpecification;
-use crate::control::request::support::{Extent, Interval};
+use crate::control::request::support::{Interval, LawExtent};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::volatility::rescaled;
 
@@ -173,8 +173,8 @@ impl Centre {
     }
 
     /// Returns the extent from which a support around the centre is computed.
-    pub fn extent(&self) -> Extent {
-        Extent { ends: [self.lowest(), self.highest()], mean: self.mean(), variance: self.variance() }
+    pub fn extent(&self) -> LawExtent {
+        LawExtent { ends: [self.lowest(), self.highest()], mean: self.mean(), variance: self.variance() }
     }
 
     /// Returns the mean, per step as the variance.

@@ -47,7 +47,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::control::kept::Kept;
+    use crate::control::kept::Cache;
     use crate::control::request::specification::Specification;
     use crate::numerics::bridge_paths::AbsoluteBridges;
     use crate::numerics::empirical::EmpiricalDistribution;
@@ -68,7 +68,7 @@ mod tests {
             let request =
                 json!({ "problem": { "horizon": 1, "rate_per_step": 0.0, "radius": rule, "history": history } });
             let specification: Specification = serde_json::from_value(request).unwrap();
-            let (mut specification, kept) = (specification.completed().unwrap(), Kept::default());
+            let (mut specification, kept) = (specification.completed().unwrap(), Cache::default());
             let found = RadiusEstimator::new(&specification, kept.clone()).found_correction();
             let Some(RadiusRule::Bridge { correction, .. }) = &mut specification.problem.radius else {
                 panic!("no bridge")

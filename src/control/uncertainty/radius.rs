@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::control::kept::{Kept, Key};
+use crate::control::kept::{Cache, Key};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
@@ -43,7 +43,7 @@ pub struct RadiusEstimator {
     /// The law of its bridge statistic, once it is needed.
     pub(super) exact: OnceLock<BridgeLaw>,
     /// The cache of the common random numbers.
-    kept: Kept,
+    kept: Cache,
 }
 
 /// The factor on the radius that the history implies, computed when a radius is first needed.
@@ -75,7 +75,7 @@ pub struct Radii {
 
 impl RadiusEstimator {
     /// Builds the estimator of a completed specification; `kept` is the cache of bridges.
-    pub fn new(specification: &Specification, kept: Kept) -> Self {
+    pub fn new(specification: &Specification, kept: Cache) -> Self {
         let rule = match specification.problem.framework {
             Framework::KnownLaw | Framework::PlugIn => RadiusRule::Fixed { radius: 0.0 },
             _ => specification.problem.radius_in_force(),
@@ -349,7 +349,7 @@ mod tests {
         let history = [0.01, -0.02, 0.03, 0.005];
         let request = json!({ "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.0, "radius": rule, "history": history } });
         let specification = serde_json::from_value::<Specification>(request).unwrap();
-        RadiusEstimator::new(&specification, Kept::default())
+        RadiusEstimator::new(&specification, Cache::default())
     }
 
     fn radius_of(framework: &str, rule: Value) -> f64 {

@@ -4,10 +4,10 @@
 use pulldown_cmark::html::push_html;
 use pulldown_cmark::{CowStr, Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 
-use super::{Document, PARTS, documents};
+use super::{GuidePage, PARTS, documents};
 
 /// Returns the whole page; it is made once and never freed.
-pub fn made(document: &Document) -> &'static [u8] {
+pub fn made(document: &GuidePage) -> &'static [u8] {
     let mut events: Vec<Event> = Parser::new_ext(document.text, Options::ENABLE_TABLES).collect();
     let headings = named(&mut events);
     let mut body = String::new();
@@ -69,7 +69,7 @@ fn anchor(heading: &str) -> String {
 
 /// Rewrites links and pictures of the repository to the addresses at which they are served. Tags within a text are
 /// shown, not treated as markup.
-fn led<'a>(event: Event<'a>, document: &Document) -> Option<Event<'a>> {
+fn led<'a>(event: Event<'a>, document: &GuidePage) -> Option<Event<'a>> {
     Some(match event {
         Event::Html(text) | Event::InlineHtml(text) => Event::Text(text),
         Event::Start(Tag::Link { link_type, dest_url, title, id }) => {
@@ -106,11 +106,11 @@ fn address(link: &str, from: &str) -> String {
 }
 
 /// Renders the list of all pages by part, with the headings below the current one.
-fn list(shown: &Document, headings: &[Heading]) -> String {
+fn list(shown: &GuidePage, headings: &[Heading]) -> String {
     let mut list = String::from("<nav class=\"pages\" aria-label=\"Pages of the guide\">\n");
     for (part, documents) in PARTS {
         list.push_str(&format!("<p>{part}</p>\n<ul>\n"));
-        for Document { name, title, .. } in *documents {
+        for GuidePage { name, title, .. } in *documents {
             if *name != shown.name {
                 list.push_str(&format!("<li><a href=\"/guide/{name}\">{title}</a></li>\n"));
                 continue;

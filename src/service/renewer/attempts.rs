@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::service::error::ServiceError;
-use crate::service::live::Live;
+use crate::service::live::LiveSession;
 use crate::service::sessions::Sessions;
 use crate::store::{JobRow, JobState, Store, TrainingRequest};
 
@@ -43,7 +43,7 @@ pub(super) struct Attempts {
 }
 
 impl Attempts {
-    pub async fn of(store: &Store, live: &Live) -> Result<Self, ServiceError> {
+    pub async fn of(store: &Store, live: &LiveSession) -> Result<Self, ServiceError> {
         let (number, mut last, mut count) = (live.renewals + 1, None, 0);
         while let Some(job) = store.job_by_key(&live.row.tenant, &request(live, number, count).key()).await? {
             (last, count) = (Some(job), count + 1);
@@ -64,7 +64,7 @@ impl Attempts {
 }
 
 /// Returns a session's request for the policy of a renewal.
-pub(super) fn request(live: &Live, renewal: usize, attempt: usize) -> TrainingRequest {
+pub(super) fn request(live: &LiveSession, renewal: usize, attempt: usize) -> TrainingRequest {
     TrainingRequest { session: live.row.session.clone(), renewal, attempt }
 }
 
@@ -73,7 +73,7 @@ impl Sessions {
     ///
     /// # Errors
     /// The store does not answer.
-    pub async fn renewal(&self, live: &Live) -> Result<Option<RenewalDue>, ServiceError> {
+    pub async fn renewal(&self, live: &LiveSession) -> Result<Option<RenewalDue>, ServiceError> {
         if !live.is_due() {
             return Ok(None);
         }

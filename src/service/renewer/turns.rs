@@ -12,7 +12,7 @@ const AT_ONCE: usize = 64;
 
 /// Sessions that wait to be handled, and those being handled.
 #[derive(Default)]
-pub(super) struct Turns {
+pub(super) struct RenewalTurns {
     /// Queues by tenant; none is empty.
     waiting: HashMap<Tenant, VecDeque<Name>>,
     /// Tenants with a queue and no session being handled, the next one first.
@@ -21,7 +21,7 @@ pub(super) struct Turns {
     known: HashSet<Name>,
 }
 
-impl Turns {
+impl RenewalTurns {
     /// Queues a session, unless it waits already or is being handled.
     pub fn queue(&mut self, name: Name) {
         if !self.known.insert(name.clone()) {
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn a_tenant_of_many_sessions_is_in_nobodys_way() {
-        let mut turns = Turns::default();
+        let mut turns = RenewalTurns::default();
         (0..200).for_each(|session| turns.queue(name("north", session)));
         turns.queue(name("south", 0));
         assert_eq!([turns.next(), turns.next(), turns.next()], [Some(name("north", 0)), Some(name("south", 0)), None]);
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn so_many_tenants_are_looked_at_side_by_side() {
-        let mut turns = Turns::default();
+        let mut turns = RenewalTurns::default();
         (0..AT_ONCE + 1).for_each(|tenant| turns.queue(name(&format!("tenant{tenant}"), 0)));
         let begun: Vec<Name> = std::iter::from_fn(|| turns.next()).collect();
         assert_eq!(begun.len(), AT_ONCE);

@@ -1,7 +1,7 @@
 //! The sessions being renewed: those to handle, and those that wait for a training.
 
-use super::turns::Turns;
-use super::waiting::Waiting;
+use super::turns::RenewalTurns;
+use super::waiting::WaitingSessions;
 use crate::service::sessions::Name;
 
 /// Sessions of one tenant renewed concurrently in this process: a bound on memory, half a megabyte. Further ones follow
@@ -20,8 +20,8 @@ pub(super) enum Left {
 /// The sessions in progress.
 #[derive(Default)]
 pub(super) struct UnderWay {
-    pub turns: Turns,
-    pub waiting: Waiting,
+    pub turns: RenewalTurns,
+    pub waiting: WaitingSessions,
     /// Sequence of the session before the first that a round left out because its tenant has as many in progress as it
     /// may.
     pub left_after: Option<i64>,

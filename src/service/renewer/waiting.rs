@@ -9,7 +9,7 @@ use crate::store::Tenant;
 
 /// Waiting sessions; each is there once.
 #[derive(Default)]
-pub(super) struct Waiting {
+pub(super) struct WaitingSessions {
     for_job: BTreeMap<String, Vec<Name>>,
     /// Lines by tenant; none is empty.
     in_line: HashMap<Tenant, VecDeque<Name>>,
@@ -17,7 +17,7 @@ pub(super) struct Waiting {
     counts: HashMap<Tenant, usize>,
 }
 
-impl Waiting {
+impl WaitingSessions {
     pub fn is_empty(&self) -> bool {
         self.known.is_empty()
     }
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn sessions_wait_once_for_their_job_or_in_line() {
         let (north, south) = ("north".parse().unwrap(), "south".parse().unwrap());
-        let mut waiting = Waiting::default();
+        let mut waiting = WaitingSessions::default();
         (0..3).for_each(|session| waiting.for_job("job".into(), name("north", session)));
         waiting.for_job("job".into(), name("north", 1));
         (3..5).for_each(|session| waiting.for_room(name("north", session)));

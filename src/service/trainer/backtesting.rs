@@ -8,22 +8,22 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Ended, Worker, failed, reported, requested};
+use super::{JobEnd, Worker, failed, reported, requested};
 use crate::control::error::TrainError;
 use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
-use crate::control::evaluation::rolling::{Common, Decision};
-use crate::control::kept::Kept;
+use crate::control::evaluation::rolling::{Decision, SharedWork};
+use crate::control::kept::Cache;
 use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::backtest_assets::{AssetsBacktestRequest, BacktestQuestion};
 use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
-    pub(super) fn backtest(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
+    pub(super) fn backtest(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, JobEnd> {
         let request = match requested(claimed)? {
             BacktestQuestion::Asset(request) => request,
             BacktestQuestion::Assets(request) => return self.backtest_of_assets(claimed, &request, stop),
@@ -40,7 +40,7 @@ impl Worker {
         claimed: &ClaimedJob,
         request: &AssetsBacktestRequest,
         stop: &AtomicBool,
-    ) -> Result<JobOutcome, Ended> {
+    ) -> Result<JobOutcome, JobEnd> {
         let backtest = AssetsBacktest::asked(request).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::backtest_of_assets(&backtest, request.returns().0, self.threads))?;
         let checkpoints = self.checkpoints(claimed)?;
@@ -52,8 +52,8 @@ impl Worker {
                 self.checkpointed(claimed, &checkpoints, Some(index), decided)
             };
             let held = pool::map(backtest.strategies().into_iter().enumerate().collect(), decide);
-            let held = held.into_iter().collect::<Result<_, Ended>>()?;
-            Ok::<_, Ended>(AssetsBacktestReport::new(&backtest.walked(&balls, held)))
+            let held = held.into_iter().collect::<Result<_, JobEnd>>()?;
+            Ok::<_, JobEnd>(AssetsBacktestReport::new(&backtest.walked(&balls, held)))
         })?;
         reported(&report)
     }
@@ -66,8 +66,8 @@ impl Worker {
         claimed: &ClaimedJob,
         backtest: &Backtest,
         stop: &AtomicBool,
-    ) -> Result<Vec<Vec<Decision>>, Ended> {
-        let kept = Kept::new(estimate::kept_by_backtest(backtest, self.threads));
+    ) -> Result<Vec<Vec<Decision>>, JobEnd> {
+        let kept = Cache::new(estimate::kept_by_backtest(backtest, self.threads));
         let checkpoints = self.checkpoints(claimed)?;
         // Progress within one of several trainings says nothing about the others.
         let watch = Watch { stop, progress: &|_| {} };
@@ -76,7 +76,7 @@ impl Worker {
         let policies = strategies.iter().filter(|strategy| strategy.is_trained()).count();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
         for stretch in 0..backtest.walk.stretches(backtest.periods.len()) {
-            let common = Common::of(&strategies, kept.clone());
+            let common = SharedWork::of(&strategies, kept.clone());
             let decide = |(index, strategy)| {
                 let step = (index < policies).then_some(stretch * policies + index);
                 let decided =
@@ -93,7 +93,7 @@ impl Worker {
     }
 
     /// Returns the checkpoints by step.
-    fn checkpoints(&self, claimed: &ClaimedJob) -> Result<BTreeMap<usize, Vec<u8>>, Ended> {
+    fn checkpoints(&self, claimed: &ClaimedJob) -> Result<BTreeMap<usize, Vec<u8>>, JobEnd> {
         let job = claimed.row.job.as_str();
         let found: BTreeMap<usize, Vec<u8>> = self.runtime.block_on(self.store.checkpoints(job))?.into_iter().collect();
         self.board.resume(job, found.len());
@@ -108,7 +108,7 @@ impl Worker {
         checkpoints: &BTreeMap<usize, Vec<u8>>,
         step: Option<usize>,
         decide: impl FnOnce() -> Result<T, TrainError>,
-    ) -> Result<T, Ended> {
+    ) -> Result<T, JobEnd> {
         let before = step.and_then(|step| checkpoints.get(&step));
         if let Some(decided) = before.and_then(|bytes| serde_json::from_slice(bytes).ok()) {
             return Ok(decided);
@@ -118,12 +118,12 @@ impl Worker {
         Ok(decided)
     }
 
-    fn keep(&self, claimed: &ClaimedJob, step: usize, decided: &impl Serialize) -> Result<(), Ended> {
+    fn keep(&self, claimed: &ClaimedJob, step: usize, decided: &impl Serialize) -> Result<(), JobEnd> {
         let bytes = serde_json::to_vec(decided)
             .map_err(|error| failed(format!("what was decided cannot be written as JSON: {error}")))?;
         let saving = self.store.save_checkpoint(&claimed.row.job, claimed.attempt, step, &bytes);
         if !self.runtime.block_on(saving)? {
-            return Err(Ended::Fenced);
+            return Err(JobEnd::Fenced);
         }
         self.board.finish_step(&claimed.row.job);
         Ok(())

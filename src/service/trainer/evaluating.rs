@@ -4,11 +4,11 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::{Ended, Worker, failed, reported, requested, unwritten};
+use super::{JobEnd, Worker, failed, reported, requested, unwritten};
 use crate::control::estimate;
 use crate::control::evaluation::paths::{Evaluation, Follower};
 use crate::control::evaluation::report::{Costs, EvaluationReport};
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::Policy;
 use crate::control::policy::advisor::Advisor;
 use crate::control::progress::Watch;
@@ -16,10 +16,10 @@ use crate::control::request::framework::Framework;
 use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
-    pub(super) fn evaluate(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
+    pub(super) fn evaluate(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, JobEnd> {
         let evaluation = Evaluation::new(requested(claimed)?).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::evaluation(&evaluation.request, self.threads))?;
-        let kept = Kept::new(estimate::kept_by_evaluation(&evaluation.request));
+        let kept = Cache::new(estimate::kept_by_evaluation(&evaluation.request));
         let evaluation = evaluation.keeping(kept.clone());
         let started = Instant::now();
         let mut followers = Vec::new();
@@ -37,9 +37,9 @@ impl Worker {
         claimed: &ClaimedJob,
         evaluation: &Evaluation,
         framework: Framework,
-        (steps_done, kept): (&mut usize, &Kept),
+        (steps_done, kept): (&mut usize, &Cache),
         stop: &AtomicBool,
-    ) -> Result<Follower, Ended> {
+    ) -> Result<Follower, JobEnd> {
         let request = &evaluation.request;
         let policy = if let Some(id) = request.policies.get(&framework) {
             let row = self.runtime.block_on(self.store.policy(&claimed.row.tenant, id))?;
@@ -63,7 +63,7 @@ impl Worker {
         followers: &[Follower],
         training_seconds: f64,
         stop: &AtomicBool,
-    ) -> Result<JobOutcome, Ended> {
+    ) -> Result<JobOutcome, JobEnd> {
         let started = Instant::now();
         let seconds = || started.elapsed().as_secs_f64();
         let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };

@@ -5,9 +5,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::super::metrics as names;
-use super::{Ended, Worker, failed};
+use super::{JobEnd, Worker, failed};
 use crate::control::estimate;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::{Policy, content_hash};
 use crate::control::progress::Watch;
 use crate::control::request::specification::Specification;
@@ -16,11 +16,11 @@ use crate::control::training::Training;
 use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
-    pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
+    pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, JobEnd> {
         let specification: Specification = serde_json::from_str(&claimed.request_json)
             .map_err(|error| failed(format!("the stored specification cannot be read: {error}")))?;
         let _reserved = self.reserve(&estimate::training(&specification, self.threads))?;
-        let kept = Kept::new(estimate::kept_by_training(&specification));
+        let kept = Cache::new(estimate::kept_by_training(&specification));
         let policy = self.trained(claimed, &specification, 0, kept, stop)?;
         let policy_json =
             policy.to_json().map_err(|error| failed(format!("the policy cannot be written as JSON: {error}")))?;
@@ -35,9 +35,9 @@ impl Worker {
         claimed: &ClaimedJob,
         specification: &Specification,
         first: usize,
-        kept: Kept,
+        kept: Cache,
         stop: &AtomicBool,
-    ) -> Result<Policy, Ended> {
+    ) -> Result<Policy, JobEnd> {
         let job = claimed.row.job.as_str();
         let training = self.pool.install(|| Training::with(specification, kept))?;
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
@@ -55,7 +55,7 @@ impl Worker {
                 .map_err(|error| failed(format!("step {step}: the solution cannot be written as JSON: {error}")))?;
             let saving = self.store.save_checkpoint(job, claimed.attempt, first + step, &bytes);
             if !self.runtime.block_on(saving)? {
-                return Err(Ended::Fenced);
+                return Err(JobEnd::Fenced);
             }
             steps.push(solution);
             self.board.finish_step(job);

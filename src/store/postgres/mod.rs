@@ -22,7 +22,7 @@ use sqlx::{ConnectOptions, Connection as _, Postgres};
 
 use super::error::{Failure, StoreError};
 use super::migrations;
-use super::query::{Connection, Purpose, Query, Row, query};
+use super::query::{Purpose, Query, StoreConnection, StoreRow, query};
 
 pub use url::{PostgresUrl, UrlError};
 
@@ -103,12 +103,12 @@ impl Database {
     pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
-        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+        W: for<'c> FnOnce(StoreConnection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         self.bounded(&self.work, doing, |connection| {
             async move {
                 let mut transaction = connection.begin().await.map_err(Failure::postgres)?;
-                let answer = work(Connection::Postgres(&mut transaction)).await;
+                let answer = work(StoreConnection::Postgres(&mut transaction)).await;
                 // If the transaction were only dropped, a failed one would keep its locks for a while after the answer.
                 match answer {
                     Ok(_) => transaction.commit().await,
@@ -127,14 +127,14 @@ impl Database {
         purpose: Purpose,
         doing: &'static str,
         query: Query,
-    ) -> Result<Vec<Row>, StoreError> {
+    ) -> Result<Vec<StoreRow>, StoreError> {
         let pool = match purpose {
             Purpose::Advice => &self.work,
             Purpose::Lists => &self.lists,
             Purpose::Probes => &self.probes,
         };
         self.bounded(pool, doing, |connection| {
-            async move { Connection::Postgres(connection).rows(query).await }.boxed()
+            async move { StoreConnection::Postgres(connection).rows(query).await }.boxed()
         })
         .await
     }
@@ -142,7 +142,7 @@ impl Database {
     /// Runs one statement as a transaction of its own, and returns the number of rows it changed.
     pub(super) async fn execute(&self, doing: &'static str, query: Query) -> Result<u64, StoreError> {
         self.bounded(&self.work, doing, |connection| {
-            async move { Connection::Postgres(connection).execute(query).await }.boxed()
+            async move { StoreConnection::Postgres(connection).execute(query).await }.boxed()
         })
         .await
     }

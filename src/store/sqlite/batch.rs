@@ -6,10 +6,10 @@ use std::collections::VecDeque;
 use futures_util::FutureExt;
 use sqlx::SqliteConnection;
 
-use super::operation::{Answer, Operation, Reply, Undo};
+use super::operation::{Operation, Reply, Respond, Undo};
 use crate::store::entries::{self, APPENDING, Append, EntryRow, append};
 use crate::store::error::StoreError;
-use crate::store::query::Connection;
+use crate::store::query::StoreConnection;
 
 /// An observation to append, and the channel for its answer.
 pub(super) struct Appending {
@@ -24,25 +24,25 @@ impl Appending {
         Operation::new(
             APPENDING,
             Undo::Statement,
-            move |connection| append(Connection::Sqlite(connection), new).boxed(),
+            move |connection| append(StoreConnection::Sqlite(connection), new).boxed(),
             reply,
         )
     }
 
     /// Returns how to answer it once it is appended and the outcome of its group is known.
-    fn appended(self) -> Answer {
+    fn appended(self) -> Respond {
         Box::new(move |group: Result<(), StoreError>| self.reply.send(group.map(|()| Append::Appended)))
     }
 }
 
 /// The contents of the next group.
 #[derive(Default)]
-pub(super) struct Waiting {
+pub(super) struct NextGroup {
     pub operations: VecDeque<Operation>,
     pub appends: Vec<Appending>,
 }
 
-impl Waiting {
+impl NextGroup {
     pub(super) fn is_empty(&self) -> bool {
         self.operations.is_empty() && self.appends.is_empty()
     }
@@ -55,14 +55,14 @@ impl Waiting {
 /// Returns the error that ended the group; the answers include the observations that ran.
 pub(super) async fn append_all(
     connection: &mut SqliteConnection,
-    waiting: &mut Waiting,
-    answers: &mut Vec<Answer>,
+    waiting: &mut NextGroup,
+    answers: &mut Vec<Respond>,
 ) -> Result<(), StoreError> {
     let batch = std::mem::take(&mut waiting.appends);
     let rows: Vec<&EntryRow> = batch.iter().map(|appending| &appending.new).collect();
     let end = match rows.as_slice() {
         [] => Ok(()),
-        rows => entries::append_all(&mut Connection::Sqlite(connection), rows).await,
+        rows => entries::append_all(&mut StoreConnection::Sqlite(connection), rows).await,
     };
     match end.map_err(|failure| failure.during(APPENDING)) {
         Err(error) if !error.ends_group() => {

@@ -1,7 +1,7 @@
 //! A version number for each session, which every write to the session changes.
 //!
 //! Only this process writes to the folder. If a session's number still equals the one noted before its rows were read,
-//! the rows are unchanged and need no further read. A [`Change`] accompanies a write and raises the number when the
+//! the rows are unchanged and need no further read. A [`WriteInProgress`] accompanies a write and raises the number when the
 //! write ends: after the commit and before the answer. It does so whatever the outcome, and even if no caller waits any
 //! more. Between commit and answer the number is the old one, and either state of the session may be shown.
 //!
@@ -33,8 +33,8 @@ impl Changes {
     }
 
     /// Returns the change of a write to `session` that is not committed yet.
-    pub(super) fn of(self: &Arc<Self>, session: &str) -> Change {
-        Change { place: self.place(session), changes: self.clone() }
+    pub(super) fn of(self: &Arc<Self>, session: &str) -> WriteInProgress {
+        WriteInProgress { place: self.place(session), changes: self.clone() }
     }
 
     fn place(&self, session: &str) -> usize {
@@ -44,12 +44,12 @@ impl Changes {
 }
 
 /// A write in progress; dropped once it has ended, before it is answered.
-pub(super) struct Change {
+pub(super) struct WriteInProgress {
     changes: Arc<Changes>,
     place: usize,
 }
 
-impl Drop for Change {
+impl Drop for WriteInProgress {
     fn drop(&mut self) {
         self.changes.numbers[self.place].fetch_add(1, Ordering::Release);
     }

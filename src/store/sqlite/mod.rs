@@ -19,19 +19,19 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::entries::{APPENDING, Append, EntryRow};
 use super::error::{Failure, StoreError};
-use super::query::{Connection, Purpose, Query, Row, query};
+use super::query::{Purpose, Query, StoreConnection, StoreRow, query};
 use batch::Appending;
 use changes::Changes;
 use opening::Readers;
 use operation::{Operation, Reply, Undo};
-use writer::Request;
+use writer::WriterRequest;
 
 /// An open folder. Clones share the connections, the lock and the writer.
 #[derive(Clone)]
 pub(super) struct Folder {
     dir: PathBuf,
     readers: Readers,
-    requests: mpsc::Sender<Request>,
+    requests: mpsc::Sender<WriterRequest>,
     changes: Arc<Changes>,
     /// The first fatal error, of a read or of a write.
     fatal: watch::Sender<Option<StoreError>>,
@@ -82,7 +82,7 @@ impl Folder {
     pub(super) async fn close(&self) {
         self.readers.close().await;
         let (answer, closed) = oneshot::channel();
-        if self.requests.send(Request::Close(answer)).await.is_ok() {
+        if self.requests.send(WriterRequest::Close(answer)).await.is_ok() {
             // An error means that the writer ended first, so the folder is closed as well.
             let _ = closed.await;
         }
@@ -92,7 +92,7 @@ impl Folder {
     pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
-        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+        W: for<'c> FnOnce(StoreConnection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         let (reply, answer) = Reply::new(None);
         self.request(doing, writing(doing, work, reply), answer).await
@@ -102,7 +102,7 @@ impl Folder {
     pub(super) async fn write_to<T, W>(&self, session: &str, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
-        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+        W: for<'c> FnOnce(StoreConnection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         let (reply, answer) = Reply::new(Some(self.changes.of(session)));
         self.request(doing, writing(doing, work, reply), answer).await
@@ -111,7 +111,7 @@ impl Folder {
     /// Appends in the writer, many observations to a statement, and returns after the commit.
     pub(super) async fn append(&self, new: EntryRow) -> Result<Append, StoreError> {
         let (reply, answer) = Reply::new(Some(self.changes.of(&new.session)));
-        self.request(APPENDING, Request::Append(Appending { new, reply }), answer).await
+        self.request(APPENDING, WriterRequest::Append(Appending { new, reply }), answer).await
     }
 
     /// Returns a number that changes with every write to `session`.
@@ -122,7 +122,7 @@ impl Folder {
     async fn request<T>(
         &self,
         doing: &'static str,
-        request: Request,
+        request: WriterRequest,
         answer: oneshot::Receiver<Result<T, StoreError>>,
     ) -> Result<T, StoreError> {
         self.refuse_after_fatal()?;
@@ -140,11 +140,12 @@ impl Folder {
         purpose: Purpose,
         doing: &'static str,
         query: Query,
-    ) -> Result<Vec<Row>, StoreError> {
+    ) -> Result<Vec<StoreRow>, StoreError> {
         let reading = async {
             let acquired = self.readers.of_purpose(purpose).acquire().await;
             let mut reader = acquired.map_err(|error| Failure::sqlite(error).during(doing))?;
-            let result = Connection::Sqlite(&mut reader).rows(query).await.map_err(|failure| failure.during(doing));
+            let result =
+                StoreConnection::Sqlite(&mut reader).rows(query).await.map_err(|failure| failure.during(doing));
             // Its thread may have died, so a failed connection is not used again.
             if result.is_err() {
                 drop(reader.detach());
@@ -165,15 +166,15 @@ impl Folder {
     }
 }
 
-fn writing<T, W>(doing: &'static str, work: W, reply: Reply<T>) -> Request
+fn writing<T, W>(doing: &'static str, work: W, reply: Reply<T>) -> WriterRequest
 where
     T: Send + 'static,
-    W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+    W: for<'c> FnOnce(StoreConnection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
 {
-    Request::Write(Operation::new(
+    WriterRequest::Write(Operation::new(
         doing,
         Undo::Savepoint,
-        move |connection| work(Connection::Sqlite(connection)).boxed(),
+        move |connection| work(StoreConnection::Sqlite(connection)).boxed(),
         reply,
     ))
 }

@@ -5,13 +5,13 @@ use futures_util::future::BoxFuture;
 use sqlx::SqliteConnection;
 use tokio::sync::oneshot;
 
-use super::changes::Change;
+use super::changes::WriteInProgress;
 use crate::store::error::{Failure, StoreError};
 
 /// One caller's reads and writes. If it gets an error instead of a connection, it returns that error to its caller.
 pub(super) struct Operation {
     pub undo: Undo,
-    pub run: Run,
+    pub run: OperationRun,
 }
 
 /// The way to undo the changes of an operation that failed.
@@ -23,27 +23,27 @@ pub(super) enum Undo {
     Statement,
 }
 
-pub(super) type Run =
+pub(super) type OperationRun =
     Box<dyn for<'c> FnOnce(Result<&'c mut SqliteConnection, StoreError>) -> BoxFuture<'c, Ran> + Send>;
 
 /// An operation that ran: the outcome that decides its savepoint, and how to answer its caller once its group has
 /// ended.
 pub(super) struct Ran {
     pub end: Result<(), StoreError>,
-    pub answer: Answer,
+    pub answer: Respond,
 }
 
 /// Answers a caller with the outcome of its group.
-pub(super) type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
+pub(super) type Respond = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
 /// The channel for the outcome of a write, and the change to mark when it ends.
 pub(super) struct Reply<T> {
-    change: Option<Change>,
+    change: Option<WriteInProgress>,
     sender: oneshot::Sender<Result<T, StoreError>>,
 }
 
 impl<T> Reply<T> {
-    pub(super) fn new(change: Option<Change>) -> (Self, oneshot::Receiver<Result<T, StoreError>>) {
+    pub(super) fn new(change: Option<WriteInProgress>) -> (Self, oneshot::Receiver<Result<T, StoreError>>) {
         let (sender, answer) = oneshot::channel();
         (Reply { change, sender }, answer)
     }
@@ -63,7 +63,7 @@ impl Operation {
         T: Send + 'static,
         W: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
-        let run: Run = Box::new(move |connection| {
+        let run: OperationRun = Box::new(move |connection| {
             async move {
                 let result = match connection {
                     Ok(connection) => work(connection).await.map_err(|failure| failure.during(doing)),

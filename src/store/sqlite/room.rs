@@ -7,13 +7,13 @@ use futures_util::FutureExt;
 use super::Folder;
 use super::opening::LOG;
 use crate::store::error::{Failure, StoreError, unusable};
-use crate::store::query::{Connection, Purpose, query};
-use crate::store::retention::Room;
+use crate::store::query::{Purpose, StoreConnection, query};
+use crate::store::retention::StoreSpace;
 
 const DOING: &str = "measuring the store";
 
 impl Folder {
-    pub(in crate::store) async fn room(&self) -> Result<Room, StoreError> {
+    pub(in crate::store) async fn room(&self) -> Result<StoreSpace, StoreError> {
         let pages = query(
             "SELECT page_count, freelist_count, page_size
              FROM pragma_page_count, pragma_freelist_count, pragma_page_size",
@@ -22,7 +22,7 @@ impl Folder {
         let row = rows.first().ok_or_else(|| Failure::sqlite(sqlx::Error::RowNotFound).during(DOING))?;
         let number = |column| row.get::<i64>(column).map(i64::unsigned_abs).map_err(|failure| failure.during(DOING));
         let page_size = number("page_size")?;
-        Ok(Room {
+        Ok(StoreSpace {
             database: number("page_count")? * page_size,
             free: Some(number("freelist_count")? * page_size),
             log: Some(self.dir.join(LOG).metadata().map_or(0, |log| log.len())),
@@ -33,7 +33,7 @@ impl Folder {
     pub(in crate::store) async fn give_back_pages(&self, pages: u32) -> Result<(), StoreError> {
         self.write("giving back free pages", move |connection| {
             async move {
-                let Connection::Sqlite(connection) = connection else { return Ok(()) };
+                let StoreConnection::Sqlite(connection) = connection else { return Ok(()) };
                 let give_back = sqlx::AssertSqlSafe(format!("PRAGMA incremental_vacuum({pages})"));
                 sqlx::query(give_back).fetch_all(connection).await.map(drop).map_err(Failure::sqlite)
             }

@@ -22,7 +22,7 @@ const PAGE_BYTES: std::ops::RangeInclusive<usize> = 512..=65_536;
 
 /// The damaged part of a log.
 #[derive(Debug, PartialEq, Eq, Error)]
-pub(super) enum Damage {
+pub(super) enum LogDamage {
     /// The head, which is written and fsynced before the first frame.
     #[error("the head of the write-ahead log")]
     Head,
@@ -35,7 +35,7 @@ pub(super) enum Damage {
 ///
 /// # Errors
 /// Fails if the file cannot be read.
-pub(super) fn damage(path: &Path) -> std::io::Result<Option<Damage>> {
+pub(super) fn damage(path: &Path) -> std::io::Result<Option<LogDamage>> {
     match File::open(path) {
         Ok(file) => damage_in(BufReader::new(file)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
@@ -43,14 +43,14 @@ pub(super) fn damage(path: &Path) -> std::io::Result<Option<Damage>> {
     }
 }
 
-fn damage_in(mut log: impl Read) -> std::io::Result<Option<Damage>> {
+fn damage_in(mut log: impl Read) -> std::io::Result<Option<LogDamage>> {
     let mut head = [0; HEAD_BYTES];
     if !filled(&mut log, &mut head)? {
         return Ok(None);
     }
-    let Some(mut chain) = Chain::start(&head) else {
+    let Some(mut chain) = ChecksumChain::start(&head) else {
         // Nothing follows the head, so it was still being written.
-        return Ok(filled(&mut log, &mut [0])?.then_some(Damage::Head));
+        return Ok(filled(&mut log, &mut [0])?.then_some(LogDamage::Head));
     };
     let mut frame = vec![0; FRAME_HEAD_BYTES + chain.page_bytes];
     let (mut failed, mut commits, mut number) = (None, 0, 0);
@@ -61,7 +61,7 @@ fn damage_in(mut log: impl Read) -> std::io::Result<Option<Damage>> {
         commits += usize::from(failed.is_some() && chain.is_commit(&frame));
         number += 1;
     }
-    Ok(failed.filter(|_| commits > 1).map(Damage::Frame))
+    Ok(failed.filter(|_| commits > 1).map(LogDamage::Frame))
 }
 
 /// Fills `bytes` from the log; returns false if there are too few.
@@ -74,7 +74,7 @@ fn filled(log: &mut impl Read, bytes: &mut [u8]) -> std::io::Result<bool> {
 }
 
 /// The running checksum of a log: each frame's checksum continues the one before.
-struct Chain {
+struct ChecksumChain {
     /// The byte order of the checksum's words.
     word: fn([u8; 4]) -> u32,
     page_bytes: usize,
@@ -83,15 +83,15 @@ struct Chain {
     sum: [u32; 2],
 }
 
-impl Chain {
+impl ChecksumChain {
     /// Reads the head; returns `None` if it is invalid.
-    fn start(head: &[u8; HEAD_BYTES]) -> Option<Chain> {
+    fn start(head: &[u8; HEAD_BYTES]) -> Option<ChecksumChain> {
         let magic = big_endian(head, 0);
         let word = if magic & 1 == 0 { u32::from_le_bytes } else { u32::from_be_bytes };
         let page_bytes = usize::try_from(big_endian(head, 8)).ok().filter(|bytes| PAGE_BYTES.contains(bytes))?;
         let mut salt = [0; 8];
         salt.copy_from_slice(&head[16..24]);
-        let mut chain = Chain { word, page_bytes, salt, sum: [0; 2] };
+        let mut chain = ChecksumChain { word, page_bytes, salt, sum: [0; 2] };
         chain.add(&head[..24]);
         (magic & !1 == MAGIC && chain.sum == [big_endian(head, 24), big_endian(head, 28)]).then_some(chain)
     }
@@ -144,7 +144,7 @@ mod tests {
         log
     }
 
-    fn damage_of(log: &[u8]) -> Option<Damage> {
+    fn damage_of(log: &[u8]) -> Option<LogDamage> {
         damage_in(log).unwrap()
     }
 
@@ -158,7 +158,7 @@ mod tests {
             let mut changed = log.clone();
             changed[at] ^= 1;
             // The number of the format (bytes 4 to 8) is summed like the rest.
-            assert_eq!(damage_of(&changed), Some(Damage::Head), "byte {at}");
+            assert_eq!(damage_of(&changed), Some(LogDamage::Head), "byte {at}");
         }
         for number in 0..frames {
             for at in [0, 4, 8, 16, FRAME_HEAD_BYTES, frame - 1] {
@@ -166,7 +166,7 @@ mod tests {
                 changed[HEAD_BYTES + number * frame + at] ^= 1;
                 let found = damage_of(&changed);
                 let hidden = frames - 1 - number;
-                assert!(hidden < 2 || found == Some(Damage::Frame(number)), "frame {number}, byte {at}: {found:?}");
+                assert!(hidden < 2 || found == Some(LogDamage::Frame(number)), "frame {number}, byte {at}: {found:?}");
                 assert!(hidden > 0 || found.is_none(), "the last commit may be torn");
             }
         }

@@ -12,9 +12,9 @@ use std::time::Duration;
 use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::batch::{self, Appending, Waiting};
+use super::batch::{self, Appending, NextGroup};
 use super::held::HeldFile;
-use super::operation::{Answer, Operation, Undo};
+use super::operation::{Operation, Respond, Undo};
 use crate::store::entries::ROWS_AT_ONCE;
 use crate::store::error::{Failure, StoreError};
 
@@ -26,7 +26,7 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
 /// The number of requests that may wait in the queue before callers have to wait.
 pub(super) const QUEUE: usize = 1024;
 
-pub(super) enum Request {
+pub(super) enum WriterRequest {
     Write(Operation),
     Append(Appending),
     /// Commits waiting writes, then closes and answers.
@@ -36,7 +36,7 @@ pub(super) enum Request {
 /// Starts the writer on its own thread, so that its many short waits for SQLite do not queue behind requests.
 pub(super) fn start(
     connection: SqliteConnection,
-    requests: mpsc::Receiver<Request>,
+    requests: mpsc::Receiver<WriterRequest>,
     fatal: watch::Sender<Option<StoreError>>,
     held: Vec<HeldFile>,
 ) -> Result<(), StoreError> {
@@ -50,11 +50,11 @@ pub(super) fn start(
 /// the folder's files locked, if it has them, as long as it can write, and ends once one of them is replaced.
 async fn serve(
     mut connection: SqliteConnection,
-    mut requests: mpsc::Receiver<Request>,
+    mut requests: mpsc::Receiver<WriterRequest>,
     fatal: watch::Sender<Option<StoreError>>,
     held: Vec<HeldFile>,
 ) {
-    let mut waiting = Waiting::default();
+    let mut waiting = NextGroup::default();
     let mut closed = Vec::new();
     let mut looks = tokio::time::interval(BETWEEN_LOOKS);
     loop {
@@ -95,8 +95,8 @@ fn verify(held: &[HeldFile]) -> Result<(), StoreError> {
 /// Waits for a request, unless some wait already, and takes those queued behind it, up to a group. Returns false once
 /// there will be no more.
 async fn receive(
-    requests: &mut mpsc::Receiver<Request>,
-    waiting: &mut Waiting,
+    requests: &mut mpsc::Receiver<WriterRequest>,
+    waiting: &mut NextGroup,
     closed: &mut Vec<oneshot::Sender<()>>,
 ) -> bool {
     if !waiting.is_empty() {
@@ -106,9 +106,9 @@ async fn receive(
     let count = requests.recv_many(&mut received, GROUP).await;
     for request in received {
         match request {
-            Request::Write(operation) => waiting.operations.push_back(operation),
-            Request::Append(append) => waiting.appends.push(append),
-            Request::Close(answer) => {
+            WriterRequest::Write(operation) => waiting.operations.push_back(operation),
+            WriterRequest::Append(append) => waiting.appends.push(append),
+            WriterRequest::Close(answer) => {
                 requests.close();
                 closed.push(answer);
             }
@@ -123,7 +123,7 @@ async fn receive(
 /// Returns the error that ended the group before its commit.
 async fn commit_group(
     connection: &mut SqliteConnection,
-    waiting: &mut Waiting,
+    waiting: &mut NextGroup,
     held: &[HeldFile],
 ) -> Result<(), StoreError> {
     let mut answers = Vec::new();
@@ -142,8 +142,8 @@ async fn commit_group(
 
 async fn run_group(
     connection: &mut SqliteConnection,
-    waiting: &mut Waiting,
-    answers: &mut Vec<Answer>,
+    waiting: &mut NextGroup,
+    answers: &mut Vec<Respond>,
 ) -> Result<(), StoreError> {
     if waiting.operations.is_empty() {
         batch::append_all(connection, waiting, answers).await?;

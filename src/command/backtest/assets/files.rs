@@ -3,7 +3,7 @@
 use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsFigures};
 use ballast::report::Csv;
 
-use super::Shown;
+use super::AssetsBacktestPage;
 use crate::command::backtest::files::{estimated, figures, of_returns, of_wealth, plain};
 
 pub fn strategies(report: &AssetsBacktestReport) -> String {
@@ -22,7 +22,7 @@ pub fn strategies(report: &AssetsBacktestReport) -> String {
 
 /// Returns one line per period and strategy, with a column for the holding of each asset; wealth and drawdown at its
 /// end.
-pub fn periods(shown: &Shown) -> String {
+pub fn periods(shown: &AssetsBacktestPage) -> String {
     let assets = &shown.report.assets;
     let header = ["date", "strategy", "allocation", "radius", "traded", "wealth", "drawdown"];
     let held: Vec<String> = assets.iter().map(|asset| format!("held: {asset}")).collect();

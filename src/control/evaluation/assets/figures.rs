@@ -6,7 +6,7 @@ use super::{AssetsLine, AssetsWalked};
 use crate::control::assets::advice::named;
 use crate::control::evaluation::account::uncounted_periods;
 use crate::control::evaluation::backtest_report::BootstrapEstimate;
-use crate::control::evaluation::resampling::{Resampled, Series, intervals};
+use crate::control::evaluation::resampling::{ResampledFigures, StrategySeries, intervals};
 use crate::control::evaluation::yearly_worth::{Scale, YearlyWorth, present_at_once};
 
 /// Returns the index of the strategy with all wealth in equal shares: the last but one.
@@ -20,9 +20,9 @@ impl AssetsBacktestReport {
         let AssetsWalked { backtest, lines } = walked;
         let (record, choices) = (&backtest.record, &backtest.choices);
         let (year, seed) = (record.periods_per_year, choices.seed);
-        let series: Vec<Series> = lines.iter().map(|line| Series::of(&line.account, year)).collect();
+        let series: Vec<StrategySeries> = lines.iter().map(|line| StrategySeries::of(&line.account, year)).collect();
         let scale = Scale { periods_per_year: year, utility: backtest.utility(), seed };
-        let resampled = Resampled::of(&series, backtest.bank(), &scale);
+        let resampled = ResampledFigures::of(&series, backtest.bank(), &scale);
         let performance = compared(lines, &scale).into_iter().enumerate();
         let strategies: Vec<AssetsFigures> =
             performance.map(|(index, compared)| figures(walked, index, compared, &resampled)).collect();
@@ -74,7 +74,7 @@ fn compared(lines: &[AssetsLine], scale: &Scale) -> Vec<Compared> {
     .collect()
 }
 
-fn figures(walked: &AssetsWalked, index: usize, compared: Compared, resampled: &Resampled) -> AssetsFigures {
+fn figures(walked: &AssetsWalked, index: usize, compared: Compared, resampled: &ResampledFigures) -> AssetsFigures {
     let line = &walked.lines[index];
     let assets = &walked.backtest.record.assets;
     let mean = |asset: usize| line.held.iter().map(|shares| shares[asset]).sum::<f64>() / line.held.len() as f64;

@@ -15,7 +15,7 @@ use crate::control::assets::advising::FundsBall;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
 use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
@@ -230,7 +230,7 @@ impl AssetsBacktest {
             watch.go_on()?;
             let problem = self.problem(start, window);
             let fund = problem.fund(self.choices.seed)?;
-            let ball = FundsBall::of(&problem, &OnePeriod::new(&fund, Kept::default()))?;
+            let ball = FundsBall::of(&problem, &OnePeriod::new(&fund, Cache::default()))?;
             done();
             Ok(ball)
         };
@@ -299,10 +299,10 @@ mod tests {
     use super::report::AssetsBacktestReport;
     use super::*;
     use crate::control::assets::advice::AssetsAdvice;
-    use crate::control::evaluation::analysis::{Analysis, Line};
+    use crate::control::evaluation::analysis::{Analysis, StrategyLine};
     use crate::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
     use crate::control::evaluation::names::StrategyKind;
-    use crate::control::evaluation::rolling::{Decision, Period};
+    use crate::control::evaluation::rolling::{ActualPeriod, Decision};
     use crate::control::evaluation::yearly_worth::Scale;
     use crate::control::problem::actions::Band;
     use crate::numerics::fund_bridges::FundBridges;
@@ -349,13 +349,13 @@ mod tests {
     #[test]
     fn assets_that_are_one_have_the_rows_of_one() {
         let walked = walk(record(3, 30, |_, period| log_return(0, period)));
-        let lived: Vec<Period> =
-            (12..30).map(|period| Period { log_return: log_return(0, period), bank_return: BANK }).collect();
+        let lived: Vec<ActualPeriod> =
+            (12..30).map(|period| ActualPeriod { log_return: log_return(0, period), bank_return: BANK }).collect();
         let names = ["Equal shares", "60 % in equal shares", "Robust, balanced, knows 3 years"];
         let line = |name: &str| {
             let decision = |share: &f64| Decision { band: Band::of(&[*share]), radius: 0.0, source: None };
             let decisions = named(&walked, name).account.allocations.iter().map(decision).collect();
-            Line::new((StrategyKind::Adaptive, name.into()), decisions, &lived, COST)
+            StrategyLine::new((StrategyKind::Adaptive, name.into()), decisions, &lived, COST)
         };
         let lines = names.map(line);
         assert!(lines[2].account.allocations.iter().all(|share| (0.05..1.0).contains(share)), "{:?}", lines[2].account);
@@ -470,7 +470,7 @@ mod tests {
         {
             let line = named(&walked, &format!("Robust, {name}, knows 3 years"));
             let problem = AssetsProblem { caution: Some(level), ..walked.backtest.problem(12, Some(12)) };
-            let fund = OnePeriod::new(&problem.fund(walked.backtest.choices.seed).unwrap(), Kept::default());
+            let fund = OnePeriod::new(&problem.fund(walked.backtest.choices.seed).unwrap(), Cache::default());
             let (advice, _) = AssetsAdvice::of(&problem, &[0.0; 3], &fund).unwrap();
             assert_eq!(line.held[0], advice.allocation.into_values().collect::<Vec<f64>>(), "{name}");
             assert!((line.radii[0] - advice.radius).abs() < 1e-12, "{name}");

@@ -24,10 +24,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use self::laws::RecordLaw;
-use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, Resampled};
+use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, ResampledFrontier};
 use crate::control::assets::{AssetsStep, advising};
 use crate::control::error::TrainError;
-use crate::control::kept::Kept;
+use crate::control::kept::Cache;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::annualised::premium;
@@ -60,7 +60,7 @@ pub struct Frontier {
 }
 
 /// The decisions on one record at every scale.
-struct Decided {
+struct RecordDecisions {
     /// Loss at each scale, in the unit of the report.
     lost: Vec<f64>,
     /// Shares of wealth in the assets, at each scale.
@@ -69,7 +69,7 @@ struct Decided {
 
 impl Frontier {
     /// Prepares the answer, with the cache `kept`.
-    pub fn new(question: FrontierQuestion, kept: Kept) -> Self {
+    pub fn new(question: FrontierQuestion, kept: Cache) -> Self {
         let fund = &question.fund.problem;
         let factor = advising::radius_factor(&question.assets, fund, question.request.seed);
         let utility = advising::utility(fund);
@@ -95,7 +95,7 @@ impl Frontier {
         ];
         let done = AtomicUsize::new(0);
         let drawn = resampled.into_iter().map(|(kind, law)| self.resampled(kind, &law, &done, watch));
-        let resampled = drawn.collect::<Result<Vec<Resampled>, TrainError>>()?;
+        let resampled = drawn.collect::<Result<Vec<ResampledFrontier>, TrainError>>()?;
         let (evidence, per_year) = (self.evidence(), assets.periods_per_year.is_some());
         Ok(FrontierReport {
             format: FORMAT.to_owned(),
@@ -117,7 +117,7 @@ impl Frontier {
         law: &RecordLaw,
         done: &AtomicUsize,
         watch: &Watch,
-    ) -> Result<Resampled, TrainError> {
+    ) -> Result<ResampledFrontier, TrainError> {
         let request = &self.question.request;
         let best = self.step(&law.rows, 0.0).solve(None).allocation;
         let best_worth = self.worth(law, &best);
@@ -128,14 +128,15 @@ impl Frontier {
             let rows = law.record(kind, self.question.assets.history.len(), request.seed, index)?;
             let allocations = self.decide(&rows, watch)?;
             let lost = allocations.iter().map(|allocation| self.unit() * (best_worth - self.worth(law, allocation)));
-            let decided = Decided { lost: lost.collect(), allocations };
+            let decided = RecordDecisions { lost: lost.collect(), allocations };
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             if done.is_multiple_of(every) || done == total {
                 (watch.progress)(StepProgress { step: 0, phase: Phase::Simulating, done, total });
             }
             Ok(decided)
         };
-        let decided = (0..resamples).into_par_iter().map(decide).collect::<Result<Vec<Decided>, TrainError>>()?;
+        let decided =
+            (0..resamples).into_par_iter().map(decide).collect::<Result<Vec<RecordDecisions>, TrainError>>()?;
         let sample = Clustered::new(resamples, 1, LEVEL);
         let least = least_on_average(&decided);
         let points = request.scales.iter().enumerate().map(|(index, &scale)| {
@@ -155,7 +156,7 @@ impl Frontier {
                 total: average.iter().sum(),
             }
         });
-        Ok(Resampled { bootstrap: kind, best, points: points.collect() })
+        Ok(ResampledFrontier { bootstrap: kind, best, points: points.collect() })
     }
 
     /// Returns, for each record, the worth of its allocation less that of the average allocation, linearised in the
@@ -247,7 +248,7 @@ fn average<'a>(allocations: impl ExactSizeIterator<Item = &'a [f64]>) -> Vec<f64
     allocations.fold(Vec::new(), add)
 }
 
-fn least_on_average(decided: &[Decided]) -> usize {
+fn least_on_average(decided: &[RecordDecisions]) -> usize {
     let scales = decided.first().map_or(0, |decided| decided.lost.len());
     let total = |index: usize| decided.iter().map(|decided| decided.lost[index]).sum::<f64>();
     (0..scales).min_by(|&one, &other| total(one).total_cmp(&total(other))).unwrap_or(0)

@@ -29,7 +29,7 @@ pub struct FrontierReport {
     /// Advice at the record itself, scale by scale: the share of wealth in each asset, in the order of the request.
     pub own: Vec<Vec<f64>>,
     /// Results for each law that records were drawn from.
-    pub resampled: Vec<Resampled>,
+    pub resampled: Vec<ResampledFrontier>,
     /// Sentences on what the figures show, and what they cannot show.
     pub sentences: Vec<String>,
 }
@@ -57,7 +57,7 @@ pub enum Bootstrap {
 
 /// The frontier on records drawn from one law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Resampled {
+pub struct ResampledFrontier {
     /// How the records were drawn.
     pub bootstrap: Bootstrap,
     /// The best allocation under the known law: the share of wealth in each asset.

@@ -1,12 +1,12 @@
 //! Sentences about a frontier.
 
-use super::report::{Bootstrap, Resampled};
+use super::report::{Bootstrap, ResampledFrontier};
 
 /// Standard errors beyond which a premium counts as distinguishable from none.
 const TOLD: f64 = 2.0;
 
 /// Returns the findings in sentences, the most important first.
-pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) -> Vec<String> {
+pub(super) fn sentences(resampled: &[ResampledFrontier], evidence: f64, per_year: bool) -> Vec<String> {
     let mut sentences: Vec<String> = resampled.iter().filter_map(|resampled| of_one(resampled, per_year)).collect();
     sentences.extend(resampled.first().map(|first| of_own_mix(first, per_year)));
     let behind = if evidence < 0.0 { "below" } else { "above" };
@@ -53,7 +53,7 @@ fn opening(words: &str) -> String {
 }
 
 /// Compares following each record with holding the average of its advice.
-fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
+fn of_own_mix(resampled: &ResampledFrontier, per_year: bool) -> String {
     let per = if per_year { "a year" } else { "a period" };
     let lost = |beyond: f64| percent((-beyond).max(0.0));
     let each: Vec<String> = resampled
@@ -68,7 +68,7 @@ fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
 }
 
 /// Names the scale that loses least, and the scales indistinguishable from it.
-fn of_one(resampled: &Resampled, per_year: bool) -> Option<String> {
+fn of_one(resampled: &ResampledFrontier, per_year: bool) -> Option<String> {
     let least = resampled.points.iter().find(|point| point.beyond_least.is_none())?;
     let steadiest =
         resampled.points.iter().min_by(|one, other| one.deviation.value.total_cmp(&other.deviation.value))?;

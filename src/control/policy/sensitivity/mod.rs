@@ -68,10 +68,10 @@ pub struct NextReturn {
     #[schema(value_type = [f64; 2])]
     pub range: [f64; 2],
     /// The return up to which the advice is the bank alone, and above which it no longer is; null if there is none.
-    pub to_bank: Option<Return>,
+    pub to_bank: Option<ReturnAndLog>,
     /// The return from which the advice is the highest allocation, and below which it is not yet; null if there is
     /// none.
-    pub to_highest: Option<Return>,
+    pub to_highest: Option<ReturnAndLog>,
     /// Advice after a return at the 5 % quantile of the record.
     pub low: NextAdvice,
     /// Advice after a return at the 95 % quantile of the record.
@@ -80,7 +80,7 @@ pub struct NextReturn {
 
 /// A return in both units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
-pub struct Return {
+pub struct ReturnAndLog {
     /// `ln(price / previous price)`.
     pub log_return: f64,
     /// `price / previous price - 1`.

@@ -1,6 +1,6 @@
 //! Computes the advice for other records, and finds the changes of advice between them.
 
-use super::{LeftOut, NextAdvice, NextReturn, Premium, Return, Sensitivity, WithoutOne};
+use super::{LeftOut, NextAdvice, NextReturn, Premium, ReturnAndLog, Sensitivity, WithoutOne};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
@@ -42,7 +42,7 @@ const FAR: f64 = 0.5;
 const MOST_PERIODS: usize = 10_000;
 
 /// An advice, and functions that compute the advice in other cases.
-struct Asked<'a> {
+struct AdviceVariants<'a> {
     /// The record, in the order in which the returns came.
     record: &'a [f64],
     advice: &'a Advice,
@@ -88,7 +88,7 @@ impl Advisor {
         let problem = &self.specification().problem;
         let highest = self.highest_action(step, state);
         let design = self.designed();
-        Asked { record, advice, problem, highest, design, of, within: &within }.sensitivity()
+        AdviceVariants { record, advice, problem, highest, design, of, within: &within }.sensitivity()
     }
 
     /// Returns the number of design points of the value after a step; 0 if the step is the last.
@@ -129,7 +129,7 @@ pub(in crate::control::policy) fn check_learning(
     Err(FieldError::new("sensitivity", true, rule))
 }
 
-impl Asked<'_> {
+impl AdviceVariants<'_> {
     fn sensitivity(&self) -> Sensitivity {
         let without_one = self.without_one();
         let next_return = self.next_return();
@@ -151,7 +151,7 @@ impl Asked<'_> {
         let found = pool::map(order, |index| {
             let rest = [&self.record[..index], &self.record[index + 1..]].concat();
             rules::history("history", &rest, self.problem.learning).ok()?;
-            let Return { log_return, simple_return } = Return::of(self.record[index]);
+            let ReturnAndLog { log_return, simple_return } = ReturnAndLog::of(self.record[index]);
             Some(LeftOut { index, log_return, simple_return, allocation: (self.of)(&rest) })
         });
         let by_allocation = |one: &&LeftOut, other: &&LeftOut| one.allocation.total_cmp(&other.allocation);
@@ -227,14 +227,14 @@ impl Asked<'_> {
         let (bank, top) =
             pool::join(|| crossing(&is_invested), || crossing(&|allocation| allocation >= self.highest - AT_AN_END));
         let next = |index: usize| {
-            let Return { log_return, simple_return } = Return::of(quantile(QUANTILES[index]));
+            let ReturnAndLog { log_return, simple_return } = ReturnAndLog::of(quantile(QUANTILES[index]));
             let allocation = told[grid.len() + index];
             NextAdvice { quantile: QUANTILES[index], log_return, simple_return, allocation }
         };
         NextReturn {
             range,
-            to_bank: bank.map(|[below, _]| Return::of(below)),
-            to_highest: top.map(|[_, above]| Return::of(above)),
+            to_bank: bank.map(|[below, _]| ReturnAndLog::of(below)),
+            to_highest: top.map(|[_, above]| ReturnAndLog::of(above)),
             low: next(0),
             high: next(1),
         }
@@ -317,8 +317,8 @@ fn parted([mut below, mut above]: [f64; 2], is_above: impl Fn(f64) -> bool) -> [
     [below, above]
 }
 
-impl Return {
+impl ReturnAndLog {
     fn of(log_return: f64) -> Self {
-        Return { log_return, simple_return: log_return.exp_m1() }
+        ReturnAndLog { log_return, simple_return: log_return.exp_m1() }
     }
 }
