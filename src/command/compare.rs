@@ -18,7 +18,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 const TICKS: u64 = 1000;
 
 /// The worker threads, and the screen that shows their progress.
-pub struct Workshop {
+pub struct ComparisonRun {
     pool: TrainingPool,
     stop: AtomicBool,
     bar: Option<ProgressBar>,
@@ -27,7 +27,7 @@ pub struct Workshop {
     started: Instant,
 }
 
-impl Workshop {
+impl ComparisonRun {
     /// Starts threads on every core, because this process serves no clients.
     ///
     /// # Errors
@@ -40,7 +40,7 @@ impl Workshop {
             }
             bar
         });
-        Ok(Workshop {
+        Ok(ComparisonRun {
             pool: TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?,
             stop: AtomicBool::new(false),
             bar,

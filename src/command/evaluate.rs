@@ -12,7 +12,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::bench::paper;
-use super::compare::Workshop;
+use super::compare::ComparisonRun;
 use super::tables;
 
 #[derive(Debug, Clone, Args)]
@@ -39,7 +39,7 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
             FieldError::new("policies", policy, "must be left out: policies are known to a service alone").into()
         );
     }
-    let workshop = Workshop::new()?;
+    let workshop = ComparisonRun::new()?;
     let evaluation = Evaluation::new(request)?;
     for warning in evaluation.request.problem.warnings() {
         eprintln!("{}", warning.message);

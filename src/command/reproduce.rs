@@ -9,7 +9,7 @@ use ballast::report::{self, Csv};
 use clap::Args;
 use serde::Serialize;
 
-use super::compare::Workshop;
+use super::compare::ComparisonRun;
 use super::evaluate::write;
 use super::tables;
 
@@ -107,7 +107,7 @@ struct Reproduction {
 pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
     let plan = if arguments.quick { ReproductionPlan::quick() } else { ReproductionPlan::full() };
     std::fs::create_dir_all(&arguments.out)?;
-    let workshop = Workshop::new()?;
+    let workshop = ComparisonRun::new()?;
     let section = runs::section(&plan, &workshop)?;
     let study = runs::study(&plan, &workshop)?;
     workshop.finish();

@@ -28,7 +28,7 @@ use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::measured::SharedSummaries;
 
 /// Summaries of the laws of a design.
-pub type Summaries = SharedSummaries<LawSummary>;
+pub type LawSummaryCache = SharedSummaries<LawSummary>;
 
 /// Placeholder for a wealth that no feature uses.
 const NO_WEALTH: f64 = 1.0;
@@ -37,7 +37,7 @@ const NO_WEALTH: f64 = 1.0;
 pub struct Training {
     problem: Problem,
     design: Design,
-    measured: Arc<Summaries>,
+    measured: Arc<LawSummaryCache>,
 }
 
 impl Training {
@@ -62,7 +62,11 @@ impl Training {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn among(specification: &Specification, kept: Cache, measured: Arc<Summaries>) -> Result<Self, TrainError> {
+    pub fn among(
+        specification: &Specification,
+        kept: Cache,
+        measured: Arc<LawSummaryCache>,
+    ) -> Result<Self, TrainError> {
         let specification = specification.clone().completed()?.resolved(&kept);
         let design = Design::new(&specification);
         Ok(Training { design, problem: Problem::with(&specification, kept), measured })
@@ -138,7 +142,7 @@ impl Training {
 struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
-    measured: &'a Summaries,
+    measured: &'a LawSummaryCache,
     /// Radii of the candidates, if their features were computed with them.
     radii: Vec<OnceLock<f64>>,
 }

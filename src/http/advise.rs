@@ -69,17 +69,17 @@ pub async fn advise(
 /// The parts of a request that show if it gives a horizon and if it names assets.
 #[derive(Deserialize)]
 struct AdviseShape {
-    problem: SaidOfProblem,
+    problem: ProblemShape,
 }
 
 #[derive(Deserialize)]
-pub(super) struct SaidOfProblem {
+pub(super) struct ProblemShape {
     horizon: Option<IgnoredAny>,
     pub(super) assets: Option<IgnoredAny>,
 }
 
 /// Reads the shape of `problem`; `None` if there is no readable problem.
-pub(super) fn said(bytes: &[u8]) -> Option<SaidOfProblem> {
+pub(super) fn said(bytes: &[u8]) -> Option<ProblemShape> {
     decode::object(bytes).ok().map(|AdviseShape { problem }| problem)
 }
 

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::access::{CallerOf, HeavyCalls};
-use super::advise::{SaidOfProblem, said};
+use super::advise::{ProblemShape, said};
 use super::decode;
 use super::extract::JsonBytes;
 use super::jobs::{Queueing, accepted, idempotency_key};
@@ -47,7 +47,7 @@ struct Only<P> {
 /// Decodes the request. Its problem is decoded by itself first, so that an error names the right field.
 fn request(bytes: &[u8]) -> Result<FrontierRequest, ProblemDocument> {
     match said(bytes) {
-        Some(SaidOfProblem { assets: Some(_), .. }) => reads::<AssetsProblem>(bytes)?,
+        Some(ProblemShape { assets: Some(_), .. }) => reads::<AssetsProblem>(bytes)?,
         Some(_) => reads::<ProblemSpecification>(bytes)?,
         None => {}
     }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoResponses, ToSchema};
 
 use super::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
-use super::advise::{SaidOfProblem, said};
+use super::advise::{ProblemShape, said};
 use super::bodies;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
@@ -95,7 +95,7 @@ pub enum TrainQuestion {
 /// Decodes the request by its shape, so that an error names the right field.
 fn question(bytes: &[u8]) -> Result<TrainQuestion, ProblemDocument> {
     match said(bytes) {
-        Some(SaidOfProblem { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
+        Some(ProblemShape { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
         _ => decode::object(bytes).map(TrainQuestion::Asset),
     }
 }

@@ -21,7 +21,7 @@ use crate::service::memory::Large;
 use crate::service::overview::Listed;
 use crate::store::LONGEST_TAG;
 use crate::store::{
-    Care, CareCounts, Counted, Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery,
+    Attention, CareCounts, Counted, Labels, SessionFilter, SessionKey, SessionOrder, SessionPlace, SessionQuery,
 };
 
 /// Most letters of a search text: more than any name has.
@@ -33,23 +33,23 @@ const LONGEST_SEARCH: usize = 100;
 pub struct SessionListQuery {
     search: Option<String>,
     tag: Option<String>,
-    state: Option<Is>,
+    state: Option<SessionFilterName>,
     sort: Option<String>,
     limit: Option<String>,
     after: Option<String>,
-    count: Option<Count>,
+    count: Option<CountName>,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-enum Count {
+enum CountName {
     Total,
     Care,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-enum Is {
+enum SessionFilterName {
     Active,
     Waiting,
     Completed,
@@ -143,13 +143,13 @@ pub enum CareReason {
     Ending,
 }
 
-impl From<Care> for CareReason {
-    fn from(care: Care) -> Self {
+impl From<Attention> for CareReason {
+    fn from(care: Attention) -> Self {
         match care {
-            Care::Overdue => CareReason::Overdue,
-            Care::Renewal => CareReason::Renewal,
-            Care::Alarm => CareReason::Alarm,
-            Care::Ending => CareReason::Ending,
+            Attention::Overdue => CareReason::Overdue,
+            Attention::Renewal => CareReason::Renewal,
+            Attention::Alarm => CareReason::Alarm,
+            Attention::Ending => CareReason::Ending,
         }
     }
 }
@@ -197,11 +197,11 @@ pub struct SessionPage {
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
     params(("search" = Option<String>, Query, max_length = 100, description = "Words, each the beginning of a word of the session's name or tags, of its policy's name or tags, or eight digits or more with which either's identifier begins, in any order and whatever the case."),
            ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
-           ("state" = inline(Option<Is>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
+           ("state" = inline(Option<SessionFilterName>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
            ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
            ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`."),
-           ("count" = inline(Option<Count>), Query, description = "`total`: how many match; `care`: that, and how many need care. Each reads every session that matches, so ask for it once, with the first page.")),
+           ("count" = inline(Option<CountName>), Query, description = "`total`: how many match; `care`: that, and how many need care. Each reads every session that matches, so ask for it once, with the first page.")),
     responses(
         (status = 200, description = "A page of sessions.", body = SessionPage),
         (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
@@ -245,18 +245,18 @@ impl SessionListQuery {
             }
         };
         let is = self.state.map(|state| match state {
-            Is::Active => SessionIs::Active,
-            Is::Waiting => SessionIs::Waiting,
-            Is::Completed => SessionIs::Completed,
-            Is::Care => SessionIs::Needing(None),
-            Is::Overdue => SessionIs::Needing(Some(Care::Overdue)),
-            Is::Renewal => SessionIs::Needing(Some(Care::Renewal)),
-            Is::Alarm => SessionIs::Needing(Some(Care::Alarm)),
-            Is::Ending => SessionIs::Needing(Some(Care::Ending)),
+            SessionFilterName::Active => SessionFilter::Active,
+            SessionFilterName::Waiting => SessionFilter::Waiting,
+            SessionFilterName::Completed => SessionFilter::Completed,
+            SessionFilterName::Care => SessionFilter::Needing(None),
+            SessionFilterName::Overdue => SessionFilter::Needing(Some(Attention::Overdue)),
+            SessionFilterName::Renewal => SessionFilter::Needing(Some(Attention::Renewal)),
+            SessionFilterName::Alarm => SessionFilter::Needing(Some(Attention::Alarm)),
+            SessionFilterName::Ending => SessionFilter::Needing(Some(Attention::Ending)),
         });
         let counted = self.count.map_or(Counted::Nothing, |count| match count {
-            Count::Total => Counted::Total,
-            Count::Care => Counted::Care,
+            CountName::Total => Counted::Total,
+            CountName::Care => Counted::Care,
         });
         let search = self.search.filter(|search| !search.is_empty());
         let asked =

@@ -16,7 +16,7 @@ use crate::control::request::framework::Framework;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
-use crate::service::assets::Composed;
+use crate::service::assets::Composition;
 use crate::service::drift::Drift;
 use crate::service::jobs::{Accepted, TrackedJob as ServiceJob};
 use crate::service::known::InitialHistory;
@@ -235,7 +235,7 @@ pub struct Session {
     pub holding: f64,
     /// Holdings of several assets, before the coming period.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub assets: Option<Composed>,
+    pub assets: Option<Composition>,
     pub sample_size: usize,
     /// Number of corrections; the next one has this number plus one.
     pub corrections: usize,

@@ -45,7 +45,7 @@ impl AbsoluteBridges {
         let mut statistics: Vec<_> = laws.iter().map(|_| vec![0.0; self.paths.next_multiple_of(PATHS)]).collect();
         for (index, block) in self.blocks().enumerate() {
             for (waiting, statistic) in weights.iter().zip(&mut statistics) {
-                waiting.pour(block, &mut statistic.as_chunks_mut().0[index]);
+                waiting.accumulate(block, &mut statistic.as_chunks_mut().0[index]);
             }
         }
         statistics.iter_mut().for_each(|statistic| statistic.truncate(self.paths));
@@ -55,7 +55,7 @@ impl AbsoluteBridges {
     /// Returns the weight of |B| at each time in the statistic of a law.
     pub(super) fn nodes(&self, law: &EmpiricalDistribution) -> Vec<f64> {
         let mut weights = Weights::new(self);
-        for (pair, shares) in law.atoms().windows(2).zip(self.shares_of(law, Statistic::Now)) {
+        for (pair, shares) in law.atoms().windows(2).zip(self.shares_of(law, Statistic::Current)) {
             weights.place(&shares, pair[1] - pair[0]);
         }
         weights.weights.iter().zip(&self.units).map(|(weight, unit)| weight / unit).collect()
@@ -117,7 +117,7 @@ impl AbsoluteBridges {
 
     /// Returns the (1 - alpha)-quantile for the law itself, with the standard error of its simulation.
     pub fn bridge_quantile_with_error(&self, law: &EmpiricalDistribution, alpha: f64) -> Quantile {
-        let statistic = self.directional_statistic(law, Statistic::Now);
+        let statistic = self.directional_statistic(law, Statistic::Current);
         let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &statistic);
         Quantile { value, standard_error }
     }
@@ -189,9 +189,9 @@ impl AbsoluteBridges {
             let some = &carried[first..self.paths.min(first + PATHS)];
             on_the_way[..some.len()].copy_from_slice(some);
             for ([on, own], all) in entered.iter().zip(all.chunks_exact_mut(self.paths)) {
-                on.pour(block, &mut on_the_way);
+                on.accumulate(block, &mut on_the_way);
                 let mut sums = on_the_way;
-                own.pour(block, &mut sums);
+                own.accumulate(block, &mut sums);
                 keep(&sums, first, all);
             }
             keep(&on_the_way, first, carried);
@@ -249,7 +249,7 @@ struct GapWeights {
 
 impl GapWeights {
     /// Adds the weighted values to the statistics of a block of paths.
-    fn pour(&self, block: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
+    fn accumulate(&self, block: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
         dispatched!(add_nodes(&self.weights, &block[self.first..], sums));
     }
 }
@@ -295,13 +295,13 @@ mod tests {
             };
             let laws = [law(0), law(1), law(5)];
             let laws: Vec<&EmpiricalDistribution> = laws.iter().collect();
-            let together = bridges.directional_statistics(&laws, Statistic::Now);
+            let together = bridges.directional_statistics(&laws, Statistic::Current);
             let alone: Vec<Vec<f64>> =
-                laws.iter().map(|law| bridges.directional_statistic(law, Statistic::Now)).collect();
+                laws.iter().map(|law| bridges.directional_statistic(law, Statistic::Current)).collect();
             assert_eq!(together, alone, "{size} {paths}");
-            let quantiles = bridges.bridge_quantiles(&laws, &[], Statistic::Now, &[0.1, 0.5]);
+            let quantiles = bridges.bridge_quantiles(&laws, &[], Statistic::Current, &[0.1, 0.5]);
             for (law, found) in laws.iter().zip(quantiles) {
-                let alone = [0.1, 0.5].map(|alpha| bridges.bridge_quantile(law, Statistic::Now, alpha));
+                let alone = [0.1, 0.5].map(|alpha| bridges.bridge_quantile(law, Statistic::Current, alpha));
                 // The tolerance of one of many quantiles.
                 assert!(found.iter().zip(alone).all(|(found, alone)| (found / alone - 1.0).abs() < 1e-5));
             }
@@ -319,7 +319,7 @@ mod tests {
                 (&large, [2, 3].map(|seed| AbsoluteBridges::graded(50, seed))),
             ] {
                 let law = EmpiricalDistribution::decaying(sample, retention);
-                for (which, bridges) in [Statistic::Now, Statistic::OneLater].into_iter().zip(bridges) {
+                for (which, bridges) in [Statistic::Current, Statistic::AfterOneMore].into_iter().zip(bridges) {
                     let carried = bridges.bridge_quantiles_with(&law, &values, which, 0.1);
                     for (value, quantile) in values.iter().zip(carried) {
                         let mut larger = law.clone();
@@ -338,7 +338,7 @@ mod tests {
         let sample = [0.02, -0.05, 0.11, 0.04, 0.07, -0.13, 0.005];
         let (equal, decaying) =
             (EmpiricalDistribution::new(&sample), EmpiricalDistribution::decaying(&sample, 1.0 - 1e-15));
-        for (size, which) in [(7, Statistic::Now), (8, Statistic::OneLater)] {
+        for (size, which) in [(7, Statistic::Current), (8, Statistic::AfterOneMore)] {
             let bridges = AbsoluteBridges::simulate(size, 500, 3);
             let [one, other] = [&equal, &decaying].map(|law| bridges.bridge_quantile(law, which, 0.1));
             // Times move by about 1e-15, and between two nodes |B| grows by about its size; the tolerance of a quantile
@@ -357,7 +357,7 @@ mod tests {
                 plain.iter_mut().zip(bridges.at(time)).for_each(|(sum, value)| *sum += (pair[1] - pair[0]) * value);
             }
             let law = EmpiricalDistribution::new(&atoms);
-            for (found, plain) in bridges.directional_statistic(&law, Statistic::Now).iter().zip(plain) {
+            for (found, plain) in bridges.directional_statistic(&law, Statistic::Current).iter().zip(plain) {
                 // 16 fused sums of positive numbers, each rounded by at most 2^-24 of itself, and 16 weights.
                 assert!((found / plain - 1.0).abs() < 32.0 * 2.0_f64.powi(-24), "{size}: {found} against {plain}");
             }
@@ -377,7 +377,7 @@ mod tests {
 
     /// Returns the plain estimate: the order statistic of H over whole paths, with the share `alpha` above it.
     fn order_statistic(whole: &AbsoluteBridges, law: &EmpiricalDistribution, alpha: f64) -> f64 {
-        let mut statistic = whole.directional_statistic(law, Statistic::Now);
+        let mut statistic = whole.directional_statistic(law, Statistic::Current);
         statistic.sort_by(f64::total_cmp);
         statistic[((1.0 - alpha) * statistic.len() as f64) as usize]
     }
@@ -415,10 +415,10 @@ mod tests {
                 let mut doubled = law.clone();
                 doubled.push(atom);
                 let (statistic, mass) =
-                    (bridges.directional_statistic(&doubled, Statistic::Now), weight / law.total_weight());
+                    (bridges.directional_statistic(&doubled, Statistic::Current), weight / law.total_weight());
                 mean.iter_mut().zip(statistic).for_each(|(sum, value)| *sum += mass * value);
             }
-            for (found, expected) in bridges.directional_statistic(&law, Statistic::OneLater).iter().zip(mean) {
+            for (found, expected) in bridges.directional_statistic(&law, Statistic::AfterOneMore).iter().zip(mean) {
                 // A dozen numbers, each rounded to single precision a few times.
                 assert!((found / expected - 1.0).abs() < 24.0 * 2.0_f64.powi(-24));
             }
@@ -436,7 +436,8 @@ mod tests {
         // different.
         let allowed = 4.0 * expected.standard_error.hypot(found.standard_error);
         assert!((found.value - expected.value).abs() < allowed, "{found:?} against {expected:?}");
-        let mean_of = |whole: AbsoluteBridges| whole.directional_statistic(&law, Statistic::Now).iter().sum::<f64>();
+        let mean_of =
+            |whole: AbsoluteBridges| whole.directional_statistic(&law, Statistic::Current).iter().sum::<f64>();
         let [exact, graded] =
             [AbsoluteBridges::whole(1500, 2000, 4), AbsoluteBridges::whole_graded(2000, 4)].map(mean_of);
         // The statistic's deviation is about half its mean, so four standard errors of the mean of 2000 are 5 %.

@@ -126,7 +126,7 @@ fn needed<R: Rng>(
             let places = law.draw(&mut generator);
             let values: Vec<f64> = places.iter().map(|&place| law.atoms[place]).collect();
             let seen = EmpiricalDistribution::decaying(&values, retention);
-            let radius = bridges.bridge_quantile(&seen, Statistic::Now, alpha) / seen.effective_size().sqrt();
+            let radius = bridges.bridge_quantile(&seen, Statistic::Current, alpha) / seen.effective_size().sqrt();
             (radius > 0.0).then(|| law.distance(&places) / radius)
         });
         needed.unwrap_or(1.0)

@@ -31,7 +31,7 @@ pub fn p_value(law: &EmpiricalDistribution, value: f64, tie: f64) -> f64 {
 
 /// The wealth of the test martingale after a number of bets.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Capital {
+pub struct TestMartingale {
     bets: usize,
     /// L = -sum ln p_i.
     surprise: f64,
@@ -39,19 +39,19 @@ pub struct Capital {
     highest: f64,
 }
 
-impl Default for Capital {
+impl Default for TestMartingale {
     /// Returns wealth 1, before the first bet.
     fn default() -> Self {
-        Capital { bets: 0, surprise: 0.0, highest: 0.0 }
+        TestMartingale { bets: 0, surprise: 0.0, highest: 0.0 }
     }
 }
 
-impl Capital {
-    /// Returns the wealth after one more p-value. Cost: as [`Capital::log`].
+impl TestMartingale {
+    /// Returns the wealth after one more p-value. Cost: as [`TestMartingale::log`].
     #[must_use]
     pub fn after(self, p_value: f64) -> Self {
-        let next = Capital { bets: self.bets + 1, surprise: self.surprise - p_value.ln(), ..self };
-        Capital { highest: self.highest.max(next.log()), ..next }
+        let next = TestMartingale { bets: self.bets + 1, surprise: self.surprise - p_value.ln(), ..self };
+        TestMartingale { highest: self.highest.max(next.log()), ..next }
     }
 
     /// Returns ln of the largest wealth reached so far.

@@ -7,12 +7,12 @@ use super::empirical::EmpiricalDistribution;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Statistic {
     /// The statistic of the law itself, over bridges of sample size n.
-    Now,
+    Current,
     /// The mean over the laws that add one of its values again, each with the mass of that value, over bridges of
     /// sample size n + 1. This is the expected statistic if the next value is drawn from the law itself. With equal
     /// weights, a value doubled at rank j moves the gaps above it one node up. Gap i is therefore at node i in n - i of
     /// the laws, and at node i + 1 in the other i.
-    OneLater,
+    AfterOneMore,
 }
 
 /// Mass below or above a gap that counts as zero: the bridge is within 1e-7 of 0.
@@ -35,7 +35,11 @@ impl<'a> SizedGaps<'a> {
     /// Prepares for laws of `size` values whose weights sum to `total`.
     pub fn new(bridges: &'a AbsoluteBridges, size: usize, total: f64, retention: f64, which: Statistic) -> Self {
         if let Times::Sample(own) = bridges.times {
-            assert_eq!(own, size + usize::from(which == Statistic::OneLater), "bridges of the sample size of the law");
+            assert_eq!(
+                own,
+                size + usize::from(which == Statistic::AfterOneMore),
+                "bridges of the sample size of the law"
+            );
         }
         SizedGaps { bridges, total, retention, which, near: 0 }
     }
@@ -47,11 +51,11 @@ impl<'a> SizedGaps<'a> {
     /// Returns the times and weights of a gap with values of total weight `below` under it.
     pub fn of(&mut self, below: f64) -> [Share; 4] {
         match self.which {
-            Statistic::Now => {
+            Statistic::Current => {
                 let [first, second] = self.at(below, self.total);
                 [first, second, NONE, NONE]
             }
-            Statistic::OneLater => {
+            Statistic::AfterOneMore => {
                 let share = below / self.total;
                 let (kept, total) = (below * self.retention, self.total * self.retention + 1.0);
                 let [first, second] = self.at(kept, total).map(|(time, part)| (time, (1.0 - share) * part));

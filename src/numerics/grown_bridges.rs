@@ -97,7 +97,7 @@ impl AbsoluteBridges {
 }
 
 impl Tables {
-    /// Fills the tables for the paths from `first` on. For [`Statistic::OneLater`], `|B|` is its mean over the laws
+    /// Fills the tables for the paths from `first` on. For [`Statistic::AfterOneMore`], `|B|` is its mean over the laws
     /// that add one of the values again.
     #[inline(always)]
     fn fill(&mut self, bridges: &AbsoluteBridges, first: usize, which: Statistic, base: &[f64]) {
@@ -106,8 +106,8 @@ impl Tables {
         for (index, fall) in self.falls.iter_mut().enumerate() {
             let next = bridges.some(index + 2, first);
             let share = match which {
-                Statistic::Now => 0.0,
-                Statistic::OneLater => (index + 1) as f32 / size,
+                Statistic::Current => 0.0,
+                Statistic::AfterOneMore => (index + 1) as f32 / size,
             };
             for path in 0..PATHS {
                 let here = (1.0 - share) * node[path] + share * next[path];
@@ -178,7 +178,7 @@ mod tests {
             let laws: Vec<EmpiricalDistribution> =
                 (0..16).map(|law| EmpiricalDistribution::new(&sample(law))).collect();
             let laws: Vec<&EmpiricalDistribution> = laws.iter().collect();
-            for (later, which) in [Statistic::Now, Statistic::OneLater].into_iter().enumerate() {
+            for (later, which) in [Statistic::Current, Statistic::AfterOneMore].into_iter().enumerate() {
                 let bridges = AbsoluteBridges::simulate(base.len() + learned + later, paths, 5);
                 let found = bridges.grown_statistics(&laws, &base, which).unwrap();
                 for (law, found) in laws.iter().zip(found) {

@@ -96,7 +96,7 @@ impl<'a> MinimumSearch<'a> {
     }
 
     /// Finds the runs that move at a multiplier, each in the better of two directions. Cost O(points between).
-    fn look(&mut self, multiplier: f64) {
+    fn sweep(&mut self, multiplier: f64) {
         let (support, payoff) = (self.ball.support, self.payoff);
         let MinimumSearch { from, between, runs, downs, ups, .. } = self;
         let levels = |slope: f64| Levels { support, payoff, slope };
@@ -131,7 +131,7 @@ impl<'a> MinimumSearch<'a> {
 
     /// Returns the best plan at a multiplier. Cost O(points between).
     fn plan(&mut self, multiplier: f64) -> DualPlan {
-        self.look(multiplier);
+        self.sweep(multiplier);
         let WassersteinBall { support, masses, .. } = *self.ball;
         let beyond = |values: &[f64]| {
             let of_run = |MassRun { points, to }: &MassRun| {
@@ -144,7 +144,7 @@ impl<'a> MinimumSearch<'a> {
     }
 
     /// Drops the mass that stays in the latest plan; its multiplier must be below the one sought.
-    fn narrow(&mut self) {
+    fn restrict(&mut self) {
         let support = self.ball.support;
         let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
         for MassRun { points, to } in &self.runs {
@@ -172,7 +172,7 @@ impl<'a> MinimumSearch<'a> {
             }
             let plan = self.plan(multiplier);
             if plan.cost > radius {
-                self.narrow();
+                self.restrict();
                 far = Some(plan);
             } else {
                 near = plan;
@@ -191,7 +191,7 @@ impl<'a> MinimumSearch<'a> {
                 break;
             }
             if plan.cost > radius {
-                self.narrow();
+                self.restrict();
                 far = plan;
             } else {
                 near = plan;
@@ -204,7 +204,7 @@ impl<'a> MinimumSearch<'a> {
     fn destinations(&mut self, plan: DualPlan) -> Vec<usize> {
         let mut places: Vec<usize> = (0..self.payoff.len()).collect();
         if plan.multiplier < f64::INFINITY {
-            self.look(plan.multiplier);
+            self.sweep(plan.multiplier);
             self.runs.iter().for_each(|MassRun { points, to }| places[points.clone()].fill(*to));
         }
         places

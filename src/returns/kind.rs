@@ -34,7 +34,7 @@ pub struct Numbers<'a> {
 }
 
 /// The facts about a record that help to interpret its numbers.
-pub struct Beside {
+pub struct RecordContext {
     /// Periods in a year: as the dates show, or else the most likely number.
     pub periods: f64,
     /// True if the dates show the periods.
@@ -43,11 +43,11 @@ pub struct Beside {
     pub bank: Option<f64>,
 }
 
-impl Beside {
+impl RecordContext {
     /// Creates the facts for `count` numbers, with the periods in a year if dates show them.
     pub fn of(dated: Option<usize>, count: usize) -> Self {
         let likely = if count > MOST_MONTHS { DAYS_A_YEAR } else { MONTHS_A_YEAR };
-        Beside { periods: dated.map_or(likely, |periods| periods as f64), is_dated: dated.is_some(), bank: None }
+        RecordContext { periods: dated.map_or(likely, |periods| periods as f64), is_dated: dated.is_some(), bank: None }
     }
 
     /// Returns the noun for a period, if only its likely length is known.
@@ -68,7 +68,7 @@ pub struct Returns {
 impl Numbers<'_> {
     /// # Errors
     /// A question or a refusal.
-    pub fn returns(&self, said: &Choices, beside: &Beside) -> Result<Returns, Stop> {
+    pub fn returns(&self, said: &Choices, beside: &RecordContext) -> Result<Returns, Stop> {
         let signs = self.percent_signs()?;
         let is_money = self.marks_of_money()?;
         let kind = said.kind.map_or_else(|| self.kind(signs, is_money), Ok)?;
@@ -249,7 +249,7 @@ impl Numbers<'_> {
     }
 
     /// Asks whether numbers that are unusual for an asset are right.
-    fn doubted(&self, returns: Returns, beside: &Beside) -> Result<Returns, Stop> {
+    fn doubted(&self, returns: Returns, beside: &RecordContext) -> Result<Returns, Stop> {
         let Returns { kind, unit, ref simple, ref logarithmic } = returns;
         let from = self.cells.len() - logarithmic.len();
         // Log-returns are not checked for jumps: files that hold logarithms record crashes as they were.

@@ -8,7 +8,7 @@ use super::cells::{Cell, mark};
 use super::choices::{Choices, Kind, Unit};
 use super::excess;
 use super::kept::KeptRows;
-use super::kind::{Beside, Numbers, Returns, called};
+use super::kind::{Numbers, RecordContext, Returns, called};
 use super::number::{Mark, number};
 use super::order::{is_newest_first, ordered};
 use super::outcome::{Answer, Question, Stop, TextPosition, both};
@@ -106,7 +106,7 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
             numbers.cells.reverse();
         });
     }
-    let mut beside = Beside::of(order.as_ref().ok().and_then(Order::periods_per_year), kept.rows.len());
+    let mut beside = RecordContext::of(order.as_ref().ok().and_then(Order::periods_per_year), kept.rows.len());
     let bank = sheet.column(Holds::Rate).map(|column| {
         let mut cells = column.at(&kept.rows);
         if is_turned {

@@ -2,7 +2,7 @@
 
 use super::cells::Cell;
 use super::choices::{Choices, Unit};
-use super::kind::{Beside, Numbers};
+use super::kind::{Numbers, RecordContext};
 use super::moments::{bulk, middle, moments, odd, sure_mean};
 use super::number::significant;
 use super::outcome::Stop;
@@ -58,7 +58,7 @@ impl Numbers<'_> {
 
     /// Decides the unit as chosen or as written, or else by how much the numbers vary and average in a year. The bulk
     /// of the numbers decides for fractions; percent must also hold for all of them, so that no odd number decides it.
-    pub fn unit(&self, signs: bool, said: &Choices, beside: &Beside) -> Result<Unit, Stop> {
+    pub fn unit(&self, signs: bool, said: &Choices, beside: &RecordContext) -> Result<Unit, Stop> {
         if signs || names_percent(self.name) {
             return Ok(said.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
         }
@@ -76,7 +76,7 @@ impl Numbers<'_> {
 
     /// Returns true if `values` cannot be fractions. Losses of everything or more also show this if they are too many
     /// to be odd.
-    fn is_percent(&self, values: &[f64], beside: &Beside) -> bool {
+    fn is_percent(&self, values: &[f64], beside: &RecordContext) -> bool {
         let (mean, deviation) = moments(values);
         let beyond_all = self.values.iter().filter(|value| **value <= -1.0).count();
         deviation >= SURELY_PERCENT
@@ -99,8 +99,8 @@ impl Numbers<'_> {
     /// Returns a sentence why numbers that vary little may be a calm record in percent, or `None` if they look like
     /// fractions. The reason is that as fractions they exceed what assets and banks do, or that they are written as
     /// percents are. The `bulk` of the numbers decides.
-    fn calm(&self, bulk: &[f64], beside: &Beside) -> Option<String> {
-        let Beside { periods, is_dated, bank } = *beside;
+    fn calm(&self, bulk: &[f64], beside: &RecordContext) -> Option<String> {
+        let RecordContext { periods, is_dated, bank } = *beside;
         let deviation_per_year = moments(bulk).1 * periods.sqrt();
         let (all_mean, all_deviation) = moments(&self.values);
         let is_period = beside.noun();

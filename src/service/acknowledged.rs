@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::assets::{Composed, ObservedAssets};
+use super::assets::{Composition, ObservedAssets};
 use super::report::Report;
 
 /// The numbers of the answer to an observation.
@@ -47,7 +47,7 @@ impl Acknowledged {
     }
 
     /// Returns the acknowledged composition if there are several assets.
-    pub(super) fn composed(&self) -> Option<&Composed> {
+    pub(super) fn composed(&self) -> Option<&Composition> {
         self.assets.as_ref().map(|assets| &assets.composed)
     }
 }

@@ -53,7 +53,7 @@ impl Sessions {
     ) -> Result<Large<PeriodAdvice>, ServiceError> {
         let mut held = self.hold(tenant, session).await;
         let live = held.current(&self.rows(tenant, session)).await?;
-        live.goes_on()?;
+        live.check_active()?;
         let (period, waiting) = (live.observed + 1, live.is_due().then(|| live.horizon()));
         let AdviceOptions { mode, explain, sensitivity } = question;
         let surrogate = mode == AdviceMode::Surrogate && !explain;

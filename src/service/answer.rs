@@ -4,7 +4,7 @@ use jiff::civil::Date;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use super::assets::{Composed, ObservedAssets};
+use super::assets::{Composition, ObservedAssets};
 use super::drift::Drift;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::problem::actions::Band;
@@ -60,7 +60,7 @@ pub struct Corrected {
     pub holding: f64,
     /// Figures of several assets before the coming period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub assets: Option<Composed>,
+    pub assets: Option<Composition>,
     /// Change of wealth over the last observed period, after the correction.
     pub wealth_change: f64,
     /// The last day of the last period, if it is known.
@@ -74,7 +74,7 @@ pub struct Corrected {
 
 /// The state of a session, as far as every answer that changes it reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct Stands {
+pub struct StateSummary {
     pub wealth: f64,
     pub holding: f64,
     pub wealth_change: f64,

@@ -34,7 +34,7 @@ pub struct Assets {
 
 /// Several assets before the coming period, by their names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Composed {
+pub struct Composition {
     /// Share of each asset in the advised holdings; they sum to 1.
     pub composition: BTreeMap<String, f64>,
     /// Share of wealth in each asset, before trading.
@@ -48,7 +48,7 @@ pub struct Composed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlannedAssets {
     pub(super) names: Vec<String>,
-    pub(super) composed: Composed,
+    pub(super) composed: Composition,
 }
 
 /// A period of several assets, by their names.
@@ -62,7 +62,7 @@ pub struct ObservedAssets {
     pub executed_allocations: BTreeMap<String, f64>,
     /// Figures before the coming period.
     #[serde(flatten)]
-    pub composed: Composed,
+    pub composed: Composition,
 }
 
 impl Assets {
@@ -86,7 +86,7 @@ impl Assets {
     ///
     /// # Errors
     /// The answer names other assets.
-    pub(super) fn told(names: &[String], rows: Vec<Vec<f64>>, told: &Composed) -> Result<Self, FieldError> {
+    pub(super) fn told(names: &[String], rows: Vec<Vec<f64>>, told: &Composition) -> Result<Self, FieldError> {
         let mut assets = Assets::at(names, rows, Some(&told.holdings))?;
         assets.take(told)?;
         Ok(assets)
@@ -96,7 +96,7 @@ impl Assets {
     ///
     /// # Errors
     /// It names other assets.
-    pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
+    pub(super) fn take(&mut self, told: &Composition) -> Result<(), FieldError> {
         self.fund.take(by_name("composition", &told.composition, &self.names)?);
         self.one_step = told.one_step.clone();
         Ok(())
@@ -108,8 +108,8 @@ impl Assets {
     }
 
     /// Returns the assets as answers show them.
-    pub fn composed(&self) -> Composed {
-        Composed {
+    pub fn composed(&self) -> Composition {
+        Composition {
             composition: named(&self.names, &self.fund.composition),
             holdings: named(&self.names, &self.fund.holdings),
             one_step: self.one_step.clone(),

@@ -13,7 +13,7 @@ use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
 
 /// The effect of a correction on a session.
-pub(super) struct PutRight {
+pub(super) struct AppliedCorrection {
     /// The state before the correction.
     pub before: SessionState,
     /// The state after it.
@@ -52,12 +52,12 @@ impl Periods {
     ///
     /// # Errors
     /// The correction names no observed period, makes a period break a rule, or raises a doubt without `confirm`.
-    pub(super) fn put_right(
+    pub(super) fn apply_correction(
         &mut self,
         correction: &Correct,
         entry: usize,
         today: Date,
-    ) -> Result<PutRight, ServiceError> {
+    ) -> Result<AppliedCorrection, ServiceError> {
         let (mut stood, mut passage) = (Vec::with_capacity(self.all.len() + 1), self.passage()?);
         while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
             stood.push(Some((step.seen, passage.standing.days.last)));
@@ -96,7 +96,7 @@ impl Periods {
         }
         let standing = passage.stands();
         let wealth_change = standing.state.wealth - wealth_before;
-        Ok(PutRight { before, standing, observed: self.all.len(), log_return, wealth_change })
+        Ok(AppliedCorrection { before, standing, observed: self.all.len(), log_return, wealth_change })
     }
 }
 

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 use super::metrics::DRIFT_ALARMS;
 use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::exchangeability::{Capital, p_value};
+use crate::numerics::exchangeability::{TestMartingale, p_value};
 
 /// Values of the test martingale that cause a warning and an alarm. If nothing changes, the chance of ever an alarm is
 /// at
@@ -44,12 +44,12 @@ pub enum DriftLevel {
 
 /// The drift test of a session, and its last p-value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Bet {
-    capital: Capital,
+pub struct DriftTest {
+    capital: TestMartingale,
     p_value: Option<f64>,
 }
 
-impl Bet {
+impl DriftTest {
     /// Updates the test with `log_return`, the last one in `record`, of `period` of `session`. A missing return changes
     /// nothing.
     #[must_use]
@@ -59,10 +59,10 @@ impl Bet {
         log_return: Option<f64>,
         session: &str,
         period: usize,
-    ) -> Bet {
+    ) -> DriftTest {
         let Some(log_return) = log_return else { return self };
         let p_value = p_value(record, log_return, tie(session, period));
-        Bet { capital: self.capital.after(p_value), p_value: Some(p_value) }
+        DriftTest { capital: self.capital.after(p_value), p_value: Some(p_value) }
     }
 
     /// Returns the test as answers show it.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::assets::{Assets, Composed};
+use super::assets::{Assets, Composition};
 use crate::control::assets::advice::named;
 use crate::control::policy::advice::{Advice, AdviceSource};
 use crate::control::problem::actions::Band;
@@ -18,7 +18,7 @@ pub struct FundAdvice {
     /// Share of wealth in all assets together.
     pub total: f64,
     #[serde(flatten)]
-    pub composed: Composed,
+    pub composed: Composition,
     /// The allocation minus the holdings: shares of wealth to buy, or to sell if negative.
     pub trade: BTreeMap<String, f64>,
     /// The totals that are best kept as they are. If trading costs nothing, both ends are the total.

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use super::allowance::HeavyPermit;
 use super::answer::{Corrected, Observed};
-use super::assets::{Composed, ObservedAssets};
+use super::assets::{Composition, ObservedAssets};
 use super::content::{answer, content};
 use super::error::ServiceError;
 use super::known::InitialHistory;
@@ -42,7 +42,7 @@ pub struct History {
     pub assets: Option<Vec<String>>,
     /// Figures of the assets at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub composed: Option<Composed>,
+    pub composed: Option<Composition>,
     /// Log-returns known at the start.
     pub history: InitialHistory,
     pub observations: Vec<Observation>,

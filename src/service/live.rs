@@ -99,7 +99,7 @@ impl LiveSession {
     ///
     /// # Errors
     /// Every period of the horizon is observed.
-    pub(super) fn goes_on(&self) -> Result<(), ServiceError> {
+    pub(super) fn check_active(&self) -> Result<(), ServiceError> {
         let horizon = self.last_period();
         if self.observed < horizon {
             return Ok(());
@@ -164,7 +164,7 @@ impl LiveSession {
         if doubts.is_empty() { Ok(()) } else { Err(ServiceError::Unconfirmed(Doubts(doubts))) }
     }
 
-    pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
+    pub(super) fn check_next_period(&self, period: usize) -> Result<(), ServiceError> {
         let horizon = self.last_period();
         if self.observed >= horizon {
             return Err(ServiceError::PastHorizon { given: period, horizon });
@@ -224,9 +224,9 @@ impl LiveSession {
         let passed = self.standing.after(dynamics, observe.period, report, (allocation, periods_per_year))?;
         let Transition { seen, log_return, executed_allocation, executed, standing } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
-        let goes_on = self.goes_on_after(observe.period);
+        let check_active = self.goes_on_after(observe.period);
         let next = self.current.step_from(observe.period, self.renew, self.renewals);
-        let (standing, uncertainty) = measured(means, &self.row.tenant, next, standing).await?;
+        let (standing, uncertainty) = with_uncertainty(means, &self.row.tenant, next, standing).await?;
         let answer = Observed {
             session: observe.session.clone(),
             period: observe.period,
@@ -244,7 +244,7 @@ impl LiveSession {
             }),
             wealth_change: standing.state.wealth - self.standing.state.wealth,
             date: standing.days.last,
-            completed: !goes_on,
+            completed: !check_active,
             drift: standing.bet.told(),
             uncertainty,
         };
@@ -255,7 +255,7 @@ impl LiveSession {
 /// Returns the uncertainty set before `step` of the policy. For several assets the composition is chosen first, which
 /// is
 /// heavy work if it needs a solve.
-pub(super) async fn measured(
+pub(super) async fn with_uncertainty(
     means: &AdviceContext<'_>,
     tenant: &Tenant,
     step: usize,

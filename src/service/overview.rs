@@ -2,7 +2,7 @@
 
 use jiff::civil::Date;
 
-use super::answer::Stands;
+use super::answer::StateSummary;
 use super::clock::day_of;
 use super::content::read;
 use super::drift::DriftLevel;
@@ -12,7 +12,7 @@ use super::keys::Caller;
 use super::metrics;
 use super::sessions::Sessions;
 use crate::store::{
-    Care, CareCounts, Counted, SessionList, SessionPlace, SessionQuery, SessionSummary, StoreError, Today,
+    Attention, CareCounts, Counted, SessionList, SessionPlace, SessionQuery, SessionSummary, StoreError, Today,
 };
 
 /// A session in a list, and its state after its last entry.
@@ -20,11 +20,11 @@ use crate::store::{
 pub struct Listed {
     pub row: SessionSummary,
     /// `None` before the first report.
-    pub stands: Option<Stands>,
+    pub stands: Option<StateSummary>,
     /// The last day on which its next report is not late, by the calendar of its policy.
     pub next: Option<Date>,
     /// Why it needs attention.
-    pub care: Vec<Care>,
+    pub care: Vec<Attention>,
 }
 
 /// A page of sessions, and how many match in all.
@@ -71,20 +71,20 @@ impl Sessions {
         });
         let damaged = damaged.collect();
         let listed = |row: SessionSummary| {
-            let stands: Option<Stands> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
+            let stands: Option<StateSummary> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
             let said = stands.and_then(|stands| stands.date);
             let from = said.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
             let is_active = row.observations < row.horizon || row.is_due;
             let next = row.periods_per_year.filter(|_| is_active).and_then(|periods| next_day(from?, periods));
             let is_last = row.observations + 1 >= row.horizon && !row.is_renewed;
-            let needs = |care: &Care| match care {
-                Care::Ending => !is_active || is_last,
+            let needs = |care: &Attention| match care {
+                Attention::Ending => !is_active || is_last,
                 _ if !is_active => false,
-                Care::Overdue => next.zip(today).is_some_and(|(next, today)| next < today),
-                Care::Renewal => row.is_due,
-                Care::Alarm => stands.is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
+                Attention::Overdue => next.zip(today).is_some_and(|(next, today)| next < today),
+                Attention::Renewal => row.is_due,
+                Attention::Alarm => stands.is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
             };
-            let care = Care::ALL.into_iter().filter(needs).collect();
+            let care = Attention::ALL.into_iter().filter(needs).collect();
             Ok(Listed { row, stands, next, care })
         };
         let sessions = sessions.into_iter().map(listed).collect::<Result<_, ServiceError>>()?;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use super::acknowledged::Acknowledged;
 use super::answer::Corrected;
-use super::assets::{Assets, Composed, PlannedAssets};
+use super::assets::{Assets, Composition, PlannedAssets};
 use super::change::Change;
 use super::content::{answer, content};
 use super::error::ServiceError;
@@ -50,7 +50,7 @@ pub struct Periods {
     history: SessionRecord,
     /// Compositions of several assets that corrections and renewals reported, in order, by the number of periods before
     /// them.
-    composed: BTreeMap<usize, Vec<Composed>>,
+    composed: BTreeMap<usize, Vec<Composition>>,
 }
 
 /// A replay of a session up to some period.
@@ -149,7 +149,7 @@ impl Periods {
     }
 
     /// Records the composition of several assets that a correction or a renewal reported.
-    fn tell(&mut self, told: Option<Composed>) {
+    fn tell(&mut self, told: Option<Composition>) {
         self.composed.entry(self.all.len()).or_default().extend(told);
     }
 
@@ -277,7 +277,7 @@ impl<'a> Replay<'a> {
     /// Switches to the policies that begin here, with the last reported composition of several assets. This is `told`
     /// with
     /// the period, unless a correction or a renewal came later.
-    fn renew(&mut self, told: Option<&Composed>) -> Result<(), FieldError> {
+    fn renew(&mut self, told: Option<&Composition>) -> Result<(), FieldError> {
         told.map_or(Ok(()), |told| self.standing.take(told))?;
         let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
         // The last one builds its law from the same returns, whatever its predecessors did.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::assets::{Composed, PlannedAssets};
+use super::assets::{Composition, PlannedAssets};
 use super::content::{json, read};
 use super::error::ServiceError;
 use crate::control::error::FieldError;
@@ -88,7 +88,7 @@ pub struct Renewed {
     pub terms: Terms,
     /// Figures of several assets before the coming period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub assets: Option<Composed>,
+    pub assets: Option<Composition>,
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
 }

@@ -11,11 +11,11 @@ use tracing::Instrument;
 use super::allowance::HeavyPermit;
 use super::answer::{Corrected, Observed};
 use super::content::{self, Packed, json};
-use super::corrections::PutRight;
+use super::corrections::AppliedCorrection;
 use super::drift::{self, DriftLevel};
 use super::error::ServiceError;
 use super::keys::Caller;
-use super::live::{LiveSession, measured};
+use super::live::{LiveSession, with_uncertainty};
 use super::memory::Large;
 use super::periods::Periods;
 use super::plan::{Renewed, SessionPlan};
@@ -48,7 +48,7 @@ impl Sessions {
                 let names = live.standing.names();
                 return self.repeat(session, (EntryKind::Observation, period), &report, names).await;
             }
-            live.expects(period)?;
+            live.check_next_period(period)?;
             let means = self.means(tenant, live, turn).await?;
             let (standing, answer) = live.after(observe, &report, (&means, self.clock.today())).await?;
             let Packed { content_json, answer_json, numbers, sent } =
@@ -113,10 +113,11 @@ impl Sessions {
             current.follows(correct.period, advisor.specification().problem.framework)?;
             current.check_change(correct, periods.all.len())?;
             let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
-            let PutRight { before, standing, observed, log_return, wealth_change } =
-                self.advising.run(tenant, move || periods.put_right(&putting, entry, today)).await??;
+            let AppliedCorrection { before, standing, observed, log_return, wealth_change } =
+                self.advising.run(tenant, move || periods.apply_correction(&putting, entry, today)).await??;
             let step = current.step_from(observed, SessionPlan::of(&facts.row)?.renew, renewals);
-            let (standing, uncertainty) = measured(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
+            let (standing, uncertainty) =
+                with_uncertainty(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
             let answer = Corrected {
                 session: session.to_owned(),
                 correction: number,
@@ -196,7 +197,7 @@ impl Sessions {
         held.clear();
         let due = next.is_due().then(|| (next.row.tenant.clone(), next.row.session.clone()));
         let appended = store.append(new).instrument(spans::of_write("append an entry")).await?;
-        let is_appended = self.settled(held, appended, next)?;
+        let is_appended = self.after_append(held, appended, next)?;
         if is_appended {
             drift::count(levels.0, levels.1);
             // If the renewer's queue is full, its next round finds the session.
@@ -206,7 +207,7 @@ impl Sessions {
     }
 
     /// Handles the store's answer to an append as [`Self::append`] does.
-    pub(super) fn settled(
+    pub(super) fn after_append(
         &self,
         held: &mut SlotGuard<Name, LiveSession>,
         appended: Append,

@@ -12,7 +12,7 @@ use tracing::Instrument;
 use super::allowance::HeavyPermit;
 use super::content::Packed;
 use super::error::ServiceError;
-use super::live::{LiveSession, measured};
+use super::live::{LiveSession, with_uncertainty};
 use super::memory::Large;
 use super::periods::Periods;
 use super::plan::{MOST_RENEWALS, Renew, Renewed, SessionPlan, check_window};
@@ -22,7 +22,7 @@ use super::spans;
 use super::standing::SessionState;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
-use crate::store::{Actor, EntryKind, EntryRow, Onto, SessionFacts, Tenant};
+use crate::store::{Actor, EntryKind, EntryRow, RenewalTarget, SessionFacts, Tenant};
 
 impl Sessions {
     /// Switches to another policy from the coming period on, exactly once and durably before the answer. Returns a
@@ -57,7 +57,7 @@ impl Sessions {
             let store = self.store.by(by.clone());
             held.clear();
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
-            if self.settled(&mut held, appended, next)? {
+            if self.after_append(&mut held, appended, next)? {
                 if turn.is_some() {
                     // A caller renewed it, so the training that the session requested is no longer needed.
                     let _ = self.due.try_send((tenant.clone(), session.to_owned()));
@@ -92,7 +92,7 @@ impl Sessions {
         };
         let (standing, terms) = self.advising.run(tenant, go_on).await??;
         self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
-        let (standing, uncertainty) = measured(&self.means_of(advisor, turn), tenant, 0, standing).await?;
+        let (standing, uncertainty) = with_uncertainty(&self.means_of(advisor, turn), tenant, 0, standing).await?;
         let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
         let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
         let answer = Renewed {
@@ -118,7 +118,8 @@ impl Sessions {
             key: by.key.to_string(),
         };
         let due = plan.renew.and_then(|next| next.due(renew.renewal, &current));
-        let onto = Onto { policy: renew.policy.clone(), horizon, periods: horizon.saturating_sub(before), due };
+        let onto =
+            RenewalTarget { policy: renew.policy.clone(), horizon, periods: horizon.saturating_sub(before), due };
         let next = LiveSession {
             seen: facts.seen.followed_by(&new),
             row: facts.row.into(),
@@ -140,7 +141,7 @@ struct DecidedRenewal {
     new: EntryRow,
     /// The answer as it is sent.
     sent: String,
-    onto: Onto,
+    onto: RenewalTarget,
     next: LiveSession,
 }
 

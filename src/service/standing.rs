@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::assets::{Assets, Composed, mean};
+use super::assets::{Assets, Composition, mean};
 use super::days::Days;
-use super::drift::Bet;
+use super::drift::DriftTest;
 use super::gate::{self, Doubt};
 use super::record::{PeriodReturns, SessionRecord};
 use super::report::{Report, by_name};
@@ -12,7 +12,7 @@ use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::dynamics::Dynamics;
-use crate::control::problem::state::{Realised, State};
+use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::request::assets::check_rows;
 use crate::control::request::learning::Learning;
 use crate::control::request::rules;
@@ -31,7 +31,7 @@ pub struct SessionState {
     /// The last days of the periods.
     pub days: Days,
     /// The test of whether returns still come from the same law.
-    pub bet: Bet,
+    pub bet: DriftTest,
     /// All observed returns, if the law holds only the last ones. For several assets always present: the mean of each
     /// date.
     seen: Option<EmpiricalDistribution>,
@@ -59,7 +59,7 @@ impl SessionState {
             assets,
             price: None,
             days: Days::default(),
-            bet: Bet::default(),
+            bet: DriftTest::default(),
             seen,
             session: session.into(),
         }
@@ -147,11 +147,11 @@ impl SessionState {
             _ => None,
         };
         let Report { rate, flow, .. } = *report;
-        let realised = Realised { action: executed_allocation, log_return, rate, flow, traded };
+        let realised = PeriodOutcome { action: executed_allocation, log_return, rate, flow, traded };
         let mut state = self.state.next_state(dynamics, &realised);
         state.wealth = match report.wealth {
             Some(reported) => reported,
-            None => reached(state.wealth, report)?,
+            None => check_wealth_range(state.wealth, report)?,
         };
         let SessionState { assets, bet, seen: known, session, .. } = self;
         let (assets, seen_before, session) = (assets.clone(), known.clone(), session.clone());
@@ -197,7 +197,7 @@ impl SessionState {
     ///
     /// # Errors
     /// It names other assets.
-    pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
+    pub(super) fn take(&mut self, told: &Composition) -> Result<(), FieldError> {
         self.assets.as_mut().map_or(Ok(()), |assets| assets.take(told))
     }
 
@@ -257,7 +257,7 @@ impl SessionState {
 }
 
 /// Returns wealth as computed from return, allocation and flow.
-fn reached(wealth: f64, report: &Report) -> Result<f64, FieldError> {
+fn check_wealth_range(wealth: f64, report: &Report) -> Result<f64, FieldError> {
     let (low, high) = rules::WEALTH;
     if (low..=high).contains(&wealth) {
         return Ok(wealth);

@@ -11,11 +11,11 @@ use super::live::LiveSession;
 use super::memory::Large;
 use super::report::{OF_ONE, OF_SEVERAL, Report, log_return_of, none_of};
 use super::sessions::Sessions;
-use super::what_if_assets::{AssetsWhatIfPoint, Supposition};
+use super::what_if_assets::{AssetsWhatIfPoint, WhatIfScenario};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::AdviceMode;
-use crate::control::policy::what_if::{Hypothesis, HypotheticalRadius, Supposed};
+use crate::control::policy::what_if::{Hypothesis, HypotheticalRadius, WhatIfResult};
 use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::store::Tenant;
 
@@ -269,7 +269,7 @@ impl Sessions {
     pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<Large<WhatIfAnswer>, ServiceError> {
         let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
-        live.goes_on()?;
+        live.check_active()?;
         let explained = explain::atoms(request.explain, hypotheses.len(), live.standing.state.law.sample_size())?;
         let assets = live.standing.assets.as_ref().map_or(1, |assets| assets.names.len());
         let room = self.memory.answers(explained * assets * ATOM_BYTES).await?;
@@ -314,7 +314,7 @@ impl Sessions {
         live: &LiveSession,
         hypotheses: Vec<Hypothesis>,
     ) -> Result<Vec<AssetsWhatIfPoint>, ServiceError> {
-        let supposition = Supposition::new(live, request.holdings.as_ref(), request.report())?;
+        let supposition = WhatIfScenario::new(live, request.holdings.as_ref(), request.report())?;
         let (advisor, mode) = (self.advisor(tenant, live).await?, request.mode());
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
@@ -331,7 +331,7 @@ impl Sessions {
 }
 
 impl WhatIfPoint {
-    fn new(period: usize, hypothesis: &Hypothesis, supposed: Supposed, explain: Option<Explain>) -> Self {
+    fn new(period: usize, hypothesis: &Hypothesis, supposed: WhatIfResult, explain: Option<Explain>) -> Self {
         let worst_case = supposed.worst_case;
         WhatIfPoint {
             period,

@@ -14,7 +14,7 @@ use super::standing::SessionState;
 use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
-use crate::control::policy::what_if::{Hypothesis, Supposed};
+use crate::control::policy::what_if::{Hypothesis, WhatIfResult};
 use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::control::problem::dynamics::Dynamics;
 
@@ -46,7 +46,7 @@ pub struct AssetsWhatIfPoint {
 
 /// A hypothesis about several assets, besides one about wealth and radius.
 #[derive(Debug, Clone)]
-pub(super) struct Supposition {
+pub(super) struct WhatIfScenario {
     standing: SessionState,
     /// Periods observed.
     observed: usize,
@@ -60,7 +60,7 @@ pub(super) struct Supposition {
     report: Option<(&'static str, Report)>,
 }
 
-impl Supposition {
+impl WhatIfScenario {
     /// Builds the hypothesis.
     ///
     /// # Errors
@@ -75,7 +75,7 @@ impl Supposition {
             let rule = "must be absent: the coming period is the last, and none is left to advise after it";
             return Err(FieldError::new(*field, "given", rule));
         }
-        Ok(Supposition {
+        Ok(WhatIfScenario {
             standing: live.standing.clone(),
             observed: live.observed,
             step: live.step(),
@@ -103,7 +103,7 @@ impl Supposition {
         hypothesis: &Hypothesis,
         mode: AdviceMode,
     ) -> Result<AssetsWhatIfPoint, FieldError> {
-        let Supposition { mut standing, observed, mut step, following, dynamics, holdings, report } = self;
+        let WhatIfScenario { mut standing, observed, mut step, following, dynamics, holdings, report } = self;
         if hypothesis.wealth.is_some() || holdings.is_some() {
             standing.suppose(advisor, step, hypothesis.wealth, holdings);
         }
@@ -123,7 +123,7 @@ impl Supposition {
         let of_radius = Hypothesis { radius: hypothesis.radius, ..Hypothesis::default() };
         let supposed = advisor.suppose(step, None, &standing.state, &of_radius, mode)?;
         let Some(assets) = &standing.assets else { return Err(of_one()) };
-        let Supposed { wealth, advice, worst_case } = supposed;
+        let WhatIfResult { wealth, advice, worst_case } = supposed;
         Ok(AssetsWhatIfPoint {
             period,
             wealth,

@@ -53,7 +53,7 @@ impl Actor {
 
 /// A kind of change that the audit records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Deed {
+pub enum AuditAction {
     OpenSession,
     Observe,
     Correct,
@@ -73,27 +73,27 @@ pub enum Deed {
     Repair,
 }
 
-impl Deed {
+impl AuditAction {
     /// The name on the wire and in SQL.
     pub fn as_str(self) -> &'static str {
         match self {
-            Deed::OpenSession => "session.open",
-            Deed::Observe => "session.observe",
-            Deed::Correct => "session.correct",
-            Deed::Renew => "session.renew",
-            Deed::LabelSession => "session.label",
-            Deed::DeleteSession => "session.delete",
-            Deed::QueueJob => "job.queue",
-            Deed::CancelJob => "job.cancel",
-            Deed::DeleteJob => "job.delete",
-            Deed::ImportPolicy => "policy.import",
-            Deed::LabelPolicy => "policy.label",
-            Deed::DeletePolicy => "policy.delete",
-            Deed::CreateKey => "key.create",
-            Deed::RotateKey => "key.rotate",
-            Deed::RevokeKey => "key.revoke",
-            Deed::CutAudit => "audit.cut",
-            Deed::Repair => "store.repair",
+            AuditAction::OpenSession => "session.open",
+            AuditAction::Observe => "session.observe",
+            AuditAction::Correct => "session.correct",
+            AuditAction::Renew => "session.renew",
+            AuditAction::LabelSession => "session.label",
+            AuditAction::DeleteSession => "session.delete",
+            AuditAction::QueueJob => "job.queue",
+            AuditAction::CancelJob => "job.cancel",
+            AuditAction::DeleteJob => "job.delete",
+            AuditAction::ImportPolicy => "policy.import",
+            AuditAction::LabelPolicy => "policy.label",
+            AuditAction::DeletePolicy => "policy.delete",
+            AuditAction::CreateKey => "key.create",
+            AuditAction::RotateKey => "key.rotate",
+            AuditAction::RevokeKey => "key.revoke",
+            AuditAction::CutAudit => "audit.cut",
+            AuditAction::Repair => "store.repair",
         }
     }
 }

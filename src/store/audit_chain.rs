@@ -16,7 +16,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditRow, Deed, entry};
+use super::audit::{Actor, AuditAction, AuditRow, entry};
 use super::codec::{Seal, hexadecimal};
 use super::error::{Failure, Quota};
 use super::query::{Query, StoreConnection, StoreRow, query};
@@ -96,7 +96,7 @@ pub(super) async fn record(
     connection: &mut StoreConnection<'_>,
     (quotas, actor): (Quotas, &Actor),
     tenant: &Tenant,
-    deed: Deed,
+    deed: AuditAction,
     object: &str,
     outcome: &str,
 ) -> Result<(), Failure> {
@@ -178,7 +178,7 @@ async fn cut(
     let mark = mark.bind(last).bind(chain.cut_seal).bind(own_seal).bind(tenant.as_str()).bind(name.as_str());
     connection.execute(mark).await?;
     let (actor, object) = (Actor::service(now_ms), format!("entries to {last} of {name}"));
-    record(connection, (Quotas::NONE, &actor), &tenant, Deed::CutAudit, &object, &outcome).await?;
+    record(connection, (Quotas::NONE, &actor), &tenant, AuditAction::CutAudit, &object, &outcome).await?;
     Ok(dropped)
 }
 

@@ -9,7 +9,7 @@ use super::{Store, StoreError};
 
 /// The reason why a session needs attention.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Care {
+pub enum Attention {
     /// Its next report is late, by the calendar of its policy.
     Overdue,
     /// It waits for its next policy.
@@ -20,8 +20,8 @@ pub enum Care {
     Ending,
 }
 
-impl Care {
-    pub const ALL: [Care; 4] = [Care::Overdue, Care::Renewal, Care::Alarm, Care::Ending];
+impl Attention {
+    pub const ALL: [Attention; 4] = [Attention::Overdue, Attention::Renewal, Attention::Alarm, Attention::Ending];
 }
 
 /// The dates that decide which reports are late, at the moment of the query.
@@ -64,35 +64,35 @@ impl Store {
     }
 }
 
-impl Care {
+impl Attention {
     pub(super) fn column(self) -> &'static str {
         match self {
-            Care::Overdue => "overdue",
-            Care::Renewal => "renewal",
-            Care::Alarm => "alarm",
-            Care::Ending => "ending",
+            Attention::Overdue => "overdue",
+            Attention::Renewal => "renewal",
+            Attention::Alarm => "alarm",
+            Attention::Ending => "ending",
         }
     }
 }
 
 /// Adds the condition that a session needs this kind of attention. A completed session only matches `Ending`.
-pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
-    if care != Care::Ending {
+pub(super) fn needs(statement: &mut Statement, care: Attention, today: &Today) {
+    if care != Attention::Ending {
         statement.and(&format!("({OBSERVATIONS} < {HORIZON} OR {IS_WAITING}) AND "), []);
     }
     match care {
-        Care::Ending => statement.and(
+        Attention::Ending => statement.and(
             &format!(
                 "(({OBSERVATIONS} >= {HORIZON} AND NOT {IS_WAITING})
                   OR ({OBSERVATIONS} + 1 >= {HORIZON} AND sessions.due IS NULL))"
             ),
             [],
         ),
-        Care::Alarm => statement
+        Attention::Alarm => statement
             .and(&format!("coalesce(json_extract(json_extract({ANSWER}, '$.drift'), '$.level') = 'alarm', 1 = 0)"), []),
-        Care::Renewal => statement.and(IS_WAITING, []),
-        Care::Overdue if today.first_days.is_empty() => statement.and("1 = 0", []),
-        Care::Overdue => {
+        Attention::Renewal => statement.and(IS_WAITING, []),
+        Attention::Overdue if today.first_days.is_empty() => statement.and("1 = 0", []),
+        Attention::Overdue => {
             statement.and("coalesce(CASE", []);
             for FirstDay { periods_per_year, date, begin_ms } in &today.first_days {
                 statement.and(
@@ -111,7 +111,7 @@ pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
 /// Adds the condition that a session needs attention for any reason.
 pub(super) fn needs_any(statement: &mut Statement, today: &Today) {
     statement.and(" AND (", []);
-    for (place, care) in Care::ALL.into_iter().enumerate() {
+    for (place, care) in Attention::ALL.into_iter().enumerate() {
         statement.and(if place == 0 { "(" } else { " OR (" }, []);
         needs(statement, care, today);
         statement.and(")", []);

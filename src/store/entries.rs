@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditRow, Deed};
+use super::audit::{Actor, AuditAction, AuditRow};
 use super::audit_chain;
 use super::codec::{Seal, from_sql, hexadecimal, to_sql};
 use super::error::Failure;
@@ -197,7 +197,7 @@ async fn append_with_room(
     let (append, tenant) = append_next(connection, &new).await?;
     if append == Append::Appended {
         let outcome = format!("{} {} recorded", new.kind.counted(), new.number);
-        take_room(connection, &tenant, &new.session, new.room(), by, (Deed::Correct, &outcome)).await?;
+        take_room(connection, &tenant, &new.session, new.room(), by, (AuditAction::Correct, &outcome)).await?;
     }
     Ok(append)
 }
@@ -209,7 +209,7 @@ pub(super) async fn take_room(
     session: &str,
     room: i64,
     (quotas, actor): (Quotas, Actor),
-    (deed, outcome): (Deed, &str),
+    (deed, outcome): (AuditAction, &str),
 ) -> Result<(), Failure> {
     let widen = query("UPDATE sessions SET room = room + $1 WHERE session = $2 RETURNING assets");
     let assets = connection.row(widen.bind(room).bind(session)).await?.map_or(Ok(0), |row| row.get("assets"))?;
@@ -318,7 +318,7 @@ impl EntryRow {
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
             key: observation.key,
             roles: String::new(),
-            deed: Deed::Observe.as_str().to_owned(),
+            deed: AuditAction::Observe.as_str().to_owned(),
             object: observation.session,
             outcome: format!("period {} recorded", observation.number),
             at_ms: observation.created_ms,

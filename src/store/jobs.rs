@@ -2,7 +2,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, Deed};
+use super::audit::{Actor, AuditAction};
 use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
@@ -183,7 +183,7 @@ pub(super) async fn count(
 ) -> Result<JobRow, Failure> {
     quotas::take(connection, &new.tenant, Usage::of_bytes(bytes), quotas).await?;
     let outcome = format!("queued, {}", new.kind.as_str());
-    audit_chain::record(connection, (quotas, &actor), &new.tenant, Deed::QueueJob, &new.job, &outcome).await?;
+    audit_chain::record(connection, (quotas, &actor), &new.tenant, AuditAction::QueueJob, &new.job, &outcome).await?;
     let row = find(connection, &new.job).await?;
     row.ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
 }
@@ -229,7 +229,7 @@ pub(super) async fn cancel(
         connection.execute(query("UPDATE jobs SET cancel_requested = TRUE WHERE job = $1").bind(job.as_str())).await?;
     }
     let outcome = if next.is_terminal() { "cancelled" } else { "asked to stop" };
-    audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, Deed::CancelJob, &job, outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, AuditAction::CancelJob, &job, outcome).await?;
     find(connection, &job).await
 }
 

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditFilter, AuditRow, Deed};
+use super::audit::{Actor, AuditAction, AuditFilter, AuditRow};
 use super::audit_chain;
 use super::codec::Seal;
 use super::error::Failure;
@@ -185,7 +185,7 @@ impl Store {
 async fn create(mut connection: StoreConnection<'_>, new: NewKey, actor: Actor) -> Result<(), Failure> {
     let (tenant, key, outcome) = (new.tenant.clone(), new.key.clone(), format!("in force, {}", new.roles));
     insert(&mut connection, new).await?;
-    audit_chain::record(&mut connection, (Quotas::NONE, &actor), &tenant, Deed::CreateKey, &key, &outcome).await
+    audit_chain::record(&mut connection, (Quotas::NONE, &actor), &tenant, AuditAction::CreateKey, &key, &outcome).await
 }
 
 /// Finds the key and locks it for this transaction.
@@ -200,7 +200,8 @@ async fn revoke(mut connection: StoreConnection<'_>, key: String, now_ms: i64) -
     if row.revoked_ms.is_none() {
         change(connection, &KeyRow { revoked_ms: Some(now_ms), ..row.clone() }).await?;
         let actor = Actor::operator(now_ms);
-        audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, Deed::RevokeKey, &key, "revoked").await?;
+        audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, AuditAction::RevokeKey, &key, "revoked")
+            .await?;
     }
     Ok(true)
 }
@@ -249,7 +250,8 @@ async fn rotate(
     let old = KeyRow { expires_ms: Some(expires_ms), ..old };
     change(connection, &old).await?;
     let (actor, outcome) = (Actor::operator(created_ms), format!("succeeded by {}", new.key));
-    audit_chain::record(connection, (Quotas::NONE, &actor), &old.tenant, Deed::RotateKey, &key, &outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &old.tenant, AuditAction::RotateKey, &key, &outcome)
+        .await?;
     Ok(Rotation::Rotated { old: Box::new(old), new: Box::new(new) })
 }
 

@@ -10,7 +10,7 @@ use futures_util::FutureExt;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use super::audit::Deed;
+use super::audit::AuditAction;
 use super::audit_chain;
 use super::error::Failure;
 use super::query::{StoreConnection, StoreRow, query};
@@ -153,8 +153,8 @@ impl Store {
                     return Ok(Some(stored(connection, &tenant, &object).await?));
                 }
                 let deed = match kind {
-                    Labelled::Policy => Deed::LabelPolicy,
-                    Labelled::Session => Deed::LabelSession,
+                    Labelled::Policy => AuditAction::LabelPolicy,
+                    Labelled::Session => AuditAction::LabelSession,
                 };
                 let of = Worded { tenant: &tenant, kind, sequence };
                 let (labels, grown) = put(connection, of, &object, &change).await?;

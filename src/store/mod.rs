@@ -70,10 +70,10 @@ use futures_util::future::BoxFuture;
 use error::Failure;
 use query::{Purpose, Query, StoreConnection, StoreRow};
 
-pub use audit::{Actor, AuditFilter, AuditRow, Deed};
+pub use audit::{Actor, AuditAction, AuditFilter, AuditRow};
 pub use audit_chain::AuditEnd;
 pub use backup::{Damage, backup, restore};
-pub use care::{Care, CareCounts, FirstDay, Today};
+pub use care::{Attention, CareCounts, FirstDay, Today};
 pub use check::Inspection;
 pub use entries::{Append, EntryKind, EntryRow};
 pub use error::{OverQuota, Quota, StoreError};
@@ -84,13 +84,13 @@ pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotation, StoredKeys, Successor};
 pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labels, MOST_TAGS, Relabel, given};
 pub use overview::{
-    Counted, SessionIs, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
+    Counted, SessionFilter, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
 };
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary, Stored};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};
 pub use relocation::relocate;
-pub use renewals::Onto;
+pub use renewals::RenewalTarget;
 pub use repair::{Repair, repair};
 pub use retention::{DeleteJob, StoreSpace};
 pub use seen::RowVersion;

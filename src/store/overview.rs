@@ -7,7 +7,7 @@
 //! All that is shown was verified: the start of a session and its last entry by their seals. If either is damaged, only
 //! the session's name is listed.
 
-use super::care::{Care, CareCounts, Today, needs, needs_any};
+use super::care::{Attention, CareCounts, Today, needs, needs_any};
 use super::codec::{from_sql, to_sql};
 use super::entries::EntryRow;
 use super::error::Failure;
@@ -35,7 +35,7 @@ pub enum SessionOrder {
 
 /// A filter by the state of sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SessionIs {
+pub enum SessionFilter {
     /// Sessions that their policy advises.
     Active,
     /// Sessions whose next policy is to be trained.
@@ -43,7 +43,7 @@ pub enum SessionIs {
     /// Sessions at their horizon with no policy to follow.
     Completed,
     /// Sessions that need attention for this reason, or for any.
-    Needing(Option<Care>),
+    Needing(Option<Attention>),
 }
 
 /// The counts to make beside a page, each of which reads every matching session.
@@ -64,7 +64,7 @@ pub struct SessionQuery {
     pub search: Option<String>,
     /// A whole tag.
     pub tag: Option<String>,
-    pub is: Option<SessionIs>,
+    pub is: Option<SessionFilter>,
     /// The dates that decide which sessions are overdue.
     pub today: Today,
     pub order: SessionOrder,
@@ -237,7 +237,7 @@ impl SessionQuery {
             " FROM (SELECT flags.*, CASE WHEN overdue + renewal + alarm + ending > 0 THEN 1 ELSE 0 END AS any_of_them FROM (SELECT ",
             [],
         );
-        for (place, care) in Care::ALL.into_iter().enumerate() {
+        for (place, care) in Attention::ALL.into_iter().enumerate() {
             statement.and(if place == 0 { "CASE WHEN " } else { ", CASE WHEN " }, []);
             needs(&mut statement, care, &self.today);
             statement.and(&format!(" THEN 1 ELSE 0 END AS {}", care.column()), []);
@@ -260,16 +260,16 @@ impl SessionQuery {
         }
         match self.is {
             None => {}
-            Some(SessionIs::Needing(None)) => needs_any(statement, &self.today),
-            Some(SessionIs::Needing(Some(care))) => {
+            Some(SessionFilter::Needing(None)) => needs_any(statement, &self.today),
+            Some(SessionFilter::Needing(Some(care))) => {
                 statement.and(" AND ", []);
                 needs(statement, care, &self.today);
             }
-            Some(SessionIs::Active) => {
+            Some(SessionFilter::Active) => {
                 statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON} AND NOT {IS_WAITING}"), [])
             }
-            Some(SessionIs::Waiting) => statement.and(&format!(" AND {IS_WAITING}"), []),
-            Some(SessionIs::Completed) => {
+            Some(SessionFilter::Waiting) => statement.and(&format!(" AND {IS_WAITING}"), []),
+            Some(SessionFilter::Completed) => {
                 statement.and(&format!(" AND {OBSERVATIONS} >= {HORIZON} AND NOT {IS_WAITING}"), []);
             }
         }

@@ -3,7 +3,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, Deed};
+use super::audit::{Actor, AuditAction};
 use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
@@ -75,8 +75,15 @@ impl Store {
             async move {
                 let is_new = insert(&mut connection, &tenant, &id, (json, year), created_ms, quotas).await?;
                 if is_new {
-                    audit_chain::record(&mut connection, (quotas, &actor), &tenant, Deed::ImportPolicy, &id, "stored")
-                        .await?;
+                    audit_chain::record(
+                        &mut connection,
+                        (quotas, &actor),
+                        &tenant,
+                        AuditAction::ImportPolicy,
+                        &id,
+                        "stored",
+                    )
+                    .await?;
                 }
                 Ok(is_new)
             }
@@ -229,7 +236,7 @@ async fn delete(
     let of = Worded { tenant: &tenant, kind: Labelled::Policy, sequence: disowned.get("sequence")? };
     let bytes = bytes.and(labels::remove(connection, of, &id).await?);
     quotas::change(connection, &tenant, bytes.given_back()).await?;
-    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeletePolicy, &id, "deleted").await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, AuditAction::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)
 }
 

@@ -2,7 +2,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, Deed};
+use super::audit::{Actor, AuditAction};
 use super::codec::to_sql;
 use super::entries::{self, APPENDING, Append, EntryRow};
 use super::error::Failure;
@@ -15,7 +15,7 @@ use super::{Store, StoreError, policies};
 
 /// The result of a renewal.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Onto {
+pub struct RenewalTarget {
     pub policy: String,
     /// The last period that the policy advises.
     pub horizon: usize,
@@ -30,7 +30,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::OverQuota`] if the quota has no room for the entry and the periods that it adds.
-    pub async fn renew(&self, new: EntryRow, onto: Onto) -> Result<Append, StoreError> {
+    pub async fn renew(&self, new: EntryRow, onto: RenewalTarget) -> Result<Append, StoreError> {
         let (by, session) = ((self.quotas, self.actor.clone()), new.session.clone());
         self.write_to(&session, APPENDING, move |connection| renew(connection, new, onto, by).boxed()).await
     }
@@ -50,7 +50,7 @@ impl Store {
 async fn renew(
     mut connection: StoreConnection<'_>,
     new: EntryRow,
-    onto: Onto,
+    onto: RenewalTarget,
     by: (Quotas, Actor),
 ) -> Result<Append, Failure> {
     let connection = &mut connection;
@@ -63,7 +63,7 @@ async fn renew(
         withdraw(connection, &tenant, &new.session, new.number).await?;
         let outcome = format!("renewal {} onto policy {}", new.number, onto.policy);
         let room = 1 + to_sql(onto.periods);
-        entries::take_room(connection, &tenant, &new.session, room, by, (Deed::Renew, &outcome)).await?;
+        entries::take_room(connection, &tenant, &new.session, room, by, (AuditAction::Renew, &outcome)).await?;
     }
     Ok(append)
 }
@@ -81,7 +81,7 @@ async fn may_go_on(connection: &mut StoreConnection<'_>, session: &str, policy: 
 }
 
 /// Stores the row that finds the policy of a renewal without its entry.
-async fn refer(connection: &mut StoreConnection<'_>, new: &EntryRow, onto: &Onto) -> Result<(), Failure> {
+async fn refer(connection: &mut StoreConnection<'_>, new: &EntryRow, onto: &RenewalTarget) -> Result<(), Failure> {
     let refer = query("INSERT INTO renewals (session, number, policy, horizon) VALUES ($1, $2, $3, $4)");
     let refer = refer.bind(new.session.as_str()).bind(to_sql(new.number)).bind(onto.policy.as_str());
     connection.execute(refer.bind(to_sql(onto.horizon))).await?;

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use sqlx::{Connection as _, SqliteConnection};
 
-use super::audit::{Actor, Deed};
+use super::audit::{Actor, AuditAction};
 use super::audit_chain;
 use super::check::TOTALS;
 use super::entries::{self, EntryRow};
@@ -170,7 +170,7 @@ impl Repairs<'_> {
         if self.rows > 0 {
             let (actor, outcome) = (Actor::operator(now_ms), format!("{} rows taken from a backup", self.rows));
             let by = (Quotas::NONE, &actor);
-            audit_chain::record(&mut self.connection, by, &tenant, Deed::Repair, name, &outcome).await?;
+            audit_chain::record(&mut self.connection, by, &tenant, AuditAction::Repair, name, &outcome).await?;
         }
         Ok(())
     }
@@ -186,7 +186,7 @@ impl Repairs<'_> {
 
     async fn session(&mut self, session: &str) -> Result<Tenant, Refusal> {
         let deleted = query("SELECT 1 AS one FROM main.audit WHERE object = $1 AND deed = $2").bind(session);
-        if self.connection.row(deleted.bind(Deed::DeleteSession.as_str())).await?.is_some() {
+        if self.connection.row(deleted.bind(AuditAction::DeleteSession.as_str())).await?.is_some() {
             return Err(Refusal::Reason(format!("the session {session} was deleted")));
         }
         self.put_back(&SESSIONS, session).await?;

@@ -5,7 +5,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, Deed};
+use super::audit::{Actor, AuditAction};
 use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
@@ -85,7 +85,7 @@ async fn delete(
     };
     remove(connection, &row).await?;
     let outcome = format!("deleted, {}", row.state.as_str());
-    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeleteJob, &job, &outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, AuditAction::DeleteJob, &job, &outcome).await?;
     Ok(DeleteJob::Deleted)
 }
 

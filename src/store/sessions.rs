@@ -2,7 +2,7 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditRow, Deed};
+use super::audit::{Actor, AuditAction, AuditRow};
 use super::audit_chain;
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::entries::EntryRow;
@@ -176,7 +176,8 @@ async fn create(
     }
     quotas::take(connection, &row.tenant, usage, quotas).await?;
     let outcome = format!("opened under policy {}", row.policy);
-    audit_chain::record(connection, (quotas, &actor), &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
+    audit_chain::record(connection, (quotas, &actor), &row.tenant, AuditAction::OpenSession, &row.session, &outcome)
+        .await?;
     Ok(CreateSession::Created)
 }
 
@@ -252,7 +253,8 @@ async fn delete(
     let usage = usage.and(labels::remove(connection, of, &session).await?);
     quotas::change(connection, &tenant, usage.given_back()).await?;
     let outcome = format!("deleted, with {entries} entries");
-    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeleteSession, &session, &outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, AuditAction::DeleteSession, &session, &outcome)
+        .await?;
     Ok(true)
 }
 

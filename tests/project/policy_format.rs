@@ -8,7 +8,7 @@ use crate::support::policies::advisor;
 use ballast::control::kept::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use serde_json::{Value, json};
 
 const HISTORY: [f64; 8] = [0.021, -0.034, 0.052, 0.043, -0.008, 0.017, 0.029, -0.011];
@@ -110,9 +110,9 @@ const SEEN: [f64; 2] = [0.03, -0.02];
 /// States of every step: along a path, and one of another wealth.
 fn states(solved: &Advisor) -> Vec<(usize, State)> {
     let start = solved.initial_state(None, None).unwrap();
-    let first = solved.advance(0, &start, &Realised::of(0.6, SEEN[0]));
+    let first = solved.advance(0, &start, &PeriodOutcome::of(0.6, SEEN[0]));
     let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
-    let second = solved.advance(1, &first, &Realised::of(0.3, SEEN[1]));
+    let second = solved.advance(1, &first, &PeriodOutcome::of(0.3, SEEN[1]));
     vec![(0, start), (1, first), (1, other), (2, second)]
 }
 

@@ -77,12 +77,12 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     let (status, corrected) = correct(&app, 1, correction).await;
     assert_eq!(status, 200, "{corrected}");
     assert_eq!(number(&corrected["log_return"]), (103.0_f64 / 102.0).ln());
-    let put_right = standing(&app).await;
-    assert_ne!(put_right["action"]["radius"], before["action"]["radius"]);
-    assert_eq!(corrected["wealth"], put_right["session"]["wealth"]);
-    assert_eq!(corrected["radius"], put_right["action"]["radius"]);
+    let apply_correction = standing(&app).await;
+    assert_ne!(apply_correction["action"]["radius"], before["action"]["radius"]);
+    assert_eq!(corrected["wealth"], apply_correction["session"]["wealth"]);
+    assert_eq!(corrected["radius"], apply_correction["action"]["radius"]);
     app.restart().await;
-    assert_eq!(standing(&app).await, put_right, "replayed");
+    assert_eq!(standing(&app).await, apply_correction, "replayed");
     let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
     assert_eq!(history["initial_radius"], at_start);
     let (second, third) = (&history["observations"][1], &history["observations"][2]);
@@ -90,7 +90,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     assert_eq!(number(&second["log_return"]), (10.3_f64 / 102.0).ln());
     assert_eq!(second["now"]["reported"]["date"], "2020-02-28", "what no correction names stays");
     assert_eq!((&third["now"]["reported"], &third["reported"]["price"]), (&json!(null), &json!(104.0)));
-    assert_eq!(third["now"]["wealth"], put_right["session"]["wealth"]);
+    assert_eq!(third["now"]["wealth"], apply_correction["session"]["wealth"]);
     assert_eq!(third["wealth"], before["session"]["wealth"]);
     assert_eq!(history["observations"][0].get("now"), None);
     assert_eq!(history["corrections"][0]["reason"], "the index was revised");
@@ -98,7 +98,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     app.open().await;
     right["date"] = json!("2020-02-28");
     report_all(&app, &[wrong[0].clone(), right, wrong[2].clone()]).await;
-    assert_eq!(without_bet(standing(&app).await), without_bet(put_right), "as it was from the start");
+    assert_eq!(without_bet(standing(&app).await), without_bet(apply_correction), "as it was from the start");
     let (_, told) = app.get(&format!("/sessions/{}/history", app.session)).await;
     for period in [1, 2] {
         let now = &history["observations"][period]["now"];
@@ -175,18 +175,18 @@ fn expected(reports: &[Value]) -> (f64, usize) {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_correction_is_made_once_and_in_its_turn() {
     let app = opened().await;
-    let put_right = json!({ "period": 1, "log_return": 0.02 });
-    let (status, refused) = correct(&app, 1, put_right.clone()).await;
+    let apply_correction = json!({ "period": 1, "log_return": 0.02 });
+    let (status, refused) = correct(&app, 1, apply_correction.clone()).await;
     assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("period")), "none was observed: {refused}");
     report_all(&app, &[json!({ "log_return": 0.01, "date": "2008-01-31" }), json!({ "log_return": 0.015 })]).await;
-    let first = correct(&app, 1, put_right.clone()).await;
+    let first = correct(&app, 1, apply_correction.clone()).await;
     assert_eq!(first.0, 200, "{}", first.1);
-    assert_eq!(correct(&app, 1, put_right.clone()).await, first);
+    assert_eq!(correct(&app, 1, apply_correction.clone()).await, first);
     for (number, correction, status, field) in [
         (1, json!({ "period": 1, "log_return": 0.03 }), 409, "correction"),
         (1, json!({ "period": 2, "log_return": 0.02 }), 409, "correction"),
-        (3, put_right.clone(), 409, "correction"),
-        (0, put_right.clone(), 422, "correction"),
+        (3, apply_correction.clone(), 409, "correction"),
+        (0, apply_correction.clone(), 422, "correction"),
         (2, json!({ "period": 3, "log_return": 0.02 }), 422, "period"),
         (2, json!({ "period": 0, "log_return": 0.02 }), 422, "period"),
         (2, json!({ "period": 1 }), 422, "log_return"),
@@ -326,9 +326,9 @@ async fn nobody_puts_right_what_is_not_his() {
     let (owner, stranger) = (app.key("default", "read,operate").await, app.key("south", "read,operate").await);
     let reader = app.key("default", "read").await;
     app.enter(&owner).await;
-    let put_right = json!({ "period": 1, "log_return": 0.02 });
+    let apply_correction = json!({ "period": 1, "log_return": 0.02 });
     for (key, status) in [(&stranger, 404), (&reader, 403), (&owner, 200)] {
         app.hold(key);
-        assert_eq!(correct(&app, 1, put_right.clone()).await.0.as_u16(), status);
+        assert_eq!(correct(&app, 1, apply_correction.clone()).await.0.as_u16(), status);
     }
 }

@@ -4,7 +4,7 @@ use crate::support::{App, ROWS, several_assets as request};
 use ballast::control::assets::fund::Fund;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::dynamics::Dynamics;
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use ballast::control::progress::Watch;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::fund::CompositionRule;
@@ -441,7 +441,7 @@ fn what_is_traded_within_the_fund_is_paid_for() {
     let stocks = Fund::at(rows(), vec![0.5, 0.0, 0.0]);
     let executed = [0.0, 0.5, 0.0];
     let dynamics = Dynamics::plain(0.0, 0.002);
-    let realised = Realised { traded: Some(stocks.traded(&executed)), ..Realised::of(0.5, 0.0) };
+    let realised = PeriodOutcome { traded: Some(stocks.traded(&executed)), ..PeriodOutcome::of(0.5, 0.0) };
     let start = State { holding: 0.5, ..state(&stocks) };
     assert!((start.next_state(dynamics, &realised).wealth - 99.8).abs() < 1e-12);
 }
@@ -482,7 +482,7 @@ fn mean_power(
     let after = |drawn: usize| {
         let shock = adversarial(adversary, &returns, drawn, advice.radius);
         let row: Vec<f64> = fund.rows[drawn].iter().map(|z| z + shock).collect();
-        let realised = Realised::of(advice.allocation, fund.log_return(&executed, &row));
+        let realised = PeriodOutcome::of(advice.allocation, fund.log_return(&executed, &row));
         let next = state.next_state(Dynamics::plain(problem.rate_per_step, 0.0), &realised);
         let mut learned = fund.clone();
         learned.passed(&executed, Some(&row), next.holding);

@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::support::{App, specification};
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
-use ballast::control::problem::state::Realised;
+use ballast::control::problem::state::PeriodOutcome;
 use serde_json::{Value, json};
 
 const HORIZON: usize = 4;
@@ -115,8 +115,8 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     let (_, action) = app.action().await;
     let advisor = advisor(&app).await;
     let mut state = advisor.initial_state(None, None).unwrap();
-    state = advisor.advance(0, &state, &Realised::of(allocation, log_return));
-    state = advisor.advance(1, &state, &Realised::of(number(&second["executed_allocation"]), 0.01));
+    state = advisor.advance(0, &state, &PeriodOutcome::of(allocation, log_return));
+    state = advisor.advance(1, &state, &PeriodOutcome::of(number(&second["executed_allocation"]), 0.01));
     state.wealth = 77.5;
     let advice = advisor.advise(2, &state, ballast::control::policy::advisor::AdviceMode::Surrogate);
     assert_eq!(number(&action["allocation"]), advice.allocation);

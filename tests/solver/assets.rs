@@ -1,6 +1,6 @@
 //! The one-step problem of several assets: against direct solutions, one asset, and laws of its own ball.
 
-use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use ballast::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::utility::RelativeUtility;
@@ -55,13 +55,13 @@ fn direct_solutions_are_met() {
     assert_eq!(cases.len(), 26);
     for (index, case) in cases.iter().enumerate() {
         let returns = rows(&case["returns"]);
-        let law = AssetsLaw {
+        let law = ReturnScenarios {
             returns: &returns,
             radius: case["radius"].as_f64().unwrap(),
             floors: vec![case["floor"].as_f64().unwrap_or(f64::NEG_INFINITY); returns[0].len()],
         };
         let ground = ground(case["norm"].as_str().unwrap(), &returns);
-        let step = AssetsStep::new(law, ground, utility(case), case["rate_per_step"].as_f64().unwrap(), WHOLE);
+        let step = PortfolioStep::new(law, ground, utility(case), case["rate_per_step"].as_f64().unwrap(), WHOLE);
         let solution = step.solve(None);
         certified(&solution);
         let expected = case["log_certainty_equivalent_over_bank"].as_f64().unwrap();
@@ -93,9 +93,15 @@ fn sample(assets: usize, dates: usize, seed: usize) -> Vec<Vec<f64>> {
 const POWER: RelativeUtility = RelativeUtility::Power { eta: 3.0 };
 const UTILITIES: [RelativeUtility; 3] = [POWER, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }];
 
-fn step(returns: &[Vec<f64>], ground: &GroundMetric, utility: RelativeUtility, radius: f64, floor: f64) -> AssetsStep {
-    AssetsStep::new(
-        AssetsLaw { returns, radius, floors: vec![floor; returns[0].len()] },
+fn step(
+    returns: &[Vec<f64>],
+    ground: &GroundMetric,
+    utility: RelativeUtility,
+    radius: f64,
+    floor: f64,
+) -> PortfolioStep {
+    PortfolioStep::new(
+        ReturnScenarios { returns, radius, floors: vec![floor; returns[0].len()] },
         ground.clone(),
         utility,
         0.002,
@@ -103,7 +109,7 @@ fn step(returns: &[Vec<f64>], ground: &GroundMetric, utility: RelativeUtility, r
     )
 }
 
-fn without_floor(returns: &[Vec<f64>], ground: &GroundMetric, utility: RelativeUtility, radius: f64) -> AssetsStep {
+fn without_floor(returns: &[Vec<f64>], ground: &GroundMetric, utility: RelativeUtility, radius: f64) -> PortfolioStep {
     step(returns, ground, utility, radius, f64::NEG_INFINITY)
 }
 
@@ -118,9 +124,10 @@ fn identical_columns_are_one_asset() {
             let even = GroundMetric::Weighted(vec![1.0 / assets as f64; assets]);
             for ground in [GroundMetric::Sup, even] {
                 let radius = case["radius"].as_f64().unwrap();
-                let law = AssetsLaw { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
+                let law =
+                    ReturnScenarios { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
                 let rate = case["rate_per_step"].as_f64().unwrap();
-                let step = AssetsStep::new(law, ground, utility(case), rate, WHOLE);
+                let step = PortfolioStep::new(law, ground, utility(case), rate, WHOLE);
                 let solution = step.solve(None);
                 certified(&solution);
                 let bank = case["wealth"].as_f64().unwrap() * (1.0 + rate);
@@ -340,8 +347,8 @@ fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
     let total = ActionInterval { lowest: 0.3, highest: 0.7 };
     for floor in [-0.3, f64::NEG_INFINITY] {
         for utility in UTILITIES {
-            let law = AssetsLaw { returns: &returns, radius: 0.01, floors: vec![floor; 3] };
-            let step = AssetsStep::new(law, ground.clone(), utility, 0.002, total);
+            let law = ReturnScenarios { returns: &returns, radius: 0.01, floors: vec![floor; 3] };
+            let step = PortfolioStep::new(law, ground.clone(), utility, 0.002, total);
             let solution = step.solve(None);
             certified(&solution);
             let sum: f64 = solution.allocation.iter().sum();
@@ -374,8 +381,8 @@ fn a_window_at_which_the_crash_comes_and_goes_is_certified() {
     };
     let radius = 1.3 * (0..12).map(deviation).sum::<f64>() / 12.0 / 240.0_f64.sqrt();
     for ground in [GroundMetric::Weighted(inverse_volatility(returns)), GroundMetric::Sup] {
-        let law = AssetsLaw { returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
-        let solution = AssetsStep::new(law, ground, POWER, 0.003, WHOLE).solve(None);
+        let law = ReturnScenarios { returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
+        let solution = PortfolioStep::new(law, ground, POWER, 0.003, WHOLE).solve(None);
         certified(&solution);
         assert!(solution.value > BP, "{solution:?}");
     }
@@ -387,8 +394,8 @@ fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
     let weights = inverse_volatility(&returns);
     let total = ActionInterval { lowest: 0.2, highest: 0.2 };
     let apart = |radius: f64| {
-        let law = AssetsLaw { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
-        let step = AssetsStep::new(law, GroundMetric::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
+        let law = ReturnScenarios { returns: &returns, radius, floors: vec![f64::NEG_INFINITY; returns[0].len()] };
+        let step = PortfolioStep::new(law, GroundMetric::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
         let solution = step.solve(None);
         certified(&solution);
         let apart = |(share, weight): (&f64, &f64)| (share / 0.2 - weight).abs();
@@ -535,8 +542,8 @@ fn holdings_and_a_cost_are_best_by_direct_search() {
         let radius = 0.02 * random.random::<f64>().powi(2);
         let cost = [0.0005, 0.005, 0.02, 0.1][random.random_range(0..4)];
         let highest = [1.0, 0.6][usize::from(case % 5 == 0)];
-        let step = AssetsStep::new(
-            AssetsLaw { returns: &returns, radius, floors: vec![-0.4; assets] },
+        let step = PortfolioStep::new(
+            ReturnScenarios { returns: &returns, radius, floors: vec![-0.4; assets] },
             ground,
             utility,
             0.002,

@@ -8,7 +8,7 @@ use ballast::control::bellman::problem::Problem;
 use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::policy::worst_case::most_cost;
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::{Specification, UtilitySpecification};
@@ -267,7 +267,7 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
         for action in [0.0, 0.13, 0.5, 0.77, 1.0].map(|share| share * problem.actions(0, &state).highest) {
             let trade = dynamics.trade_to(state.holding, action);
             for (z, found) in returns.iter().zip(field.at(&returns).payoff(trade)) {
-                let then = solved.advance(0, &state, &Realised::of(action, *z));
+                let then = solved.advance(0, &state, &PeriodOutcome::of(action, *z));
                 let gain = (problem.floor(1, &then) / floor).ln() + solved.surrogate(1, &then).1;
                 // The cubics are good to 1e-6 of the gain; where trading costs, a value bends where its law's band passes the
                 // holding, and they are good to a tenth of the half basis point that a surrogate may err by.

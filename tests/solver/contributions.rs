@@ -2,7 +2,7 @@
 
 use ballast::control::policy::advice::Advice;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::Specification;
 use serde_json::{Value, json};
@@ -200,7 +200,7 @@ fn what_is_withdrawn_stays_in_the_bank() {
         for mode in [AdviceMode::Surrogate, AdviceMode::Resolve] {
             let advice = solved.advise(0, &start(&solved, wealth, 0.0), mode);
             assert!((advice.allocation - (1.0 - reserve / wealth)).abs() < 1e-6, "{mode:?}: {advice:?}");
-            let after = solved.advance(0, &start(&solved, wealth, 0.0), &Realised::of(advice.allocation, -5.0));
+            let after = solved.advance(0, &start(&solved, wealth, 0.0), &PeriodOutcome::of(advice.allocation, -5.0));
             // Of which 30 are withdrawn.
             assert!(after.wealth * (1.0 + RATE) > 30.0, "{after:?}");
         }

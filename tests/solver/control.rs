@@ -8,7 +8,7 @@ use ballast::control::error::TrainError;
 use ballast::control::kept::Cache;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
 use ballast::control::request::learning::Learning;
@@ -316,6 +316,6 @@ fn no_import_shows_more_than_the_best_return_earns_in_every_period() {
             assert!(advice.certainty_equivalent <= most * (1.0 + 1e-12), "{step} {mode:?}: {advice:?}, at most {most}");
             assert!(advice.surrogate_sd < 1.0, "{advice:?}");
         }
-        state = claiming.advance(step, &state, &Realised::of(0.5, 0.01));
+        state = claiming.advance(step, &state, &PeriodOutcome::of(0.5, 0.01));
     }
 }

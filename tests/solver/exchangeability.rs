@@ -2,7 +2,7 @@
 //! bound, and how soon it tells a doubled volatility.
 
 use ballast::numerics::empirical::EmpiricalDistribution;
-use ballast::numerics::exchangeability::{Capital, p_value};
+use ballast::numerics::exchangeability::{TestMartingale, p_value};
 use ballast::numerics::streams::stream;
 use rand::{Rng, RngExt};
 
@@ -40,7 +40,7 @@ fn the_capital_is_the_integral_of_the_bets() {
     for bets in [0_usize, 1, 3, 40, 400] {
         for power in [0.3, 1.0, 4.0] {
             let values: Vec<f64> = (0..bets).map(|_| random.random_range(1e-9..1.0_f64).powf(power)).collect();
-            let capital = values.iter().fold(Capital::default(), |capital, &p| capital.after(p));
+            let capital = values.iter().fold(TestMartingale::default(), |capital, &p| capital.after(p));
             let surprise: f64 = -values.iter().map(|p| p.ln()).sum::<f64>();
             let at = |e: f64| if bets == 0 { 0.0 } else { bets as f64 * e.ln() } + (1.0 - e) * surprise;
             let nodes: Vec<f64> = (0..=20_000).map(|k| at(f64::from(k) / 20_000.0)).collect();
@@ -60,7 +60,7 @@ fn the_capital_is_the_integral_of_the_bets() {
 fn bet(seed: u64, known: usize, periods: usize, shape: impl Fn(usize, f64) -> f64) -> (f64, Option<usize>) {
     let mut random = stream(seed, "sessions", 0, 0);
     let sample: Vec<f64> = (0..known).map(|_| shape(0, normal(&mut random))).collect();
-    let (mut law, mut capital, mut alarm) = (EmpiricalDistribution::new(&sample), Capital::default(), None);
+    let (mut law, mut capital, mut alarm) = (EmpiricalDistribution::new(&sample), TestMartingale::default(), None);
     for period in 1..=periods {
         let value = shape(period, normal(&mut random));
         law.push(value);
@@ -137,7 +137,7 @@ fn the_alarms_of_the_us_market() {
     let (mut alarms, mut sessions) = (Vec::new(), 0);
     for start in (first..rows.len() - 12).step_by(12) {
         let record: Vec<f64> = rows[start - 240..start].iter().map(|row| row.1).collect();
-        let (mut law, mut capital) = (EmpiricalDistribution::new(&record), Capital::default());
+        let (mut law, mut capital) = (EmpiricalDistribution::new(&record), TestMartingale::default());
         let mut random = stream(1, "market", start, 0);
         sessions += 1;
         for &(month, log_return) in &rows[start..] {

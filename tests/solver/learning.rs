@@ -7,7 +7,7 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::kept::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use ballast::control::request::learning::Learning;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -35,7 +35,7 @@ fn along(solved: &Advisor, mode: AdviceMode) -> Vec<[f64; 3]> {
     for (step, log_return) in [0.03, -0.04, 0.01].into_iter().enumerate() {
         let advice = solved.advise(step, &state, mode);
         told.push([advice.radius, advice.allocation, advice.certainty_equivalent]);
-        state = solved.advance(step, &state, &Realised::of(0.4, log_return));
+        state = solved.advance(step, &state, &PeriodOutcome::of(0.4, log_return));
     }
     told
 }
@@ -117,7 +117,7 @@ fn the_first_step_serves_every_law_once_the_record_has_settled() {
         read_off += usize::from(advice.source == AdviceSource::PolicySurrogate);
         let log_return = 0.008 + 0.04 * (f64::from(period) * 2.3).sin();
         // A session that rolls stands at the first step for ever.
-        state = State { wealth: 100.0, ..solved.advance(0, &state, &Realised::of(advice.allocation, log_return)) };
+        state = State { wealth: 100.0, ..solved.advance(0, &state, &PeriodOutcome::of(advice.allocation, log_return)) };
     }
     assert_eq!(state.law.sample_size(), record.len() + 40);
     assert!(read_off >= 30, "{read_off} of 40 read off the surrogate");
@@ -269,7 +269,7 @@ async fn a_session_rolls_beyond_its_horizon() {
         supposed = Some(foretold);
         assert_eq!(observed["completed"], json!(false));
         earlier.push(state.clone());
-        state = library.advance(0, &state, &Realised::of(advice.allocation, log_return));
+        state = library.advance(0, &state, &PeriodOutcome::of(advice.allocation, log_return));
         assert_eq!(observed["wealth"], json!(state.wealth));
         if period == 4 {
             app.restart().await;
@@ -287,7 +287,7 @@ async fn a_session_rolls_beyond_its_horizon() {
     let mut state = earlier.swap_remove(4);
     for period in 4..8 {
         let log_return = if period == 4 { 0.05 } else { returned(period) };
-        state = library.advance(0, &state, &Realised::of(held(period), log_return));
+        state = library.advance(0, &state, &PeriodOutcome::of(held(period), log_return));
         let now = &history["observations"][period]["now"];
         assert_eq!((&now["wealth"], &now["radius"]), (&json!(state.wealth), &json!(library.radius(&state))));
     }

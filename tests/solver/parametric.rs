@@ -9,7 +9,7 @@ use ballast::control::bellman::solution::Adversary;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
-use ballast::control::problem::state::{Realised, State};
+use ballast::control::problem::state::{PeriodOutcome, State};
 use ballast::control::request::learning::Learning;
 use serde_json::{Value, json};
 
@@ -202,7 +202,7 @@ fn the_order_of_returns_and_the_way_they_arrive_change_nothing() {
         }
         let mut pushed = forward.initial_state(Some(&HISTORY[..10]), Some(97.0)).unwrap();
         for (step, &log_return) in HISTORY[10..].iter().enumerate() {
-            pushed = forward.advance(step, &pushed, &Realised::of(0.0, log_return));
+            pushed = forward.advance(step, &pushed, &PeriodOutcome::of(0.0, log_return));
         }
         pushed.wealth = 97.0;
         let whole = forward.initial_state(Some(&backward), Some(97.0)).unwrap();
@@ -218,7 +218,7 @@ fn the_region_of_the_answers_is_that_of_the_returns_seen() {
     let radius = |size: f64| (-2.0 * 0.1_f64.ln() / size).sqrt();
     for (advisor, last) in [(&frozen, 12.0), (&learning, 13.0)] {
         let first = advisor.initial_state(None, None).unwrap();
-        let second = advisor.advance(0, &first, &Realised::of(0.3, 0.02));
+        let second = advisor.advance(0, &first, &PeriodOutcome::of(0.3, 0.02));
         assert_eq!(advisor.advise(0, &first, AdviceMode::Surrogate).radius, radius(12.0));
         let advice = advisor.advise(1, &second, AdviceMode::Surrogate);
         assert_eq!((advice.radius, advice.sample_size), (radius(last), 13));
@@ -325,7 +325,7 @@ async fn a_live_session_equals_the_simulator_and_tells_the_worst_mean_and_varian
             assert!(sentence.contains(&format!("mean log-return of {:.2} %", 100.0 * normal.mean)), "{sentence}");
             assert!(sentence.contains(&format!("variance of {:.2e}", normal.variance)), "{sentence}");
             let (_, observed) = app.observe(index + 1, log_return).await;
-            state = advisor.advance(index, &state, &Realised::of(advice.allocation, log_return));
+            state = advisor.advance(index, &state, &PeriodOutcome::of(advice.allocation, log_return));
             assert_eq!(number(&observed["wealth"]), state.wealth);
             assert_eq!(number(&observed["radius"]), advisor.uncertainty(&state).radius);
             assert_eq!(observed["quantile"], Value::Null);

@@ -5,7 +5,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use ballast::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::specification::UtilitySpecification;
@@ -150,7 +150,7 @@ fn measure(
     })
 }
 
-fn step(window: &[Vec<f64>], sup: bool) -> (AssetsStep, f64) {
+fn step(window: &[Vec<f64>], sup: bool) -> (PortfolioStep, f64) {
     let count = window.len() as f64;
     let deviation = |asset: usize| {
         let mean = window.iter().map(|row| row[asset]).sum::<f64>() / count;
@@ -160,6 +160,6 @@ fn step(window: &[Vec<f64>], sup: bool) -> (AssetsStep, f64) {
     let radius = RADIUS * (0..assets).map(deviation).sum::<f64>() / assets as f64 / count.sqrt();
     let ground = if sup { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(window)) };
     let utility = RelativeUtility::new(UtilitySpecification::relative(RISK_AVERSION), 1.0);
-    let law = AssetsLaw { returns: window, radius, floors: vec![f64::NEG_INFINITY; assets] };
-    (AssetsStep::new(law, ground, utility, RATE, ActionInterval { lowest: 0.0, highest: 1.0 }), radius)
+    let law = ReturnScenarios { returns: window, radius, floors: vec![f64::NEG_INFINITY; assets] };
+    (PortfolioStep::new(law, ground, utility, RATE, ActionInterval { lowest: 0.0, highest: 1.0 }), radius)
 }

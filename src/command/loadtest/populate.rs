@@ -29,7 +29,7 @@ const HISTORY: usize = 20;
 const IN_FLIGHT: usize = 1024;
 
 /// A policy, and the returns of its sessions.
-pub struct World {
+pub struct LoadFixture {
     pub policy: String,
     pub horizon: usize,
     specification: Specification,
@@ -41,7 +41,7 @@ fn specification(horizon: usize, count: usize) -> Specification {
     paper::specification(HISTORY, horizon, count, InitialLaws::Given)
 }
 
-impl World {
+impl LoadFixture {
     /// Trains the policy here, on every core, and imports it into the service.
     pub async fn train(server: &Server, arguments: &LoadTest) -> Result<Self, Box<dyn Error>> {
         let LoadTest { horizon, count, .. } = *arguments;
@@ -54,7 +54,7 @@ impl World {
         let imported = LoadConnection::open(server.addresses[0]).await?.exchange(&import).await?.to_vec();
         let policy = text(&serde_json::from_slice(&imported)?, "policy")?;
         let specification = trained.specification().clone();
-        Ok(World { policy, horizon, specification, returns: paper::history(RETURNS, 2) })
+        Ok(LoadFixture { policy, horizon, specification, returns: paper::history(RETURNS, 2) })
     }
 
     /// Opens `count` sessions over HTTP.

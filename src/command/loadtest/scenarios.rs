@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::connection::get;
 use super::figures::{LoadBound, LoadReport, Must};
 use super::load::{Load, paced, saturate};
-use super::populate::{World, long_training, periods};
+use super::populate::{LoadFixture, long_training, periods};
 use super::server::Server;
 use super::stored::Growth;
 use super::{LoadTest, Scenario, limits, tell};
@@ -41,7 +41,7 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut LoadRep
             None => report.note("no pgbench here: what the database itself does is not known"),
         }
     }
-    let world = World::train(server, arguments).await?;
+    let world = LoadFixture::train(server, arguments).await?;
     let test = Test { arguments, world, clients: usize::from(arguments.clients), time };
     if arguments.runs(Scenario::Observe) {
         test.observe(server, report).await?;
@@ -63,7 +63,7 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut LoadRep
 
 struct Test<'a> {
     arguments: &'a LoadTest,
-    world: World,
+    world: LoadFixture,
     clients: usize,
     time: Duration,
 }

@@ -23,7 +23,7 @@ use serde_json::json;
 use super::ReproductionPlan;
 use super::printed::{QUANTILES, TABLES};
 use crate::command::bench::paper;
-use crate::command::compare::Workshop;
+use crate::command::compare::ComparisonRun;
 
 /// Number of returns of a history.
 pub const SAMPLE_SIZE: usize = 20;
@@ -80,7 +80,7 @@ pub fn request(
     Ok(serde_json::from_value(request)?)
 }
 
-pub fn section(plan: &ReproductionPlan, workshop: &Workshop) -> Result<Section, Box<dyn Error>> {
+pub fn section(plan: &ReproductionPlan, workshop: &ComparisonRun) -> Result<Section, Box<dyn Error>> {
     let request = request(plan, SAMPLE_SIZE, &[Framework::Adaptive, Framework::KnownLaw, Framework::Static])?;
     let evaluation = Evaluation::new(request.clone())?;
     let (quantiles, close) =
@@ -142,7 +142,7 @@ fn seek(plan: &ReproductionPlan, evaluation: &Evaluation) -> (Quantiles, [Vec<Ve
 
 fn case(
     plan: &ReproductionPlan,
-    workshop: &Workshop,
+    workshop: &ComparisonRun,
     request: &EvaluationRequest,
     followers: &[Follower],
     target: f64,
@@ -188,7 +188,7 @@ pub struct Slope {
     pub last: Estimate,
 }
 
-pub fn study(plan: &ReproductionPlan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> {
+pub fn study(plan: &ReproductionPlan, workshop: &ComparisonRun) -> Result<Study, Box<dyn Error>> {
     let mut rows = Vec::new();
     for &sample_size in &plan.study_sizes {
         rows.extend(study_size(plan, workshop, sample_size)?);
@@ -228,7 +228,7 @@ fn last_slope(gaps: &[(f64, Estimate)]) -> Estimate {
 
 fn study_size(
     plan: &ReproductionPlan,
-    workshop: &Workshop,
+    workshop: &ComparisonRun,
     sample_size: usize,
 ) -> Result<Vec<StudyRow>, Box<dyn Error>> {
     let sized = |frameworks: &[Framework], count: usize| -> Result<EvaluationReport, Box<dyn Error>> {

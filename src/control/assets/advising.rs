@@ -1,7 +1,7 @@
 //! Turns a request about several assets into advice.
 
 use super::advice::{AssetsAdvice, named, worst_means};
-use super::{AssetsLaw, AssetsStep};
+use super::{PortfolioStep, ReturnScenarios};
 use crate::control::error::FieldError;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::levels::{LevelsAdvised, WhyNothing};
@@ -40,7 +40,7 @@ pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
 
 /// Returns the step of `problem`, whose fund has the completed problem `fund`, as if `rows` had been seen, in a ball of
 /// this radius.
-pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
+pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> PortfolioStep {
     step_above(floors(fund.support_rule(), rows), problem, fund, rows, radius)
 }
 
@@ -59,10 +59,10 @@ fn step_above(
     fund: &ProblemSpecification,
     rows: &[Vec<f64>],
     radius: f64,
-) -> AssetsStep {
+) -> PortfolioStep {
     let [lowest, highest] = fund.action_interval;
-    AssetsStep::new(
-        AssetsLaw { returns: rows, radius, floors },
+    PortfolioStep::new(
+        ReturnScenarios { returns: rows, radius, floors },
         problem.ground_norm.at(rows),
         utility(fund),
         fund.rate_per_step,
@@ -105,7 +105,7 @@ impl FundsBall {
 impl AssetsAdvice {
     /// Returns the advice for `problem`, whose fund of inverse volatilities is `fund`, given these holdings as shares
     /// of wealth; and the reason if nothing is held. Cost: its levels of caution, if one is followed, and the joint
-    /// factor under `bridge` and `calibrated`. Also [`AssetsStep::solve_from`], twice if a return may fall below those
+    /// factor under `bridge` and `calibrated`. Also [`PortfolioStep::solve_from`], twice if a return may fall below those
     /// seen, and once for each level of a short record.
     /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
@@ -124,7 +124,7 @@ impl AssetsAdvice {
         let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve_from(holdings, cost, None);
         let total_of =
-            |step: AssetsStep| step.solve_from(holdings, cost, Some(&solution)).allocation.iter().sum::<f64>();
+            |step: PortfolioStep| step.solve_from(holdings, cost, Some(&solution)).allocation.iter().sum::<f64>();
         let total_within = |radius: f64| total_of(step(problem, fund, rows, radius));
         let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let crashes = floors(fund.support_rule(), rows).into_iter().any(|floor| floor < lowest);

@@ -7,7 +7,7 @@
 //! grows. At the end of a phase, when a position reaches its floor, f may have another local minimum. A worst law needs
 //! only these points and the atom in place.
 
-use super::AssetsStep;
+use super::PortfolioStep;
 use crate::control::problem::utility::RelativeUtility;
 use crate::numerics::interruption;
 use crate::numerics::levelling::{FillingPhase, Levelling};
@@ -76,7 +76,7 @@ impl Branches {
     }
 
     /// Finds the branches at a point. Cost O(n d ln d).
-    pub fn find(&mut self, step: &AssetsStep, allocation: &[f64], price: f64) {
+    pub fn find(&mut self, step: &PortfolioStep, allocation: &[f64], price: f64) {
         self.start(step);
         for atom in 0..step.atoms() {
             self.find_of(step, atom, allocation, price);
@@ -84,7 +84,7 @@ impl Branches {
         }
     }
 
-    fn start(&mut self, step: &AssetsStep) {
+    fn start(&mut self, step: &PortfolioStep) {
         interruption::checkpoint();
         self.assets = step.assets();
         self.first.clear();
@@ -109,7 +109,7 @@ impl Branches {
         self.all.push(Branch { cost: 0.0, payoff, slope, bend, level: f64::INFINITY, follows: false });
     }
 
-    fn find_of(&mut self, step: &AssetsStep, atom: usize, allocation: &[f64], price: f64) {
+    fn find_of(&mut self, step: &PortfolioStep, atom: usize, allocation: &[f64], price: f64) {
         let growths = step.growth(atom);
         self.leave(step.utility, allocation, growths);
         if step.radius <= 0.0 {
@@ -133,7 +133,7 @@ impl Branches {
                 wealth += position;
                 let growth = match share > 0.0 {
                     true => position / share,
-                    false => step.unheld(index, growths[index], level),
+                    false => step.unheld_growth(index, growths[index], level),
                 };
                 let moves = follows && position < positions[index] && position > floors[index];
                 moving += if moves { position } else { 0.0 };

@@ -1,6 +1,6 @@
 //! The bounds that the search computes at every point: they hold in any state of the search.
 
-use super::AssetsStep;
+use super::PortfolioStep;
 use super::cuts::dot;
 use super::interior::Interior;
 use super::trading::Tangent;
@@ -13,7 +13,7 @@ const ENTERING_TOO: f64 = 0.5;
 
 impl Interior<'_> {
     /// Updates the lower bound by this point, whose dual is given.
-    pub fn tell_lower(&mut self, dual: f64) {
+    pub fn update_lower_bound(&mut self, dual: f64) {
         let (shares, price) = self.point.split_at(self.step.assets());
         let lower = dual - self.step.trading.taken(shares);
         if lower > self.lower {
@@ -22,7 +22,7 @@ impl Interior<'_> {
     }
 
     /// Updates the upper bound by the law of the multipliers, and the assets that would raise it.
-    pub fn tell_upper(&mut self) {
+    pub fn update_upper_bound(&mut self) {
         let assets = self.step.assets();
         let shares = &self.point[..assets];
         let masses = self.law();
@@ -38,7 +38,7 @@ impl Interior<'_> {
                     }
                     if assets < others.len() {
                         for (asset, growth) in self.whole.growth(atom).iter().enumerate() {
-                            others[asset] += weight * (self.whole.unheld(asset, *growth, found.level) - 1.0);
+                            others[asset] += weight * (self.whole.unheld_growth(asset, *growth, found.level) - 1.0);
                         }
                     }
                 }
@@ -46,7 +46,7 @@ impl Interior<'_> {
         });
         let steepest = |gradient: &[f64]| gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let along = dot(&gradient, shares);
-        let upper = |slopes: &[f64], step: &AssetsStep| mean + step.trading.most(slopes, step.total) - along;
+        let upper = |slopes: &[f64], step: &PortfolioStep| mean + step.trading.most(slopes, step.total) - along;
         let among = upper(&gradient, self.step);
         let mut slopes = others.clone();
         self.held.iter().zip(&gradient).for_each(|(&asset, slope)| slopes[asset] = *slope);
@@ -83,8 +83,8 @@ impl Interior<'_> {
             let growths = self.whole.growth(atom);
             for cut in self.cuts.of(atom).skip(1) {
                 let level = self.cuts.all[cut].level;
-                let unheld = |(asset, growth): (usize, &f64)| self.whole.unheld(asset, *growth, level);
-                let mut moved: Vec<f64> = growths.iter().enumerate().map(unheld).collect();
+                let unheld_growth = |(asset, growth): (usize, &f64)| self.whole.unheld_growth(asset, *growth, level);
+                let mut moved: Vec<f64> = growths.iter().enumerate().map(unheld_growth).collect();
                 let held = self.held.iter().zip(self.cuts.excess(cut));
                 held.for_each(|(&asset, excess)| moved[asset] = excess + 1.0);
                 for (sum, (moved, growth)) in moves.iter_mut().zip(moved.iter().zip(growths)) {

@@ -40,7 +40,7 @@ pub fn of(allocation: &[f64]) -> Option<Vec<f64>> {
 /// would be.
 ///
 /// Both of the two values must be as high; a fund without values is never chosen.
-pub fn guarded(held: Vec<f64>, proposed: Vec<f64>, value: impl Fn(&[f64]) -> Option<[f64; 2]>) -> Vec<f64> {
+pub fn accept_if_no_worse(held: Vec<f64>, proposed: Vec<f64>, value: impl Fn(&[f64]) -> Option<[f64; 2]>) -> Vec<f64> {
     let Some(new) = value(&proposed) else { return held };
     let is_as_high = value(&held).is_none_or(|old| new.iter().zip(old).all(|(new, old)| *new >= old));
     if is_as_high { proposed } else { held }
@@ -77,13 +77,13 @@ mod tests {
     #[test]
     fn a_composition_that_the_policy_values_less_is_not_taken() {
         let value = |fund: &[f64]| (fund[0] > 0.1).then_some([fund[0], 0.0]);
-        assert_eq!(guarded(vec![0.5, 0.5], vec![0.4, 0.6], value), [0.5, 0.5]);
-        assert_eq!(guarded(vec![0.5, 0.5], vec![0.6, 0.4], value), [0.6, 0.4]);
-        assert_eq!(guarded(vec![0.5, 0.5], vec![0.5, 0.5], value), [0.5, 0.5]);
-        assert_eq!(guarded(vec![0.0, 1.0], vec![0.05, 0.95], value), [0.0, 1.0]);
-        assert_eq!(guarded(vec![0.0, 1.0], vec![0.2, 0.8], value), [0.2, 0.8]);
+        assert_eq!(accept_if_no_worse(vec![0.5, 0.5], vec![0.4, 0.6], value), [0.5, 0.5]);
+        assert_eq!(accept_if_no_worse(vec![0.5, 0.5], vec![0.6, 0.4], value), [0.6, 0.4]);
+        assert_eq!(accept_if_no_worse(vec![0.5, 0.5], vec![0.5, 0.5], value), [0.5, 0.5]);
+        assert_eq!(accept_if_no_worse(vec![0.0, 1.0], vec![0.05, 0.95], value), [0.0, 1.0]);
+        assert_eq!(accept_if_no_worse(vec![0.0, 1.0], vec![0.2, 0.8], value), [0.2, 0.8]);
         // A proposal that is worth more but costs more to reach.
         let dear = |fund: &[f64]| Some([fund[0], fund[1]]);
-        assert_eq!(guarded(vec![0.5, 0.5], vec![0.6, 0.4], dear), [0.5, 0.5]);
+        assert_eq!(accept_if_no_worse(vec![0.5, 0.5], vec![0.6, 0.4], dear), [0.5, 0.5]);
     }
 }

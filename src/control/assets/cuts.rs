@@ -8,7 +8,7 @@
 //! does not move by itself. The second agrees with its branch to second order, and is a bound near the origin alone: if
 //! it is kept longer, it becomes a fixed move.
 
-use super::AssetsStep;
+use super::PortfolioStep;
 use super::branches::Branches;
 use crate::control::request::assets::MOST_ASSETS;
 use crate::numerics::dispatch::dispatched;
@@ -101,7 +101,7 @@ impl Cuts {
 
     /// Takes over the branches found at a point, and those earlier moves that still carry mass and differ from all of
     /// the new ones.
-    pub fn renew(&mut self, step: &AssetsStep, branches: &Branches, point: &[f64], before: &Cuts) {
+    pub fn renew(&mut self, step: &PortfolioStep, branches: &Branches, point: &[f64], before: &Cuts) {
         self.assets = step.assets();
         self.origin.clear();
         self.origin.extend_from_slice(point);
@@ -151,7 +151,7 @@ impl Cuts {
     }
 
     /// Sets payoffs and their derivatives at a point. Cost O(n d) for n moves of d assets.
-    pub fn evaluate(&mut self, step: &AssetsStep, point: &[f64]) {
+    pub fn evaluate(&mut self, step: &PortfolioStep, point: &[f64]) {
         dispatched!({
             for atom in 0..step.atoms() {
                 for cut in self.of(atom) {
@@ -165,7 +165,7 @@ impl Cuts {
     }
 
     #[inline(always)]
-    fn evaluate_still(&mut self, step: &AssetsStep, cut: usize, point: &[f64]) {
+    fn evaluate_still(&mut self, step: &PortfolioStep, cut: usize, point: &[f64]) {
         let (assets, found) = (self.assets, &mut self.all[cut]);
         let excess = &self.excesses[cut * assets..][..assets];
         let wealth = 1.0 + dot(excess, point);
@@ -178,7 +178,14 @@ impl Cuts {
     }
 
     #[inline(always)]
-    fn evaluate_following(&mut self, step: &AssetsStep, atom: usize, cut: usize, point: &[f64], following: Following) {
+    fn evaluate_following(
+        &mut self,
+        step: &PortfolioStep,
+        atom: usize,
+        cut: usize,
+        point: &[f64],
+        following: Following,
+    ) {
         let along = self.along(cut, point);
         let level = self.level(step, atom, cut, point, following.slope);
         let (assets, found) = (self.assets, &mut self.all[cut]);
@@ -209,7 +216,7 @@ impl Cuts {
 
     /// Returns the level at which a following move is optimal if U' is `slope`.
     #[inline(always)]
-    fn level(&self, step: &AssetsStep, atom: usize, cut: usize, point: &[f64], slope: f64) -> f64 {
+    fn level(&self, step: &PortfolioStep, atom: usize, cut: usize, point: &[f64], slope: f64) -> f64 {
         let price = point[self.assets];
         if !step.ground.is_sup() {
             return price / slope;
@@ -221,7 +228,7 @@ impl Cuts {
     }
 
     /// Sets the following moves to their optimum at a point, for the law: U' has also changed since the origin.
-    pub fn follow(&mut self, step: &AssetsStep, point: &[f64]) {
+    pub fn follow(&mut self, step: &PortfolioStep, point: &[f64]) {
         let assets = self.assets;
         for atom in 0..step.atoms() {
             for cut in self.of(atom) {
@@ -244,7 +251,7 @@ impl Cuts {
 /// Returns the growth of an asset with a positive share once positions are lowered to a level, and whether it moves by
 /// itself there.
 #[inline(always)]
-fn lowered(step: &AssetsStep, index: usize, share: f64, growth: f64, level: f64) -> (f64, bool) {
+fn lowered(step: &PortfolioStep, index: usize, share: f64, growth: f64, level: f64) -> (f64, bool) {
     let (position, floor) = (share * growth, share * step.least_growths[index].min(growth));
     let lowered = step.ground.lowered(index, position, floor, level);
     (if lowered < position { lowered / share } else { growth }, lowered < position && lowered > floor)
@@ -255,7 +262,7 @@ mod tests {
     use rand::RngExt;
 
     use super::*;
-    use crate::control::assets::AssetsLaw;
+    use crate::control::assets::ReturnScenarios;
     use crate::control::problem::actions::ActionInterval;
     use crate::control::problem::utility::RelativeUtility;
     use crate::numerics::levelling::{GroundMetric, inverse_volatility};
@@ -276,8 +283,8 @@ mod tests {
                 [RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }]
                     [case % 3];
             let floor = [f64::NEG_INFINITY, -0.3, -0.13][case % 4 % 3];
-            let law = AssetsLaw { returns: &returns, radius: 0.01, floors: vec![floor; ASSETS] };
-            let step = AssetsStep::new(law, ground, utility, 0.002, ActionInterval { lowest: 0.0, highest: 1.0 });
+            let law = ReturnScenarios { returns: &returns, radius: 0.01, floors: vec![floor; ASSETS] };
+            let step = PortfolioStep::new(law, ground, utility, 0.002, ActionInterval { lowest: 0.0, highest: 1.0 });
             let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
             let mut point: Vec<f64> = (0..ASSETS).map(|_| draw(0.02, 0.24)).collect();
             point.push(draw(0.1, 2.0));

@@ -4,7 +4,7 @@
 //! A rule proposes the composition theta from the returns seen. The policy knows the assets only through the log-return
 //! of the fund, `zeta = ln sum_i theta_i e^(z_i)`. The state's law is that of the zetas of all dates, its radius holds
 //! for all funds at once, and the advice is the policy's share times theta. A proposal replaces the composition held
-//! only if the policy values it as much (see [`guarded`]). The policy's certainty equivalent at the fund held then
+//! only if the policy values it as much (see [`accept_if_no_worse`]). The policy's certainty equivalent at the fund held then
 //! stays a valid promise for any proposal rule. Checked by:
 //! `tests/service/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
 //!
@@ -14,8 +14,8 @@
 
 use super::advice::{OneStep, named, worst_means};
 use super::advising::{floors, radius_factor};
-use super::composition::guarded;
-use super::{AssetsLaw, AssetsSolution, AssetsStep};
+use super::composition::accept_if_no_worse;
+use super::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::actions::ActionInterval;
@@ -155,7 +155,7 @@ impl Fund {
         let mut solution = None;
         let proposed = fund.composition.composition(&self.rows, || {
             let even = self.state(advisor, state, &inverse_volatility(&self.rows));
-            let law = AssetsLaw {
+            let law = ReturnScenarios {
                 returns: &self.rows,
                 radius: advisor.radius(&even),
                 floors: floors(problem.support_rule(), &self.rows),
@@ -163,7 +163,7 @@ impl Fund {
             let utility = RelativeUtility::new(problem.utility, state.wealth * (1.0 + problem.rate_per_step));
             let [lowest, highest] = problem.action_interval;
             let total = ActionInterval { lowest, highest };
-            let step = AssetsStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
+            let step = PortfolioStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
             // A cold start, so that the proposal depends on the returns seen alone.
             solution.insert(step.solve(None)).clone()
         });
@@ -176,7 +176,7 @@ impl Fund {
             let net = gain / left - problem.trading_cost * self.traded(&executed);
             varies.then_some([gain, net])
         };
-        let chosen = guarded(self.composition.clone(), proposed, value);
+        let chosen = accept_if_no_worse(self.composition.clone(), proposed, value);
         self.take(chosen);
         (self.state(advisor, state, &self.composition), solution)
     }

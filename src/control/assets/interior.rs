@@ -17,7 +17,7 @@
 mod newton;
 
 use self::newton::Direction;
-use super::AssetsStep;
+use super::PortfolioStep;
 use super::branches::Branches;
 use super::cuts::{Cut, Cuts, dot};
 use super::trading::Tangent;
@@ -73,8 +73,8 @@ impl BarrierConstraint {
 /// The state of the interior point search.
 pub(super) struct Interior<'a> {
     /// The step with the assets searched among, which are `held` of the `whole`.
-    pub step: &'a AssetsStep,
-    pub whole: &'a AssetsStep,
+    pub step: &'a PortfolioStep,
+    pub whole: &'a PortfolioStep,
     pub held: &'a [usize],
     /// Other assets, which would raise the value by more than the remaining gap among these.
     pub entering: Vec<usize>,
@@ -123,8 +123,8 @@ fn top(cuts: &[Cut], barrier: f64) -> f64 {
 impl<'a> Interior<'a> {
     /// Starts the search. `near` is a warm start: shares of the assets searched among, and a price.
     pub fn start(
-        step: &'a AssetsStep,
-        whole: &'a AssetsStep,
+        step: &'a PortfolioStep,
+        whole: &'a PortfolioStep,
         held: &'a [usize],
         near: Option<(Vec<f64>, f64)>,
         barrier: f64,
@@ -194,7 +194,7 @@ impl<'a> Interior<'a> {
         self.branches.find(self.step, shares, price[0]);
         self.evaluations += 1;
         let dual = self.step.dual(&self.branches, price[0]).0;
-        self.tell_lower(dual);
+        self.update_lower_bound(dual);
         dual
     }
 
@@ -229,7 +229,7 @@ impl<'a> Interior<'a> {
             let goes_on = self.solve_known();
             let unknown = self.known() - self.ask();
             self.cuts.follow(self.step, &self.point);
-            self.tell_upper();
+            self.update_upper_bound();
             let found = self.upper - self.lower < tolerance || !self.entering.is_empty();
             if found || !goes_on || self.barrier < LEAST_BARRIER {
                 return;

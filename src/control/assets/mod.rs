@@ -54,7 +54,7 @@ const LEAST_SHARE: f64 = 1e-6;
 
 /// A robust step with several assets.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AssetsStep {
+pub struct PortfolioStep {
     assets: usize,
     /// `e^(z_i) / (1 + r)`, atom after atom.
     growths: Vec<f64>,
@@ -70,7 +70,7 @@ pub struct AssetsStep {
 
 /// The law of the coming returns and the set around it.
 #[derive(Debug, Clone)]
-pub struct AssetsLaw<'a> {
+pub struct ReturnScenarios<'a> {
     /// Log-returns of all assets, at most thirty, date by date; at least one date.
     pub returns: &'a [Vec<f64>],
     /// In log-return, at least 0.
@@ -103,11 +103,11 @@ impl AssetsSolution {
     }
 }
 
-impl AssetsStep {
+impl PortfolioStep {
     /// Builds the step at the empirical law of `law.returns`, each date with the same mass; the shares sum to within
     /// `total`. `utility` is relative to the wealth that the bank makes.
     pub fn new(
-        law: AssetsLaw<'_>,
+        law: ReturnScenarios<'_>,
         ground: GroundMetric,
         utility: RelativeUtility,
         rate_per_step: f64,
@@ -115,7 +115,7 @@ impl AssetsStep {
     ) -> Self {
         let bank = 1.0 + rate_per_step;
         let count = law.returns.len().max(1);
-        AssetsStep {
+        PortfolioStep {
             assets: law.returns.first().map_or(0, Vec::len),
             growths: law.returns.iter().flatten().map(|log_return| log_return.exp() / bank).collect(),
             masses: vec![1.0 / count as f64; law.returns.len()],
@@ -230,9 +230,9 @@ impl AssetsStep {
     }
 
     /// Returns the step with some of the assets alone.
-    fn among(&self, held: &[usize]) -> AssetsStep {
+    fn among(&self, held: &[usize]) -> PortfolioStep {
         let of = |row: &[f64]| held.iter().map(|&asset| row[asset]).collect::<Vec<f64>>();
-        AssetsStep {
+        PortfolioStep {
             assets: held.len(),
             growths: (0..self.atoms()).flat_map(|atom| of(self.growth(atom))).collect(),
             least_growths: of(&self.least_growths),
@@ -249,7 +249,7 @@ impl AssetsStep {
     /// Returns the growth of an asset not held once positions are lowered to a level. It moves at no cost if all move
     /// together, and does not move if each move is paid for.
     #[inline(always)]
-    fn unheld(&self, asset: usize, growth: f64, level: f64) -> f64 {
+    fn unheld_growth(&self, asset: usize, growth: f64, level: f64) -> f64 {
         let moved = if self.ground.is_sup() { growth * level } else { growth };
         let least = self.least_growths[asset];
         let held_up = if moved > least { moved } else { least };

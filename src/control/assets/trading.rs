@@ -10,7 +10,7 @@
 //!
 //!   the whole  <=  V_F(a) + ln(1 - c T(a)) + max_b [ grad V_F(a) . (b - a) - c / (1 - c T(a)) (T(b) - T(a)) ].
 
-use super::{AssetsSolution, AssetsStep, BARRIER_NEAR, BARRIERS, CONTENT, LEAST_SHARE};
+use super::{AssetsSolution, BARRIER_NEAR, BARRIERS, CONTENT, LEAST_SHARE, PortfolioStep};
 use crate::control::problem::actions::ActionInterval;
 
 /// Largest number of searches.
@@ -78,7 +78,7 @@ impl Trading {
     }
 }
 
-impl AssetsStep {
+impl PortfolioStep {
     /// Solves for the best allocation given `holdings`, one for each asset, if each unit of wealth bought or sold loses
     /// the share `cost` of wealth. `value` and `bound` are net of that cost. Under power and log utility. Cost: some
     /// searches. Checked by: `tests/solver/assets.rs::holdings_and_a_cost_are_best_by_direct_search`.

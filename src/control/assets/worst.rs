@@ -5,7 +5,7 @@
 //! the two tangents meet, kept off the ends. The two laws, mixed so that the radius is just used up, are the worst law,
 //! and its value is the primal.
 
-use super::AssetsStep;
+use super::PortfolioStep;
 use super::branches::Branches;
 
 /// Largest number of prices tried.
@@ -22,7 +22,7 @@ const HIGHEST_PRICE: f64 = 1e15;
 
 /// The value of an allocation against the worst law for it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AssetsWorth {
+pub struct RobustValue {
     /// Lower bound on the log certainty equivalent over the bank, by duality.
     pub value: f64,
     /// The log certainty equivalent under a law in the ball; minus infinity if some atom has no furthest point to be
@@ -40,16 +40,16 @@ struct Priced {
     distance: f64,
 }
 
-impl AssetsStep {
+impl PortfolioStep {
     /// Returns the worth of an allocation. Cost: some 20 to 60 evaluations.
-    pub fn worth(&self, allocation: &[f64]) -> AssetsWorth {
+    pub fn worth(&self, allocation: &[f64]) -> RobustValue {
         let mut branches = Branches::default();
         let mut at = |price: f64| {
             branches.find(self, allocation, price);
             let (dual, distance) = self.dual(&branches, price);
             Priced { price, dual, distance }
         };
-        let told = |dual: f64, primal: f64, price: f64| AssetsWorth {
+        let told = |dual: f64, primal: f64, price: f64| RobustValue {
             value: self.utility.inverse(dual),
             primal: self.utility.inverse(primal),
             multiplier: price,

@@ -24,7 +24,7 @@ use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::request::support::Support;
-use crate::control::training::{Summaries, Training};
+use crate::control::training::{LawSummaryCache, Training};
 
 /// Returns of one actual period.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,7 +120,7 @@ impl Strategy {
 /// Work shared by the trainings of one block of periods; no bit of a decision depends on it.
 pub struct SharedWork {
     kept: Cache,
-    measured: Arc<Summaries>,
+    measured: Arc<LawSummaryCache>,
 }
 
 impl SharedWork {
@@ -134,7 +134,7 @@ impl SharedWork {
                 alphas.push(alpha);
             }
         }
-        SharedWork { kept, measured: Arc::new(Summaries::at(alphas)) }
+        SharedWork { kept, measured: Arc::new(LawSummaryCache::at(alphas)) }
     }
 }
 

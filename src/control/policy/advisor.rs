@@ -14,7 +14,7 @@ use crate::control::error::FieldError;
 use crate::control::kept::Cache;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
-use crate::control::problem::state::{Realised, State};
+use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::request::specification::Specification;
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
@@ -347,7 +347,7 @@ impl Advisor {
     }
 
     /// Returns the state after the period that follows `step` observed periods.
-    pub fn advance(&self, step: usize, state: &State, realised: &Realised) -> State {
+    pub fn advance(&self, step: usize, state: &State, realised: &PeriodOutcome) -> State {
         state.next_state(self.problem.dynamics(step), realised)
     }
 }

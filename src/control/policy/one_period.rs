@@ -117,7 +117,7 @@ impl OnePeriod {
     /// A holding that is no share.
     pub fn sensitivity(&self, holding: f64, advice: &Advice) -> Result<Sensitivity, FieldError> {
         let state = self.state(holding)?;
-        let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).found_rule());
+        let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).calibrated_rule());
         let of = |record: &[f64]| {
             // The rule found already includes the level's share.
             let caution = Some(CautionLevel::Paper);

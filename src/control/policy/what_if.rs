@@ -4,7 +4,7 @@ use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::policy::worst_case::WorstCase;
-use crate::control::problem::state::{Realised, State};
+use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::request::rules;
 
 /// The hypothetical changes; everything else stays as it is. They apply in the order of the fields.
@@ -31,7 +31,7 @@ pub enum HypotheticalRadius {
 
 /// The advice under a hypothesis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Supposed {
+pub struct WhatIfResult {
     /// Wealth at that time.
     pub wealth: f64,
     /// Advice for the period after those observed at that time.
@@ -90,7 +90,7 @@ impl Advisor {
         state: &State,
         hypothesis: &Hypothesis,
         mode: AdviceMode,
-    ) -> Result<Supposed, FieldError> {
+    ) -> Result<WhatIfResult, FieldError> {
         hypothesis.check()?;
         let (step, state) = self.supposed_state(step, following, state, hypothesis)?;
         let wealth = state.wealth;
@@ -106,7 +106,7 @@ impl Advisor {
             let (advice, worst_case) = self.explain_knowing(step, &state, own, radius);
             (advice, Some(worst_case))
         };
-        Ok(Supposed { wealth, advice, worst_case })
+        Ok(WhatIfResult { wealth, advice, worst_case })
     }
 
     /// Returns the step and state with the hypothetical wealth and holding, after the hypothetical return.
@@ -126,7 +126,7 @@ impl Advisor {
             return Err(FieldError::new("log_return", log_return, rule));
         };
         let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
-        let then = self.advance(step, &now, &Realised::of(advised, log_return));
+        let then = self.advance(step, &now, &PeriodOutcome::of(advised, log_return));
         let (low, high) = rules::WEALTH;
         if !(low..=high).contains(&then.wealth) {
             let rule = format!("must leave a wealth in [{low}, {high}]");

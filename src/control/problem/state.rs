@@ -8,7 +8,7 @@ use crate::numerics::empirical::EmpiricalDistribution;
 
 /// The realised values of a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Realised {
+pub struct PeriodOutcome {
     /// Share of wealth held in the risky asset through the period.
     pub action: f64,
     /// z; if it is not known the asset counts as unmoved, and nothing is learned.
@@ -21,10 +21,10 @@ pub struct Realised {
     pub traded: Option<f64>,
 }
 
-impl Realised {
+impl PeriodOutcome {
     /// Returns a period with the rate, the contribution and the trade of the problem.
     pub fn of(action: f64, log_return: f64) -> Self {
-        Realised { action, log_return: Some(log_return), rate: None, flow: None, traded: None }
+        PeriodOutcome { action, log_return: Some(log_return), rate: None, flow: None, traded: None }
     }
 }
 
@@ -62,8 +62,8 @@ impl State {
 
     /// Returns G(y, a, z): next wealth and holding after a period of `dynamics` with the values `realised`, and the law
     /// with the return learned.
-    pub fn next_state(&self, dynamics: Dynamics, realised: &Realised) -> State {
-        let Realised { action, log_return, rate, flow, traded } = *realised;
+    pub fn next_state(&self, dynamics: Dynamics, realised: &PeriodOutcome) -> State {
+        let PeriodOutcome { action, log_return, rate, flow, traded } = *realised;
         let rate_per_step = rate.unwrap_or(dynamics.rate_per_step);
         let contribution = flow.unwrap_or(dynamics.contribution);
         let dynamics = Dynamics { rate_per_step, contribution, ..dynamics };

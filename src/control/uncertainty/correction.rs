@@ -25,7 +25,7 @@ impl RadiusEstimator {
     /// of similar laws.
     fn correction(&self, alpha: f64, paths: usize) -> f64 {
         let bridges = self.bridges(self.learned.sample_size(), paths);
-        let simulated = bridges.bridge_quantile(&self.learned, Statistic::Now, alpha);
+        let simulated = bridges.bridge_quantile(&self.learned, Statistic::Current, alpha);
         let exact = || self.exact.get_or_init(|| bridges.exact(&self.learned)).quantile(1.0 - alpha);
         if simulated > 0.0 { (exact() / simulated).clamp(RADIUS_CORRECTION.0, RADIUS_CORRECTION.1) } else { 1.0 }
     }

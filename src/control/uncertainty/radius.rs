@@ -172,14 +172,18 @@ impl RadiusEstimator {
             RadiusRule::Bridge { alpha, paths, scale, .. } => {
                 let bridges = self.bridges(law.sample_size(), paths);
                 let scale = self.factor(scale, alpha, paths);
-                self.bridged_radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
+                self.scaled_quantile(
+                    scale,
+                    bridges.bridge_quantile(law, Statistic::Current, alpha),
+                    law.effective_size(),
+                )
             }
             _ => self.radius_of_size(law.effective_size()),
         }
     }
 
     /// Returns the rule with the result of a calibration: it gives every law the same radius, without the history.
-    pub fn found_rule(&self) -> RadiusRule {
+    pub fn calibrated_rule(&self) -> RadiusRule {
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale, correction } => {
                 RadiusRule::Bridge { alpha, paths, scale: self.calibrated(scale, alpha, paths), correction }
@@ -207,8 +211,8 @@ impl RadiusEstimator {
         let size = law.effective_size();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale, .. } => {
-                let simulated = self.bridges(law.sample_size(), paths).bridge_quantile(law, Statistic::Now, alpha);
-                let radius = self.bridged_radius(self.factor(scale, alpha, paths), simulated, size);
+                let simulated = self.bridges(law.sample_size(), paths).bridge_quantile(law, Statistic::Current, alpha);
+                let radius = self.scaled_quantile(self.factor(scale, alpha, paths), simulated, size);
                 Measure { radius, quantile: Some(self.correction_at(alpha, paths) * simulated) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
@@ -223,9 +227,9 @@ impl RadiusEstimator {
             RadiusRule::Bridge { alpha, paths, scale, .. } => {
                 let bridges = self.bridges(size + 1, paths);
                 let scale = self.factor(scale, alpha, paths);
-                self.bridged_radius(
+                self.scaled_quantile(
                     scale,
-                    bridges.bridge_quantile(law, Statistic::OneLater, alpha),
+                    bridges.bridge_quantile(law, Statistic::AfterOneMore, alpha),
                     law.effective_sizes_ahead()[0],
                 )
             }
@@ -248,15 +252,15 @@ impl RadiusEstimator {
         let factors: Vec<f64> = alphas.iter().map(|alpha| self.factor(scale, *alpha, paths)).collect();
         let base = self.learned.atoms();
         let quantiles = |which, size| self.bridges(size, paths).bridge_quantiles(laws, base, which, alphas);
-        let now = quantiles(Statistic::Now, size);
-        let ahead = self.looks_ahead(size).then(|| quantiles(Statistic::OneLater, size + 1));
+        let now = quantiles(Statistic::Current, size);
+        let ahead = self.looks_ahead(size).then(|| quantiles(Statistic::AfterOneMore, size + 1));
         let effective_size_ahead = first.effective_sizes_ahead()[0];
         let of_law = |(index, now): (usize, Vec<f64>)| {
             let of_level = |(level, now): (usize, f64)| {
                 let factor = factors[level];
-                let known = self.bridged_radius(factor, now, effective_size);
+                let known = self.scaled_quantile(factor, now, effective_size);
                 let later =
-                    ahead.as_ref().map(|ahead| self.bridged_radius(factor, ahead[index][level], effective_size_ahead));
+                    ahead.as_ref().map(|ahead| self.scaled_quantile(factor, ahead[index][level], effective_size_ahead));
                 Radii { radius: known, radius_ahead: later.unwrap_or(known) }
             };
             now.into_iter().enumerate().map(of_level).collect()
@@ -283,16 +287,16 @@ impl RadiusEstimator {
                     let found = self.bridges(size, paths).bridge_quantiles_with(law, values, which, alpha);
                     found
                         .into_iter()
-                        .map(|quantile| self.bridged_radius(scale, quantile, effective_size))
+                        .map(|quantile| self.scaled_quantile(scale, quantile, effective_size))
                         .collect::<Vec<f64>>()
                 };
-                let now = radii(values, Statistic::Now, size, next_size);
+                let now = radii(values, Statistic::Current, size, next_size);
                 if !self.looks_ahead(size) {
                     return now.into_iter().map(|radius| Radii { radius, radius_ahead: radius }).collect();
                 }
                 let some = thinned(values.len());
                 let at: Vec<f64> = some.iter().map(|&index| values[index]).collect();
-                let later = radii(&at, Statistic::OneLater, size + 1, size_after);
+                let later = radii(&at, Statistic::AfterOneMore, size + 1, size_after);
                 let gained: Vec<f64> = later.iter().zip(&some).map(|(later, &index)| later - now[index]).collect();
                 let ahead = |(radius, &value): (f64, &f64)| {
                     let (first, weights) = local_cubic(&at, value);
@@ -320,7 +324,7 @@ impl RadiusEstimator {
         of_returns * self.centre.share_seen(size)
     }
 
-    fn bridged_radius(&self, scale: f64, quantile: f64, effective_size: f64) -> f64 {
+    fn scaled_quantile(&self, scale: f64, quantile: f64, effective_size: f64) -> f64 {
         scale * quantile / effective_size.sqrt() * self.centre.share_seen(effective_size)
     }
 
@@ -382,7 +386,7 @@ mod tests {
         // Four returns show too little of their law's spread.
         assert!(factor > 1.05, "{factor}");
         let known = calibrated.radius(&law);
-        let RadiusRule::Bridge { scale, .. } = calibrated.found_rule() else { panic!("no bridge") };
+        let RadiusRule::Bridge { scale, .. } = calibrated.calibrated_rule() else { panic!("no bridge") };
         assert!((scale / 0.7 / factor - 1.0).abs() < 1e-12, "{scale}");
         let mut pairs = vec![(bridge.measure(&law).radius, calibrated.measure(&law).radius)];
         pairs.push((bridge.radii(&law, known).radius_ahead, calibrated.radii(&law, known).radius_ahead));

@@ -2,7 +2,7 @@
 
 use super::AssetsBacktest;
 use crate::control::assets::advising::{FundsBall, floors};
-use crate::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use crate::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use crate::control::error::TrainError;
 use crate::control::evaluation::names::{StrategyKind, caution_in_words};
 use crate::control::problem::actions::ActionInterval;
@@ -153,12 +153,12 @@ impl AssetsStrategy {
 }
 
 /// Returns the one-step problem before a period. The bank is assumed to keep paying its last rate.
-fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: GroundNorm, radius: f64) -> AssetsStep {
+fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: GroundNorm, radius: f64) -> PortfolioStep {
     let rate = backtest.record.bank[period - 1];
     // Under power and log utility the solution does not depend on wealth.
     let utility = RelativeUtility::new(backtest.utility(), 1.0 + rate);
-    let law = AssetsLaw { returns: rows, radius, floors: floors(backtest.choices.support, rows) };
-    AssetsStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
+    let law = ReturnScenarios { returns: rows, radius, floors: floors(backtest.choices.support, rows) };
+    PortfolioStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
 }
 
 /// Returns the covariance of log-returns, given date by date.

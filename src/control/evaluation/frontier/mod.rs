@@ -25,7 +25,7 @@ use rayon::prelude::*;
 
 use self::laws::RecordLaw;
 use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, ResampledFrontier};
-use crate::control::assets::{AssetsStep, advising};
+use crate::control::assets::{PortfolioStep, advising};
 use crate::control::error::TrainError;
 use crate::control::kept::Cache;
 use crate::control::problem::utility::RelativeUtility;
@@ -207,7 +207,7 @@ impl Frontier {
         self.factor * self.radii.radius(&EmpiricalDistribution::new(&fund))
     }
 
-    fn step(&self, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
+    fn step(&self, rows: &[Vec<f64>], radius: f64) -> PortfolioStep {
         advising::step(&self.question.assets, &self.question.fund.problem, rows, radius)
     }
 
