@@ -102,8 +102,8 @@ impl Training {
         }
         // The first step has one state if all sessions start alike.
         let erring = step + usize::from(self.design.count(0) > 1);
-        let asked = Some(&self.problem.specification.design).filter(|_| counts.chosen);
-        let aim = asked.and_then(|design| Aim::of(design, step, erring, after.map(|after| &after.diagnostics)));
+        let design = Some(&self.problem.specification.design).filter(|_| counts.chosen);
+        let aim = design.and_then(|design| Aim::of(design, step, erring, after.map(|after| &after.diagnostics)));
         let (specification, names) = (&self.problem.specification, &self.problem.selection.names());
         DesignFitting { specification, names, step, counts, aim, watch }
             .run(&solver, after.map(|after| &after.solution))

@@ -15,7 +15,7 @@ impl Interior<'_> {
     /// Updates the lower bound by this point, whose dual is given.
     pub fn update_lower_bound(&mut self, dual: f64) {
         let (shares, price) = self.point.split_at(self.step.assets());
-        let lower = dual - self.step.trading.taken(shares);
+        let lower = dual - self.step.trading.utility_cost(shares);
         if lower > self.lower {
             (self.lower, self.best, self.best_price) = (lower, shares.to_vec(), price[0]);
         }

@@ -196,7 +196,7 @@ impl PortfolioStep {
             upper = interior.upper.min(upper);
             evaluations += interior.evaluations;
             if interior.entering.is_empty() {
-                return (among.told(&interior, upper, evaluations), interior.tangent_of_all());
+                return (among.solution_from(&interior, upper, evaluations), interior.tangent_of_all());
             }
             let entering = std::mem::take(&mut interior.entering);
             let (shares, price) = interior.point.split_at(held.len());
@@ -207,7 +207,7 @@ impl PortfolioStep {
         }
     }
 
-    fn told(&self, interior: &Interior<'_>, upper: f64, evaluations: usize) -> AssetsSolution {
+    fn solution_from(&self, interior: &Interior<'_>, upper: f64, evaluations: usize) -> AssetsSolution {
         let (mut shares, price) = (interior.best.clone(), interior.best_price);
         let total: f64 = shares.iter().sum();
         shares.iter_mut().filter(|share| **share < LEAST_SHARE).for_each(|share| *share = 0.0);
@@ -261,7 +261,7 @@ impl PortfolioStep {
     fn value_at(&self, allocation: &[f64], price: f64) -> f64 {
         let mut branches = Branches::default();
         branches.find(self, allocation, price);
-        self.dual(&branches, price).0 - self.trading.taken(allocation)
+        self.dual(&branches, price).0 - self.trading.utility_cost(allocation)
     }
 
     /// Returns the dual at a price of distance, and the distance that its law uses.

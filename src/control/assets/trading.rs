@@ -47,7 +47,7 @@ impl Trading {
     }
 
     /// Returns the cost of trading, in relative utility.
-    pub fn taken(&self, allocation: &[f64]) -> f64 {
+    pub fn utility_cost(&self, allocation: &[f64]) -> f64 {
         self.price * self.turnover(allocation)
     }
 
@@ -66,7 +66,7 @@ impl Trading {
         let bought = slopes.iter().map(|slope| (slope - self.price, f64::INFINITY));
         let mut pieces: Vec<(f64, f64)> = kept.chain(bought).collect();
         pieces.sort_by(|left, right| right.0.total_cmp(&left.0));
-        let (mut filled, mut most) = (0.0, -self.taken(&vec![0.0; self.holdings.len()]));
+        let (mut filled, mut most) = (0.0, -self.utility_cost(&vec![0.0; self.holdings.len()]));
         for (slope, room) in pieces {
             let wanted = if slope > 0.0 { total.highest } else { total.lowest };
             let part = room.min(wanted - filled).max(0.0);
@@ -136,7 +136,7 @@ impl PortfolioStep {
         let whole: f64 = kept.iter().sum();
         let fits = (self.total.lowest..=self.total.highest).contains(&whole);
         let worth = |allocation: &[f64]| {
-            let utility = self.value_at(allocation, found.multiplier) + trading.taken(allocation);
+            let utility = self.value_at(allocation, found.multiplier) + trading.utility_cost(allocation);
             self.utility.inverse(utility) + (-cost * trading.turnover(allocation)).ln_1p()
         };
         let (mut allocation, mut value) = (found.allocation.clone(), worth(&found.allocation));
@@ -159,12 +159,12 @@ impl PortfolioStep {
         let free = Trading { holdings: trading.holdings.clone(), price: cost / (1.0 - lost) };
         let along: f64 = slopes.iter().zip(&tangent.shares).map(|(slope, share)| slope * share).sum();
         self.utility.inverse(tangent.mean) + (-lost).ln_1p() + free.most(&slopes, self.total) - along
-            + free.taken(&tangent.shares)
+            + free.utility_cost(&tangent.shares)
     }
 
     /// Returns p at an allocation: `c / (1 - c T) dU/dV`.
     fn price_of_trading(&self, found: &AssetsSolution, cost: f64) -> f64 {
-        let utility = self.value_at(&found.allocation, found.multiplier) + self.trading.taken(&found.allocation);
+        let utility = self.value_at(&found.allocation, found.multiplier) + self.trading.utility_cost(&found.allocation);
         cost / (1.0 - cost * self.trading.turnover(&found.allocation)) / self.utility.inverse_slope(utility)
     }
 }

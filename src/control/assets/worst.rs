@@ -49,7 +49,7 @@ impl PortfolioStep {
             let (dual, distance) = self.dual(&branches, price);
             Priced { price, dual, distance }
         };
-        let told = |dual: f64, primal: f64, price: f64| RobustValue {
+        let robust_value = |dual: f64, primal: f64, price: f64| RobustValue {
             value: self.utility.inverse(dual),
             primal: self.utility.inverse(primal),
             multiplier: price,
@@ -59,7 +59,7 @@ impl PortfolioStep {
         let mut high = at(1.0);
         while high.distance > self.radius {
             if high.price > HIGHEST_PRICE {
-                return told(f64::NEG_INFINITY, f64::NEG_INFINITY, high.price);
+                return robust_value(f64::NEG_INFINITY, f64::NEG_INFINITY, high.price);
             }
             low = high;
             high = at(GROWTH * high.price);
@@ -75,7 +75,7 @@ impl PortfolioStep {
             let mixed = if share > 0.0 { share * primal(&low) + (1.0 - share) * primal(&high) } else { primal(&high) };
             let (dual, price) = if low.dual > high.dual { (low.dual, low.price) } else { (high.dual, high.price) };
             if mixed - dual < TOLERANCE || high.price - low.price < WIDTH * high.price {
-                return told(dual, mixed, price);
+                return robust_value(dual, mixed, price);
             }
             let meet = if share > 0.0 { (primal(&high) - primal(&low)) / (low.distance - high.distance) } else { 0.0 };
             let margin = 0.01 * (high.price - low.price);
@@ -88,6 +88,6 @@ impl PortfolioStep {
             if priced.distance > self.radius { low = priced } else { high = priced }
         }
         let best = if low.dual > high.dual { low } else { high };
-        told(best.dual, f64::NEG_INFINITY, best.price)
+        robust_value(best.dual, f64::NEG_INFINITY, best.price)
     }
 }

@@ -238,10 +238,14 @@ mod tests {
                 let falls = (utility.at(wealth + 1e-4).1 - utility.at(wealth - 1e-4).1) / -2e-4;
                 assert!((wealth * falls / slope / utility.relative_aversion(wealth) - 1.0).abs() < 1e-4);
             }
-            let taken = |moving: f64| utility.at(0.4 + moving).1 * moving;
+            let scaled_slope = |moving: f64| utility.at(0.4 + moving).1 * moving;
             let peak = utility.steepest(0.4).min(1e6);
-            assert!(taken(peak) >= taken(0.9 * peak) && taken(peak) >= taken(1.1 * peak) || peak == 1e6, "{utility:?}");
-            assert!((taken(1e-9) - utility.steepness_of_ruin(0.4)).abs() < 1e-7);
+            assert!(
+                scaled_slope(peak) >= scaled_slope(0.9 * peak) && scaled_slope(peak) >= scaled_slope(1.1 * peak)
+                    || peak == 1e6,
+                "{utility:?}"
+            );
+            assert!((scaled_slope(1e-9) - utility.steepness_of_ruin(0.4)).abs() < 1e-7);
         }
         assert_eq!(RelativeUtility::Log.steepness_of_ruin(0.0), 1.0);
         assert_eq!(RelativeUtility::Power { eta: 3.0 }.steepness_of_ruin(0.0), f64::INFINITY);

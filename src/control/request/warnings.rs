@@ -83,13 +83,13 @@ impl ProblemSpecification {
             )
         };
         let in_percent = |field, deviation: f64| {
-            let said = || {
+            let message = || {
                 format!(
                     "has log-returns of the standard deviation {deviation:.4} a period: are they in percent? They are \
                      meant as fractions, 0.012 for a rise of 1.2 %"
                 )
             };
-            (deviation > large).then(|| warning(WarningCode::RecordInPercent, field, said()))
+            (deviation > large).then(|| warning(WarningCode::RecordInPercent, field, message()))
         };
         let assumed = match &self.centre {
             CentreSpecification::Mixed { history: Some(history), .. } => Some(annualised::deviation(history)),
@@ -113,8 +113,8 @@ impl ProblemSpecification {
     }
 }
 
-fn warning(code: WarningCode, field: &'static str, said: String) -> Warning {
-    Warning { code, field, message: format!("{field} {said}.") }
+fn warning(code: WarningCode, field: &'static str, text: String) -> Warning {
+    Warning { code, field, message: format!("{field} {text}.") }
 }
 
 /// Formats a share in percent, to a tenth of a percent.
