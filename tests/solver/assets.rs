@@ -437,13 +437,16 @@ fn extremes_are_answered_with_bounds_in_order() {
                 for (radius, floor) in [(0.0, f64::NEG_INFINITY), (10.0, f64::NEG_INFINITY), (1e-9, -5.0), (10.0, -5.0)]
                 {
                     for ground in [GroundMetric::Sup, GroundMetric::Weighted(inverse_volatility(returns))] {
-                        let told = step(returns, &ground, utility, radius, floor).solve(None);
-                        let total: f64 = told.allocation.iter().sum();
-                        assert!(told.value >= 0.0 && told.bound >= told.value && told.bound < 6.0, "{told:?}");
-                        assert!((0.0..=1.0 + 1e-9).contains(&total), "{told:?}");
+                        let solution = step(returns, &ground, utility, radius, floor).solve(None);
+                        let total: f64 = solution.allocation.iter().sum();
                         assert!(
-                            told.allocation.iter().chain(&told.mean_moves).all(|number| number.is_finite()),
-                            "{told:?}"
+                            solution.value >= 0.0 && solution.bound >= solution.value && solution.bound < 6.0,
+                            "{solution:?}"
+                        );
+                        assert!((0.0..=1.0 + 1e-9).contains(&total), "{solution:?}");
+                        assert!(
+                            solution.allocation.iter().chain(&solution.mean_moves).all(|number| number.is_finite()),
+                            "{solution:?}"
                         );
                         held += usize::from(total > 0.01);
                     }

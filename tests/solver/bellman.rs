@@ -318,10 +318,10 @@ fn a_wider_ball_costs_at_most_what_is_said() {
             let (advice, worst) = at(radius);
             for wider in [0.0001, 0.001, 0.01] {
                 let cost = 1e4 * (advice.certainty_equivalent / at(radius + wider).0.certainty_equivalent).ln();
-                let said = most_cost(wider, worst.radius_cost, &advice);
+                let bound = most_cost(wider, worst.radius_cost, &advice);
                 // Allocations are found to 1e-6, which moves the worth by less.
-                assert!(cost <= said + 1e-3, "{kind} {radius} {wider}: {cost} of {said}");
-                less_than_the_slope += usize::from(said < 0.99e4 * wider * worst.radius_cost);
+                assert!(cost <= bound + 1e-3, "{kind} {radius} {wider}: {cost} of {bound}");
+                less_than_the_slope += usize::from(bound < 0.99e4 * wider * worst.radius_cost);
             }
         }
     }

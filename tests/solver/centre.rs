@@ -245,7 +245,7 @@ fn the_value_of_a_centre_is_that_of_steps_in_each_other() {
 /// memory.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_of_any_centre_equals_the_simulator_through_a_correction_and_an_export() {
-    for (centre, told) in [
+    for (centre, phrase) in [
         (smoothed(0.01), "of the 10 returns seen, each with a normal error of deviation 0.01, moves"),
         (mixed(5.0), "of the 10 returns seen and the law that is assumed to tell as much as 5 more moves"),
     ] {
@@ -254,7 +254,7 @@ async fn a_session_of_any_centre_equals_the_simulator_through_a_correction_and_a
         app.open().await;
         let (_, explained) = app.get(&format!("/action?session={}&explain=worst_case", app.session)).await;
         let sentence = explained["worst_case"]["sentence"].as_str().unwrap();
-        assert!(sentence.contains(told), "{sentence}");
+        assert!(sentence.contains(phrase), "{sentence}");
         let solved = Advisor::new(Policy::from_json(&app.export().await).unwrap());
         let kept: CentreSpecification = serde_json::from_value(centre.clone()).unwrap();
         assert_eq!(solved.specification().problem.centre, kept);
@@ -283,10 +283,10 @@ fn a_volatility_scaled_centre_is_that_of_the_record_brought_to_one_volatility() 
     for rule in [bridge(0.2), json!({ "rule": "calibrated", "alpha": 0.5, "paths": 200, "scale": 0.2 })] {
         for (framework, horizon) in [("static", 3), ("adaptive", 1), ("plug_in", 1)] {
             let solved = |history: &[f64], centre: Value| {
-                let mut asked = request(horizon, rule.clone(), centre);
-                asked["problem"]["framework"] = json!(framework);
-                asked["problem"]["history"] = json!(history);
-                let solved = advisor(asked);
+                let mut body = request(horizon, rule.clone(), centre);
+                body["problem"]["framework"] = json!(framework);
+                body["problem"]["history"] = json!(history);
+                let solved = advisor(body);
                 let start = solved.initial_state(None, None).unwrap();
                 let (advice, worst) = solved.explain(0, &start);
                 (advice.allocation, advice.certainty_equivalent, advice.radius, worst.sentence)
@@ -310,14 +310,14 @@ fn a_volatility_scaled_centre_is_that_of_the_record_brought_to_one_volatility() 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_volatility_scaled_centre_advises_at_once_and_in_a_static_session() {
     let mut app = App::start().await;
-    let mut asked = request(1, bridge(0.2), volatility_scaled(4.0));
-    asked.as_object_mut().unwrap().remove("design");
-    let (status, advice) = app.post("/advise", &asked).await;
+    let mut body = request(1, bridge(0.2), volatility_scaled(4.0));
+    body.as_object_mut().unwrap().remove("design");
+    let (status, advice) = app.post("/advise", &body).await;
     assert_eq!(status, 200, "{advice}");
     let scaled = rescaled(&HISTORY, 4.0);
-    asked["problem"]["history"] = json!(scaled);
-    asked["problem"]["centre"] = json!({ "kind": "empirical" });
-    let (_, expected) = app.post("/advise", &asked).await;
+    body["problem"]["history"] = json!(scaled);
+    body["problem"]["centre"] = json!({ "kind": "empirical" });
+    let (_, expected) = app.post("/advise", &body).await;
     assert_eq!(advice["allocation"], expected["allocation"]);
     assert_eq!(advice["radius"], expected["radius"]);
 
@@ -375,7 +375,7 @@ async fn a_centre_is_refused_by_name_where_it_has_no_meaning() {
         "history": [[0.01, 0.02], [-0.01, 0.0], [0.02, -0.01]] } });
     let history = [HISTORY, HISTORY].concat();
     let record = json!({ "problem": { "rate_per_step": RATE, "centre": smoothed(0.01), "history": history } });
-    for (path, asked, field) in [
+    for (path, body, field) in [
         ("/train", &known, "problem.centre.kind"),
         ("/train", &parametric, "problem.centre.kind"),
         ("/train", &decaying, "problem.learning.kind"),
@@ -386,7 +386,7 @@ async fn a_centre_is_refused_by_name_where_it_has_no_meaning() {
         ("/advise", &several, "problem.centre"),
         ("/frontier", &record, "problem.centre.kind"),
     ] {
-        let (status, problem) = app.post(path, asked).await;
+        let (status, problem) = app.post(path, body).await;
         assert_eq!((status.as_u16(), problem["field"].as_str()), (422, Some(field)), "{path}: {problem}");
     }
 }

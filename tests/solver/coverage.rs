@@ -136,14 +136,14 @@ fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_opti
         let command = Command::new(env!("CARGO_BIN_EXE_ballast")).arg("coverage").args(arguments).output().unwrap();
         (String::from_utf8(command.stdout).unwrap(), String::from_utf8(command.stderr).unwrap())
     };
-    let (told, _) = run(&["--records", "20", "--sizes", "5,8"]);
-    let lines: Vec<&str> = told.lines().collect();
-    assert_eq!(lines.len(), 1 + 4 * 2 * 4 * 4, "{told}");
+    let (output, _) = run(&["--records", "20", "--sizes", "5,8"]);
+    let lines: Vec<&str> = output.lines().collect();
+    assert_eq!(lines.len(), 1 + 4 * 2 * 4 * 4, "{output}");
     for name in ["normal", "the paper's mixture", "Student, 4 degrees", "market, in blocks"] {
-        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 32, "{told}");
+        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 32, "{output}");
     }
     for centre in [" empirical ", " smoothed ", " volatility_scaled ", " mixed "] {
-        assert_eq!(lines.iter().filter(|line| line.contains(centre)).count(), 32, "{told}");
+        assert_eq!(lines.iter().filter(|line| line.contains(centre)).count(), 32, "{output}");
     }
     for (arguments, option) in [
         (["--alpha", "0"], "--alpha"),

@@ -115,7 +115,7 @@ fn a_larger_volatility_is_told() {
             let quantile = |share: usize| delays.get(delays.len() * share / 100).copied().unwrap_or_default();
             let [median, late] = [50, 90].map(quantile);
             println!(
-                "{known} returns known, {factor} times as wide: {} of 400 told, median {median}, nine in ten by {late}",
+                "{known} returns known, {factor} times as wide: {} of 400 detect it, median {median}, 90 % by {late}",
                 delays.len()
             );
             assert!(factor != 2.0 || (delays.len() >= 380 && median <= 40), "{delays:?}");

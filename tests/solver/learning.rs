@@ -31,13 +31,13 @@ fn decay() -> Value {
 /// Advice along a path, resolved where `mode` says so.
 fn along(solved: &Advisor, mode: AdviceMode) -> Vec<[f64; 3]> {
     let mut state = solved.initial_state(None, None).unwrap();
-    let mut told = Vec::new();
+    let mut advised = Vec::new();
     for (step, log_return) in [0.03, -0.04, 0.01].into_iter().enumerate() {
         let advice = solved.advise(step, &state, mode);
-        told.push([advice.radius, advice.allocation, advice.certainty_equivalent]);
+        advised.push([advice.radius, advice.allocation, advice.certainty_equivalent]);
         state = solved.advance(step, &state, &PeriodOutcome::of(0.4, log_return));
     }
-    told
+    advised
 }
 
 /// Weights differ by 1e-14 of themselves, so radii agree to what a search for a quantile leaves, and so does what is solved at the
@@ -65,8 +65,8 @@ fn a_half_life_without_end_is_equal_weights() {
 #[test]
 fn the_value_of_a_decaying_law_is_that_of_steps_in_each_other() {
     for radius in [bridge(), json!({ "rule": "root_n", "kappa": 0.01 })] {
-        let asked = request(2, radius.clone(), decay());
-        let solved = advisor(asked.clone());
+        let body = request(2, radius.clone(), decay());
+        let solved = advisor(body.clone());
         let start = solved.initial_state(None, None).unwrap();
         let problem = || solved.policy().problem(Default::default());
         let last = problem();
@@ -89,11 +89,11 @@ fn the_value_of_a_decaying_law_is_that_of_steps_in_each_other() {
 /// `request` with the laws of the design resampled, over a record nine half-lives long.
 fn settled(horizon: usize, count: usize) -> Value {
     let record: Vec<f64> = (0..24).map(|k| 0.01 + 0.03 * f64::from(k * 7 % 13 - 6) / 6.0).collect();
-    let mut asked = request(horizon, bridge(), json!({ "kind": "decay", "half_life": 2.5 }));
-    asked["problem"]["history"] = json!(record);
-    asked["problem"]["support"] = json!({ "rule": "none" });
-    asked["design"] = json!({ "count": count, "initial_laws": "resampled" });
-    asked
+    let mut body = request(horizon, bridge(), json!({ "kind": "decay", "half_life": 2.5 }));
+    body["problem"]["history"] = json!(record);
+    body["problem"]["support"] = json!({ "rule": "none" });
+    body["design"] = json!({ "count": count, "initial_laws": "resampled" });
+    body
 }
 
 #[test]
@@ -132,9 +132,9 @@ async fn trained(horizon: usize) -> App {
 
 /// The radius and the moments of a record, by the rules of the policy.
 fn measured(record: &[f64]) -> (f64, f64, f64) {
-    let asked = specification(request(1, bridge(), decay())).resolved(&Cache::default());
-    let law = asked.problem.learning.law(record);
-    let problem = ballast::control::bellman::problem::Problem::new(&asked);
+    let resolved = specification(request(1, bridge(), decay())).resolved(&Cache::default());
+    let law = resolved.problem.learning.law(record);
+    let problem = ballast::control::bellman::problem::Problem::new(&resolved);
     (problem.sets.measure(&law).radius, law.raw_moments(1)[0], law.effective_size())
 }
 
@@ -191,8 +191,8 @@ async fn a_policy_is_exported_taken_back_and_asked_as_any_other() {
     // Ten returns of this half-life weigh like fewer, and the caution says so.
     assert!(advised["caution"][0]["sentence"].as_str().unwrap().contains("weigh like"), "{advised}");
     let present = advised["sensitivity"]["premium"]["present"].as_f64().unwrap();
-    let asked = specification(request(1, bridge(), decay())).resolved(&Cache::default());
-    let law = asked.problem.learning.law(&HISTORY);
+    let resolved = specification(request(1, bridge(), decay())).resolved(&Cache::default());
+    let law = resolved.problem.learning.law(&HISTORY);
     let mean: f64 =
         law.atoms().iter().zip(law.weights()).map(|(z, weight)| weight / law.total_weight() * z.exp_m1()).sum();
     assert!((present - (mean - 0.002)).abs() < 1e-15, "{present}");
@@ -207,13 +207,13 @@ async fn an_evaluation_measures_coverage_by_weight() {
     let law =
         json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.008, "variance": 0.001 }] });
     let wide = json!({ "rule": "bridge", "alpha": 0.1, "paths": 500 });
-    let mut asked = request(1, wide, decay());
-    asked["problem"]["law"] = law;
-    asked["problem"]["history"] = json!((0..40).map(|k| 0.008 + 0.001 * f64::from(k)).collect::<Vec<f64>>());
-    asked["design"] = json!({ "count": 12 });
-    (asked["frameworks"], asked["paths"]) = (json!(["adaptive", "known_law"]), json!(100));
-    asked["histories"] = json!({ "kind": "drawn", "count": 100 });
-    let (status, job) = app.post("/evaluate", &asked).await;
+    let mut body = request(1, wide, decay());
+    body["problem"]["law"] = law;
+    body["problem"]["history"] = json!((0..40).map(|k| 0.008 + 0.001 * f64::from(k)).collect::<Vec<f64>>());
+    body["design"] = json!({ "count": 12 });
+    (body["frameworks"], body["paths"]) = (json!(["adaptive", "known_law"]), json!(100));
+    body["histories"] = json!({ "kind": "drawn", "count": 100 });
+    let (status, job) = app.post("/evaluate", &body).await;
     assert_eq!(status, StatusCode::ACCEPTED, "{job}");
     let done = app.until(job["job"].as_str().unwrap(), |job| job["finished_ms"].is_i64()).await;
     assert_eq!(done["state"], "succeeded", "{done}");
@@ -243,10 +243,10 @@ async fn a_record_that_no_longer_varies_by_its_weights_is_refused() {
 /// restart, a correction and a policy put in the place of the first.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_rolls_beyond_its_horizon() {
-    let asked = settled(2, 20);
-    let library = advisor(asked.clone());
+    let body = settled(2, 20);
+    let library = advisor(body.clone());
     let mut app = App::start().await;
-    app.train(&asked).await;
+    app.train(&body).await;
     app.open_with(json!({ "rolling": true })).await;
     let path = format!("/sessions/{}", app.session);
     let mut state = library.initial_state(None, None).unwrap();
@@ -275,8 +275,11 @@ async fn a_session_rolls_beyond_its_horizon() {
             app.restart().await;
         }
     }
-    let told = app.get(&path).await.1;
-    assert_eq!((&told["state"], &told["rolling"], &told["period"]), (&json!("active"), &json!(true), &json!(9)));
+    let summary = app.get(&path).await.1;
+    assert_eq!(
+        (&summary["state"], &summary["rolling"], &summary["period"]),
+        (&json!("active"), &json!(true), &json!(9))
+    );
     // The fifth return becomes another: what was held for it, and after it, stays.
     let correction = json!({ "correction": 1, "period": 5, "log_return": 0.05, "reason": "the index was revised" });
     let (status, corrected) = app.post(&format!("{path}/corrections"), &correction).await;

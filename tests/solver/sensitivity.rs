@@ -36,7 +36,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
-async fn asked(app: &App, question: &Value) -> Value {
+async fn advise(app: &App, question: &Value) -> Value {
     let (status, advised) = app.post("/advise", question).await;
     assert_eq!(status, 200, "{question} {advised}");
     advised
@@ -58,8 +58,8 @@ fn by_record(problem: &Value) -> impl Fn(&[f64]) -> f64 {
 async fn the_range_without_one_is_that_of_asking_again_without_each() {
     let app = App::start().await;
     for problem in problems() {
-        let plain = asked(&app, &json!({ "problem": problem, "holding": 0.1 })).await;
-        let mut advised = asked(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
+        let plain = advise(&app, &json!({ "problem": problem, "holding": 0.1 })).await;
+        let mut advised = advise(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
         let range = advised["sensitivity"]["without_one"].clone();
         let (mut again, of_record) = (Vec::new(), by_record(&problem));
         for index in 0..HISTORY.len() {
@@ -88,9 +88,9 @@ async fn the_range_without_one_is_that_of_asking_again_without_each() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_next_return_that_changes_the_advice_is_found_on_a_finer_grid_too() {
     let app = App::start().await;
-    let (mut told, mut silent) = (0, 0);
+    let (mut crossings, mut silent) = (0, 0);
     for problem in problems() {
-        let advised = asked(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
+        let advised = advise(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
         let next = &advised["sensitivity"]["next_return"];
         let [low, high] = [0, 1].map(|end| number(&next["range"][end]));
         // The extremes are 0.15 apart.
@@ -123,7 +123,7 @@ async fn the_next_return_that_changes_the_advice_is_found_on_a_finer_grid_too() 
                     assert!((pair[0].0..=pair[1].0).contains(&found), "{name} of {problem}: {found} not in {pair:?}");
                     let [own, beyond] = [after(found), after(found + across)].map(is_above);
                     assert_eq!((own, beyond), (across < 0.0, across > 0.0), "{name} of {problem}");
-                    told += 1;
+                    crossings += 1;
                 }
             }
         }
@@ -135,7 +135,7 @@ async fn the_next_return_that_changes_the_advice_is_found_on_a_finer_grid_too() 
             assert_eq!(next[name]["allocation"], after(found));
         }
     }
-    assert!(told >= 6 && silent >= 2, "{told} told, {silent} not");
+    assert!(crossings >= 6 && silent >= 2, "{crossings} crossings, {silent} ends without one");
 }
 
 /// The least mean of e^Z within `radius` of the law of `record`: the largest returns are cut off at a cap.
@@ -160,7 +160,7 @@ async fn the_premium_is_the_one_at_which_the_worst_mean_is_the_banks() {
         let radius = json!({ "rule": "bridge", "alpha": 0.5, "paths": 300, "scale": scale });
         let utility = json!({ "kind": "power", "risk_aversion": 4.0 });
         let problem = json!({ "history": HISTORY, "utility": utility, "radius": radius, "rate_per_step": rate });
-        let advised = asked(&app, &json!({ "problem": problem, "sensitivity": true })).await;
+        let advised = advise(&app, &json!({ "problem": problem, "sensitivity": true })).await;
         let (premium, radius) = (&advised["sensitivity"]["premium"], number(&advised["radius"]));
         let bank: f64 = 1.0 + rate;
         let worst = least_mean(&HISTORY, radius);
@@ -223,7 +223,7 @@ async fn an_action_of_one_period_is_as_sensitive_as_the_advice_without_a_policy(
     app.train(&json!({ "problem": problem, "design": { "count": 20 } })).await;
     app.open_with(json!({ "holding": 0.1 })).await;
     let path = format!("/action?session={}&sensitivity=true", app.session);
-    let advised = asked(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
+    let advised = advise(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
     for query in ["&mode=resolve", "&explain=worst_case"] {
         let (status, action) = app.get(&format!("{path}{query}")).await;
         assert_eq!(status, 200, "{action}");
@@ -277,10 +277,10 @@ async fn a_record_of_ten_years_may_hang_on_one_month() {
     let record = months("1962-07", 120);
     let problem = json!({ "history": record, "rate_per_step": 0.002, "caution": "paper",
         "support": { "rule": "none" }, "utility": { "kind": "exponential", "risk_aversion": 0.01 } });
-    let advised = asked(&app, &json!({ "problem": problem, "sensitivity": true })).await;
+    let advised = advise(&app, &json!({ "problem": problem, "sensitivity": true })).await;
     let range = &advised["sensitivity"]["without_one"];
-    let told = number(&advised["allocation"]);
-    assert!(told > 0.5 && told < 0.9, "{advised}");
+    let allocation = number(&advised["allocation"]);
+    assert!(allocation > 0.5 && allocation < 0.9, "{advised}");
     assert_eq!(
         [&range["lowest"]["allocation"], &range["highest"]["allocation"]],
         [&json!(0.0), &json!(1.0)],
@@ -291,7 +291,7 @@ async fn a_record_of_ten_years_may_hang_on_one_month() {
     // Without either of the best two all is in the bank.
     assert!(sentence.contains("Without its return of 8.6 % the advice would be 0.0 %"), "{sentence}");
     // Not asked, it is not known.
-    assert_eq!(codes(&asked(&app, &json!({ "problem": problem })).await), [""; 0]);
+    assert_eq!(codes(&advise(&app, &json!({ "problem": problem })).await), [""; 0]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -301,7 +301,7 @@ async fn a_short_record_is_said_to_be_short_and_a_steady_one_is_not_said_to_hang
     for (count, expected) in [(23, vec!["short_record"]), (24, vec![])] {
         let record: Vec<f64> = (0..count).map(|index| if index % 2 == 0 { -0.02 } else { 0.01 }).collect();
         let question = json!({ "problem": { "rate_per_step": 0.002, "history": record, "radius": { "rule": "root_n", "kappa": 0.01 } }, "sensitivity": true });
-        let advised = asked(&app, &question).await;
+        let advised = advise(&app, &question).await;
         assert_eq!((codes(&advised), &advised["allocation"]), (expected, &json!(0.0)));
         let sensitivity = &advised["sensitivity"];
         // Two returns apart by 0.03 leave two records, of which the first of each is told.
@@ -310,12 +310,12 @@ async fn a_short_record_is_said_to_be_short_and_a_steady_one_is_not_said_to_hang
     }
     // Without the third nothing varies.
     let three = json!({ "problem": { "rate_per_step": 0.002, "history": [0.01, 0.01, 0.03] }, "sensitivity": true });
-    assert_ne!(asked(&app, &three).await["sensitivity"]["without_one"]["lowest"]["index"], 2);
+    assert_ne!(advise(&app, &three).await["sensitivity"]["without_one"]["lowest"]["index"], 2);
     let two = json!({ "problem": { "rate_per_step": 0.002, "history": [0.01, 0.03] }, "sensitivity": true });
-    assert_eq!(asked(&app, &two).await["sensitivity"]["without_one"], Value::Null);
+    assert_eq!(advise(&app, &two).await["sensitivity"]["without_one"], Value::Null);
     // A radius that no number of returns makes narrower.
     let fixed = json!({ "problem": { "rate_per_step": 0.002, "history": HISTORY, "radius": { "rule": "fixed", "radius": 0.05 } }, "sensitivity": true });
-    assert_eq!(asked(&app, &fixed).await["sensitivity"]["premium"]["periods_more"], Value::Null);
+    assert_eq!(advise(&app, &fixed).await["sensitivity"]["premium"]["periods_more"], Value::Null);
 }
 
 /// Leaves out 360 of 480 months in turn, whose range is that of leaving out every one; with as many bridges as there may be, few of the
@@ -330,7 +330,7 @@ async fn records_of_any_length_are_told_and_the_range_is_that_of_every_return() 
         let record = months(first, 480);
         let problem = json!({ "rate_per_step": 0.003, "history": record, "learning": learning, "radius": bridge(100, 0.3),
             "utility": { "kind": "power", "risk_aversion": 6.0 } });
-        let advised = asked(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
+        let advised = advise(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
         let range = &advised["sensitivity"]["without_one"];
         assert_eq!(range["tried"], 360, "{range}");
         let (mut lowest, mut highest, of_record) = (f64::INFINITY, f64::NEG_INFINITY, by_record(&problem));
@@ -351,7 +351,7 @@ async fn records_of_any_length_are_told_and_the_range_is_that_of_every_return() 
     }
     let days: Vec<f64> = (0..3000).map(|day| 0.0004 + 0.01 * (1.7 * f64::from(day)).sin()).collect();
     let problem = json!({ "rate_per_step": 0.0001, "history": days, "radius": bridge(9000, 1.0) });
-    let advised = asked(&app, &json!({ "problem": problem, "sensitivity": true })).await;
+    let advised = advise(&app, &json!({ "problem": problem, "sensitivity": true })).await;
     let tried = number(&advised["sensitivity"]["without_one"]["tried"]);
     assert!((32.0..=40.0).contains(&tried), "{tried}");
 }
