@@ -58,7 +58,12 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         specification.surrogate.target = SurrogateTarget::FloorGain;
         let specification = specification.completed()?;
         if specification.design.initial_laws == InitialLaws::Resampled {
-            return Err(FieldError::new("design.initial_laws", "resampled", "must be given here").into());
+            return Err(FieldError::new(
+                "design.initial_laws",
+                "resampled",
+                "must be `given` for a controlled problem",
+            )
+            .into());
         }
         if !problem.has_floor() && specification.problem.support_rule() == (Support::None {}) {
             let rule = "must be given for a problem without a floor";

@@ -43,7 +43,7 @@ pub enum TrainError {
     },
     /// A robust step has no finite solution.
     #[error(
-        "step {step}, design point {point}: the robust step gave the gain {gain} for the action {action}: not both finite"
+        "step {step}, design point {point}: the robust step gave the gain {gain} and the action {action}, which are not both finite"
     )]
     NotFinite {
         /// The step being solved.

@@ -10,7 +10,7 @@ pub struct TrainingPool(rayon::ThreadPool);
 
 /// The threads could not be started.
 #[derive(Debug, Error)]
-#[error("starting {threads} training threads")]
+#[error("could not start {threads} training threads")]
 pub struct PoolError {
     threads: usize,
     source: rayon::ThreadPoolBuildError,
