@@ -376,19 +376,19 @@ mod tests {
         assert_eq!(message(&["--cost-bp", "2000"]), "--cost-bp is 2000: must lie in [0, 1000]");
         assert_eq!(message(&["--risk-aversion", "0.5"]), "--risk-aversion is 0.5: must be a number in [1, 100]");
         assert_eq!(message(&["--alpha", "0.1,0.2,0.3,0.4"]), "--alpha is 4 levels: must hold 1 to 3");
-        let every = "must be at least 1, and at most horizon: a policy is lived by until the next is trained";
+        let every = "must be at least 1 and at most horizon: each policy is used until the next is trained";
         assert_eq!(message(&["--every", "0"]), format!("--every is 0: {every}"));
         assert_eq!(message(&["--every", "7", "--horizon", "6"]), format!("--every is 7: {every}"));
         let long = BacktestArgs { window: vec![Window::Last(50)], ..arguments(&[]) };
         let short = walk(&long, months(48)).err().unwrap().to_string();
         assert_eq!(
             short,
-            "--window is 50: must be at most 36: the record has 48 periods, of which a year of 12 is lived through"
+            "--window is 50: must be at most 36: the record has 48 periods, and a year of 12 must follow the window"
         );
         let few = BacktestArgs { count: Some(3), ..arguments(&[]) };
         let few = walk(&few, months(48)).err().unwrap().to_string();
         assert_eq!(few, "--count is 3: must lie in [10, 10000]");
-        let scaled = "--centre kind is volatility_scaled: must be another where the horizon exceeds 1";
+        let scaled = "--centre kind is volatility_scaled: must be another centre if the horizon exceeds 1";
         let centre = r#"{"kind": "volatility_scaled", "half_life": 12}"#;
         assert!(message(&["--centre", centre]).starts_with(scaled), "{}", message(&["--centre", centre]));
         let wide = message(&["--centre", r#"{"kind": "smoothed", "bandwidth": 2}"#]);

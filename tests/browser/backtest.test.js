@@ -46,7 +46,7 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByLabel("Trained on").fill("600");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   // The refusal stands at the field, and opens the fold it is in.
-  const refused = page.locator(".error").getByText(/^Trained on is 600; it must be at most \d+: the record has \d+ periods, of which a year of 4 is lived through\.$/);
+  const refused = page.locator(".error").getByText(/^Trained on is 600; it must be at most \d+: the record has \d+ periods, and a year of 4 must follow the window\.$/);
   await refused.waitFor();
   const fold = page.locator("details", { has: page.getByLabel("Trained on") });
   await fold.evaluate((details) => (details.open = false));
@@ -57,7 +57,7 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByLabel("Trained anew every").fill("9");
   await page.getByLabel("Looking ahead").fill("4");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.locator(".error").getByText("Trained anew every is 9; it must be at least 1, and at most \u201cLooking ahead\u201d: a policy is lived by until the next is trained.").waitFor();
+  await page.locator(".error").getByText("Trained anew every is 9; it must be at least 1 and at most \u201cLooking ahead\u201d: each policy is used until the next is trained.").waitFor();
   for (const label of ["Trained anew every", "Looking ahead"]) await page.getByLabel(label).fill("");
   await page.getByLabel("Confidence, %").fill("90; 50");
   await page.getByLabel("Design points").fill("10");

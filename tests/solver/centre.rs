@@ -247,7 +247,7 @@ fn the_value_of_a_centre_is_that_of_steps_in_each_other() {
 async fn a_session_of_any_centre_equals_the_simulator_through_a_correction_and_an_export() {
     for (centre, phrase) in [
         (smoothed(0.01), "of the 10 returns seen, each with a normal error of deviation 0.01, moves"),
-        (mixed(5.0), "of the 10 returns seen and the law that is assumed to tell as much as 5 more moves"),
+        (mixed(5.0), "of the 10 returns seen and the assumed law that counts as 5 more moves"),
     ] {
         let mut app = App::start().await;
         app.train(&request(3, bridge(0.2), centre.clone())).await;
@@ -297,7 +297,7 @@ fn a_volatility_scaled_centre_is_that_of_the_record_brought_to_one_volatility() 
             let plain = solved(&HISTORY, json!({ "kind": "empirical" }));
             assert!(found.0 > 0.0 && found.1 != plain.1, "{framework} {found:?} {plain:?}");
             assert!(
-                framework != "static" || found.3.contains("returns seen, each at the volatility of now, moves"),
+                framework != "static" || found.3.contains("returns seen, each rescaled to today's volatility, moves"),
                 "{}",
                 found.3
             );

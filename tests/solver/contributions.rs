@@ -214,8 +214,8 @@ fn a_bank_that_runs_dry_is_refused_with_its_period() {
             "initial_wealth": wealth, "contributions": contributions }, "design": { "wealth": { "min": 50.0, "max": 200.0 } } });
         let specification: Specification = serde_json::from_value(request).unwrap();
         let error = specification.completed().unwrap_err().to_string();
-        let named = format!("the end of period {period}, for what problem.contributions withdraws");
-        assert!(error.contains(field) && error.contains(&named), "{error}");
+        let named = format!("problem.contributions empty it by the end of period {period}");
+        assert!(error.contains(field) && error.ends_with(&named), "{error}");
     };
     refused(json!(-25.0), 100.0, "problem.initial_wealth", 5);
     refused(json!([-30.0, -75.0, 400.0, 0.0, 0.0]), 100.0, "problem.initial_wealth", 2);
@@ -228,5 +228,5 @@ fn a_bank_that_runs_dry_is_refused_with_its_period() {
         "contributions": -100.49 } });
     let specification: Specification = serde_json::from_value(request).unwrap();
     let error = specification.completed().unwrap_err();
-    assert!(error.field == "problem.initial_wealth" && error.rule.contains("a hundredth is to spare"), "{error}");
+    assert!(error.field == "problem.initial_wealth" && error.rule.contains("1 % more than the withdrawals"), "{error}");
 }

@@ -234,7 +234,7 @@ async fn a_record_that_no_longer_varies_by_its_weights_is_refused() {
         json!({ "rate_per_step": 0.001, "history": history, "learning": { "kind": "decay", "half_life": 1.0 } });
     let (status, refused) = app.post("/advise", &json!({ "problem": problem })).await;
     assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("problem.history")), "{refused}");
-    assert!(refused["rule"].as_str().unwrap().contains("must vary: as learned"), "{refused}");
+    assert!(refused["rule"].as_str().unwrap().contains("must vary: with the weights of learning"), "{refused}");
     problem["learning"]["half_life"] = json!(12.0);
     assert_eq!(app.post("/advise", &json!({ "problem": problem })).await.0, StatusCode::OK);
 }

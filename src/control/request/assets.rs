@@ -95,15 +95,15 @@ impl AssetsProblem {
     pub fn fund(&self, seed: u64) -> Result<Specification, FieldError> {
         self.check()?;
         if let Some(horizon) = self.horizon.filter(|horizon| *horizon != 1) {
-            let rule = "must be 1 or left out: one period is advised, and a policy is trained for more";
+            let rule = "must be 1 or left out: the advice covers one period; train a policy for more periods";
             return Err(FieldError::new("problem.horizon", horizon, rule));
         }
         if !self.contributions.are_none() {
-            let rule = "must be 0 or left out: a policy is trained for it";
+            let rule = "must be 0 or left out: train a policy to add or withdraw money";
             return Err(FieldError::new("problem.contributions", "not 0", rule));
         }
         if self.trading_cost != 0.0 && matches!(self.utility, UtilitySpecification::Exponential { .. }) {
-            let rule = "must be 0 or left out under exponential utility; power and log utility take one";
+            let rule = "must be 0 or left out under exponential utility; power and log utility allow a trading cost";
             return Err(FieldError::new("problem.trading_cost", self.trading_cost, rule));
         }
         Specification::of(ProblemSpecification { horizon: 1, ..self.of_fund() }, seed).completed()
@@ -153,7 +153,7 @@ pub fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
         let field = || format!("{named}[{index}]");
         check_text(&field(), name, NAME_LENGTH, &[])?;
         if !seen.insert(name) {
-            return Err(FieldError::new(field(), name, "must be a name of its own"));
+            return Err(FieldError::new(field(), name, "must differ from the other names"));
         }
     }
     Ok(())
@@ -231,7 +231,7 @@ pub(super) fn check_fund(
     laws: InitialLaws,
 ) -> Result<(), FieldError> {
     if laws != InitialLaws::Resampled {
-        let rule = "must be resampled for a fund of several assets, whose law changes with its shares";
+        let rule = "must be resampled for a fund of several assets, because its law changes with its shares";
         return Err(FieldError::new("design.initial_laws", "given", rule));
     }
     if problem.framework != Framework::Adaptive {
@@ -261,7 +261,7 @@ pub(super) fn check_fund(
     match problem.history.iter().zip(returns).enumerate().find_map(differs) {
         None => Ok(()),
         Some((index, given, of_fund)) => {
-            let rule = format!("must be {of_fund}, that of the fund of inverse volatilities of fund.history");
+            let rule = format!("must be {of_fund}, the log-return of the inverse-volatility fund of fund.history");
             Err(FieldError::new(format!("problem.history[{index}]"), given, rule))
         }
     }

@@ -169,9 +169,11 @@ pub fn usual_window(wanted: usize, found: usize, year: usize) -> usize {
 pub fn too_long(window: usize, found: usize, year: usize) -> FieldError {
     let most = found.saturating_sub(year);
     let rule = match most {
-        0 | 1 => format!("has no room: the record has {found} periods, and a year of {year} is lived through"),
+        0 | 1 => format!(
+            "must be followed by a year of {year} periods, but the record has only {found}; give a longer record"
+        ),
         _ => format!(
-            "must be at most {most}: the record has {found} periods, of which a year of {year} is lived through"
+            "must be at most {most}: the record has {found} periods, and a year of {year} must follow the window"
         ),
     };
     FieldError::new("window", window, rule)
@@ -213,7 +215,7 @@ impl BacktestRequest {
             let dates = self.days();
             self.periods_per_year = frequency.map(|frequency| frequency.periods_per_year(&dates));
         }
-        let rule = "must be given where there are no dates, which would tell it";
+        let rule = "must be given if there are no dates";
         let year = self.periods_per_year.ok_or_else(|| FieldError::new("periods_per_year", "null", rule))?;
         whole("periods_per_year", year, &YEAR)?;
         self.check_strategies()?;
@@ -221,14 +223,14 @@ impl BacktestRequest {
         let horizon = self.horizon.unwrap_or(every);
         let window = self.window.unwrap_or_else(|| usual_window(WINDOW_YEARS * year, self.period_count(), year));
         if !(1..=horizon).contains(&every) {
-            let rule = "must be at least 1, and at most horizon: a policy is lived by until the next is trained";
+            let rule = "must be at least 1 and at most horizon: each policy is used until the next is trained";
             return Err(FieldError::new("every", every, rule));
         }
         whole("horizon", horizon, &HORIZON)?;
         whole("window", window, &HISTORY_LENGTH)?;
         let (found, wanted) = (self.period_count(), window + year);
         if found < wanted {
-            let rule = format!("must hold at least {wanted}, the window of {window} and a year");
+            let rule = format!("must hold at least {wanted} periods: a window of {window} and then a year");
             let short = FieldError::new(self.returns().0, format!("{found} periods"), rule);
             return Err(self.window.map_or(short, |window| too_long(window, found, year)));
         }
@@ -273,7 +275,7 @@ impl BacktestRequest {
     fn check_record(&self) -> Result<(), FieldError> {
         if self.log_returns.is_some() == self.simple_returns.is_some() {
             let value = if self.log_returns.is_some() { "given with simple_returns" } else { "null" };
-            return Err(FieldError::new("log_returns", value, "must be given, or simple_returns: exactly one of them"));
+            return Err(FieldError::new("log_returns", value, "give either log_returns or simple_returns, not both"));
         }
         let (field, returns) = self.returns();
         if !PERIODS.contains(&returns.len()) {
@@ -310,11 +312,12 @@ impl BacktestRequest {
         let strategies = self.alpha.len() + 3;
         let trainings = (self.period_count() - window).div_ceil(every).saturating_mul(strategies);
         if trainings > MOST_TRAININGS {
-            let rule = format!("must be larger: it makes {trainings} trainings, and {MOST_TRAININGS} is the most");
+            let rule =
+                format!("must be larger: it needs {trainings} trainings, and at most {MOST_TRAININGS} are allowed");
             return Err(FieldError::new("every", every, rule));
         }
         if trainings.saturating_mul(horizon) > MOST_STEPS {
-            let rule = format!("times {trainings} trainings must be at most {MOST_STEPS}");
+            let rule = format!("must be smaller: multiplied by {trainings} trainings it may be at most {MOST_STEPS}");
             return Err(FieldError::new("horizon", horizon, rule));
         }
         Ok(())
@@ -329,5 +332,5 @@ pub fn same_length(field: &str, found: usize, wanted: usize) -> Result<(), Field
     if found == wanted {
         return Ok(());
     }
-    Err(FieldError::new(field, format!("{found} values"), format!("must hold {wanted}, as many as there are returns")))
+    Err(FieldError::new(field, format!("{found} values"), format!("must hold {wanted} values, one for each return")))
 }

@@ -113,7 +113,7 @@ impl AssetsBacktestRequest {
     pub fn check(&self) -> Result<(Frequency, usize), FieldError> {
         if self.log_returns.is_some() == self.simple_returns.is_some() {
             let value = if self.log_returns.is_some() { "given with simple_returns" } else { "null" };
-            return Err(FieldError::new("log_returns", value, "must be given, or simple_returns: exactly one of them"));
+            return Err(FieldError::new("log_returns", value, "give either log_returns or simple_returns, not both"));
         }
         check_names("assets", &self.assets)?;
         let (field, rows) = self.returns();

@@ -64,8 +64,8 @@ impl ProblemSpecification {
             rules::within("problem.caution.scale", scale, 0.0, LARGEST_SCALE)?;
         }
         if level != CautionLevel::Paper && !self.takes_levels() {
-            let rule = "must be left out: it is a share of the radius of `bridge` or `calibrated`, in the frameworks `adaptive` \
-                        and `static`";
+            let rule = "must be left out: caution applies only to the rules `bridge` and `calibrated`, in the frameworks \
+                        `adaptive` and `static`";
             return Err(FieldError::new("problem.caution", level.name(), rule));
         }
         Ok(())

@@ -88,9 +88,9 @@ impl CentreSpecification {
             CentreSpecification::Smoothed { bandwidth } => {
                 format!(", each with a normal error of deviation {bandwidth},")
             }
-            CentreSpecification::VolatilityScaled { .. } => ", each at the volatility of now,".to_owned(),
+            CentreSpecification::VolatilityScaled { .. } => ", each rescaled to today's volatility,".to_owned(),
             CentreSpecification::Mixed { weight, .. } => {
-                format!(" and the law that is assumed to tell as much as {weight} more")
+                format!(" and the assumed law that counts as {weight} more")
             }
         };
         format!("the {sample_size} returns seen{more}")

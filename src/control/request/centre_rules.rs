@@ -28,11 +28,11 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
         let refused = |rule: &str| Err(FieldError::new("problem.centre.kind", centre.name(), rule));
         if problem.horizon > 1 {
             return refused(
-                "must be another where the horizon exceeds 1, unless the framework is static: what returns to come do to the volatility is no part of a state",
+                "must be another centre if the horizon exceeds 1, unless the framework is static: a state does not hold how later returns change the volatility",
             );
         }
         if laws == InitialLaws::Resampled {
-            return refused("must be another where design.initial_laws is resampled: a law that is drawn has no order");
+            return refused("must be another centre if design.initial_laws is resampled: a resampled law has no order");
         }
     }
     match centre {
@@ -44,7 +44,7 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
             within("problem.centre.bandwidth", *bandwidth, BANDWIDTH.0, BANDWIDTH.1)
         }
         CentreSpecification::Mixed { .. } if learning.decays() => {
-            let rule = "must be equal where the centre is mixed: a law that counts as so many returns has no age";
+            let rule = "must be equal if the centre is mixed: the assumed law has no age";
             Err(FieldError::new("problem.learning.kind", "decay", rule))
         }
         CentreSpecification::Mixed { law, history, weight } => {
@@ -54,7 +54,7 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
                 (None, Some(history)) => assumed_history(history, problem.support_rule().given()),
                 (law, _) => {
                     let value = if law.is_some() { "given with history" } else { "null" };
-                    let rule = "must be given, or history in its place: exactly one of them";
+                    let rule = "give either law or history, not both";
                     Err(FieldError::new("problem.centre.law", value, rule))
                 }
             }
@@ -64,7 +64,7 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
 
 fn assumed_law(law: &SamplingLaw) -> Result<(), FieldError> {
     if *law == (SamplingLaw::Bootstrap {}) {
-        let rule = "must be a law of its own: what the returns seen say is counted already";
+        let rule = "must be another law: the returns seen are already counted";
         return Err(FieldError::new("problem.centre.law.kind", "bootstrap", rule));
     }
     sampling_law("problem.centre.law", law)

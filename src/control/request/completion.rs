@@ -25,7 +25,7 @@ fn utility(given: UtilitySpecification, risk_aversion: Option<f64>) -> Result<Ut
         None if given.is_given() => Ok(given),
         None => Ok(UtilitySpecification::default()),
         Some(value) if given.is_given() => {
-            Err(FieldError::new(FIELD, value, "must be left out where problem.utility is given"))
+            Err(FieldError::new(FIELD, value, "must be left out if problem.utility is given"))
         }
         Some(value) => {
             let (low, high) = rules::RELATIVE_RISK_AVERSION;

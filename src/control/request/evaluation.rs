@@ -103,7 +103,11 @@ impl EvaluationRequest {
     pub fn completed(mut self) -> Result<Self, FieldError> {
         if self.problem.framework != Framework::Adaptive {
             let value = self.problem.framework.name();
-            return Err(FieldError::new("problem.framework", value, "must be left out: frameworks names them"));
+            return Err(FieldError::new(
+                "problem.framework",
+                value,
+                "must be left out: list the frameworks in `frameworks`",
+            ));
         }
         self.problem = self.problem.as_in_the_paper();
         let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
@@ -114,7 +118,7 @@ impl EvaluationRequest {
         self.check_frameworks()?;
         self.complete_mixes()?;
         if self.frameworks.is_empty() && self.mixes().is_empty() {
-            return Err(FieldError::new("frameworks", "[]", "must name a framework where there are no constant_mixes"));
+            return Err(FieldError::new("frameworks", "[]", "must name a framework if there are no constant_mixes"));
         }
         self.check_sizes()?;
         Ok(self)
@@ -131,10 +135,12 @@ impl EvaluationRequest {
         for (framework, policy) in &self.policies {
             let refused = |rule: &str| Err(FieldError::new(format!("policies.{}", framework.name()), policy, rule));
             if !self.frameworks.contains(framework) {
-                return refused("must be for one of the frameworks");
+                return refused("must belong to a framework that `frameworks` lists");
             }
             if !self.one_policy_for_all(*framework) {
-                return refused("must be left out where histories are drawn: the framework is frozen at its history");
+                return refused(
+                    "must be left out if histories are drawn: this framework trains a policy for each history",
+                );
             }
         }
         Ok(())
@@ -168,7 +174,8 @@ impl EvaluationRequest {
             rules::whole("histories.count", count, &HISTORIES)?;
         }
         if self.history_count().saturating_mul(self.paths).saturating_mul(self.problem.horizon) > STEPS {
-            let rule = format!("times histories.count and problem.horizon must be at most {STEPS}");
+            let rule =
+                format!("must be smaller: multiplied by histories.count and problem.horizon it may be at most {STEPS}");
             return Err(FieldError::new("paths", self.paths, rule));
         }
         within("level", self.level, LEVEL.0, LEVEL.1)

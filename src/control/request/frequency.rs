@@ -112,9 +112,9 @@ impl Frequency {
         }
         let Some(frequency) = Self::typical(dates) else {
             let index = gaps.iter().position(|gap| Self::by(*gap).is_none()).unwrap_or_default();
-            let rule = "where rows must be daily, weekly, monthly, quarterly or yearly";
+            let rule = "rows must be daily, weekly, monthly, quarterly or yearly";
             let (gap, before) = (gaps[index], written[index]);
-            return refused(index, format!("is {gap} days after {before}, the row before, {rule}"));
+            return refused(index, format!("is {gap} days after {before}, the row before: {rule}"));
         };
         let week = Week::of(dates);
         let is_again = |pair: &[Date]| frequency == Weekly && week.holds_both(pair[0], pair[1]);
@@ -122,7 +122,7 @@ impl Frequency {
             None => Ok(frequency),
             Some(index) => {
                 let (noun, adjective) = (frequency.noun(), frequency.adjective());
-                let rest = if frequency == Daily { ", but for weekends and holidays" } else { "" };
+                let rest = if frequency == Daily { ", except for weekends and holidays" } else { "" };
                 let (gap, before) = (gaps[index], written[index]);
                 let days = if gap == 1 { "day" } else { "days" };
                 refused(

@@ -133,7 +133,7 @@ impl FrontierRequest {
             return Err(FieldError::new("problem.history", format!("{count} periods"), rule));
         }
         if let Some(given) = self.problem.caution().filter(|given| *given != CautionLevel::Paper) {
-            let rule = "must be `paper` or left out: `scales` are the shares of the radius that are tried";
+            let rule = "must be `paper` or left out: `scales` already sets the shares of the radius to try";
             return Err(FieldError::new("problem.caution", given.name(), rule));
         }
         let (assets, mut fund) = match &self.problem {
@@ -149,7 +149,7 @@ impl FrontierRequest {
         let drawn = count * assets.assets.len() * self.scales.len();
         if drawn * resamples > MOST_DRAWN {
             let rule = format!(
-                "must be at most {}: periods, assets, scales and resamples multiply to at most {MOST_DRAWN}",
+                "must be at most {}: periods times assets times scales times resamples may be at most {MOST_DRAWN}",
                 MOST_DRAWN / drawn
             );
             return Err(FieldError::new("resamples", resamples, rule));
@@ -190,28 +190,28 @@ impl FrontierRequest {
 fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
     let name = problem.framework.name();
     if problem.framework != Framework::Adaptive {
-        return Err(FieldError::new("problem.framework", name, "must be `adaptive`: its radius is what is tried"));
+        return Err(FieldError::new(
+            "problem.framework",
+            name,
+            "must be `adaptive`: a frontier varies the radius of this framework",
+        ));
     }
     if problem.horizon != 1 {
         return Err(FieldError::new(
             "problem.horizon",
             problem.horizon,
-            "must be 1 or left out: one period is advised",
+            "must be 1 or left out: a frontier covers one period",
         ));
     }
     if problem.trading_cost != 0.0 {
-        let rule = "must be 0 or left out: nothing is held before";
+        let rule = "must be 0 or left out: a frontier starts without holdings";
         return Err(FieldError::new("problem.trading_cost", problem.trading_cost, rule));
     }
     if problem.learning != (Learning::Equal {}) {
-        return Err(FieldError::new(
-            "problem.learning",
-            "decay",
-            "must be `equal`: records are drawn without an order",
-        ));
+        return Err(FieldError::new("problem.learning", "decay", "must be `equal`: resampled records have no order"));
     }
     if !problem.centre.is_empirical() {
-        let rule = "must be empirical: radii are tried around the law of a record alone";
+        let rule = "must be empirical: a frontier centres its balls on the law of the record alone";
         return Err(FieldError::new("problem.centre.kind", problem.centre.name(), rule));
     }
     if !problem.contributions.are_none() {

@@ -42,7 +42,9 @@ impl Learning {
         if self.deviation(record) >= SMALLEST_DEVIATION {
             return Ok(());
         }
-        let rule = format!("must vary: as learned, its standard deviation must be at least {SMALLEST_DEVIATION:e}");
+        let rule = format!(
+            "must vary: with the weights of learning, its standard deviation must be at least {SMALLEST_DEVIATION:e}"
+        );
         Err(FieldError::new(
             field,
             format!("{} values near {}", record.len(), record.first().copied().unwrap_or_default()),

@@ -82,7 +82,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         return Err(FieldError::new(
             "problem.action_interval[0]",
             lowest,
-            "must be 0: the all-bank floor must be feasible",
+            "must be 0, so that all wealth may stay in the bank",
         ));
     }
     within("problem.action_interval[1]", highest, SMALLEST_HIGHEST_ACTION, 1.0)?;
@@ -132,12 +132,12 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     let (field, given, (low, high)) = match problem.utility {
         UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: Some(relative) } => {
             if !risk_aversion.is_nan() {
-                return Err(FieldError::new(RELATIVE, relative, "must be left out where risk_aversion is given"));
+                return Err(FieldError::new(RELATIVE, relative, "must be left out if risk_aversion is given"));
             }
             (RELATIVE, relative, RISK_AVERSION_RELATIVE)
         }
         UtilitySpecification::Exponential { risk_aversion, .. } if risk_aversion.is_nan() => {
-            return Err(FieldError::new(FIELD, "null", "must be given, or risk_aversion_relative in its place"));
+            return Err(FieldError::new(FIELD, "null", "must be given, or risk_aversion_relative instead"));
         }
         UtilitySpecification::Exponential { risk_aversion, .. } => (FIELD, risk_aversion, RISK_AVERSION),
         UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
@@ -155,13 +155,13 @@ fn not_flat(problem: &ProblemSpecification, wealth: f64, refused: (&str, f64), o
     let utility = problem.utility.absolute(problem.initial_wealth);
     let UtilitySpecification::Exponential { risk_aversion, .. } = utility else { return Ok(()) };
     if risk_aversion * wealth > EXPONENTIAL_SCALE {
-        let rule = format!("times {other} must be at most {EXPONENTIAL_SCALE}");
+        let rule = format!("must be smaller: multiplied by {other} it may be at most {EXPONENTIAL_SCALE}");
         return Err(FieldError::new(refused.0, refused.1, rule));
     }
     let total = withdrawals::total_wealth(problem, wealth);
     if risk_aversion * total > EXPONENTIAL_SCALE {
         let rule = format!(
-            "must be less: with wealth they are worth {total} now, which times problem.utility.risk_aversion must be at most {EXPONENTIAL_SCALE}"
+            "must be smaller: its value now plus wealth is {total}; multiplied by problem.utility.risk_aversion, that may be at most {EXPONENTIAL_SCALE}"
         );
         return Err(FieldError::new("problem.contributions", "money to come", rule));
     }
@@ -179,7 +179,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
             ));
         }
         (false, true) => {
-            let rule = "must be another unless the framework is parametric_static or parametric_adaptive";
+            let rule = "must be another rule unless the framework is parametric_static or parametric_adaptive";
             return Err(FieldError::new("problem.radius.rule", name, rule));
         }
         _ => {}
@@ -195,7 +195,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
                 within("problem.radius.correction", correction, RADIUS_CORRECTION.0, RADIUS_CORRECTION.1)?;
             }
             if paths.saturating_mul(problem.history.len() + problem.horizon) > numbers {
-                let rule = format!("times the final sample size must be at most {numbers}");
+                let rule = format!("must be smaller: multiplied by the final sample size it may be at most {numbers}");
                 return Err(FieldError::new("problem.radius.paths", paths, rule));
             }
             Ok(())
@@ -246,7 +246,8 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
         whole("design.count", count, &COUNT)?;
         let numbers = count.saturating_mul(specification.problem.history.len() + specification.problem.horizon);
         if design.initial_laws == InitialLaws::Resampled && numbers > DESIGN_NUMBERS {
-            let rule = format!("times the final sample size must be at most {DESIGN_NUMBERS}");
+            let rule =
+                format!("must be smaller: multiplied by the final sample size it may be at most {DESIGN_NUMBERS}");
             return Err(FieldError::new("design.count", count, rule));
         }
     }

@@ -22,7 +22,7 @@ pub fn check_text(
     let control = text.chars().zip(1..).find(|(letter, _)| letter.is_control() && !accepted.contains(letter));
     let Some((control, place)) = control else { return Ok(()) };
     let rule = format!(
-        "must have no control character, and letter {place} is U+{:04X}: remove it, or put a space in its place",
+        "must have no control character, but letter {place} is U+{:04X}: remove it or replace it with a space",
         u32::from(control)
     );
     Err(FieldError::new(field, format!("{text:?}"), rule))

@@ -67,26 +67,27 @@ impl ProblemSpecification {
         let (rate, cost, periods) = (self.rate_per_step, self.trading_cost, self.periods_per_year);
         let mean = self.mean_return();
         let a_year = compounded(rate, periods.unwrap_or(1.0));
-        let year =
-            periods.map_or("if a period is a year, and more if it is less".into(), |p| format!("of {p} periods"));
+        let year = periods
+            .map_or("if a period is a year, and more if a period is shorter".into(), |p| format!("of {p} periods"));
         let large = periods.map_or(LARGE_DEVIATION, |periods| LARGE_DEVIATION_A_YEAR / periods.sqrt());
         let rate_high = || {
             let a_year = percent(a_year);
             format!(
-                "is {rate}, which is {a_year} a year {year}. It is meant as a fraction of one period, not of a year"
+                "is {rate}, which is {a_year} a year {year}. Give the rate of one period as a fraction, not the rate of a \
+                 year"
             )
         };
         let rate_above = || {
             format!(
-                "is {rate}, above the mean simple return of problem.history, {mean:.6}: through the record the bank paid \
-                 more than the asset. It is meant as a fraction of one period, not of a year"
+                "is {rate}, above the mean simple return of problem.history, {mean:.6}: over the record the bank paid \
+                 more than the asset. Give the rate of one period as a fraction, not the rate of a year"
             )
         };
         let in_percent = |field, deviation: f64| {
             let message = || {
                 format!(
-                    "has log-returns of the standard deviation {deviation:.4} a period: are they in percent? They are \
-                     meant as fractions, 0.012 for a rise of 1.2 %"
+                    "has log-returns with a standard deviation of {deviation:.4} a period: are they in percent? Give \
+                     fractions, 0.012 for a rise of 1.2 %"
                 )
             };
             (deviation > large).then(|| warning(WarningCode::RecordInPercent, field, message()))
@@ -97,7 +98,7 @@ impl ProblemSpecification {
         };
         let cost_high = || {
             let share = percent(cost);
-            format!("is {cost}, which is {share} of all that is traded. It is meant as a fraction, 0.002 for 0.2 %")
+            format!("is {cost}, which is {share} of every trade. Give a fraction, 0.002 for 0.2 %")
         };
         [
             (a_year > HIGH_RATE_A_YEAR).then(|| warning(WarningCode::RateHigh, "problem.rate_per_step", rate_high())),

@@ -17,8 +17,7 @@ pub fn check_start(problem: &ProblemSpecification, field: &str, wealth: f64) -> 
     match (check_bank(&periods[..problem.horizon], wealth), periods[0].least_wealth()) {
         (Err(rule), _) => refused(rule),
         (Ok(()), least) if wealth < least => refused(format!(
-            "must be at least {least}, so that a hundredth is to spare of what must stay in the bank for what \
-             problem.contributions withdraws"
+            "must be at least {least}: the bank must hold 1 % more than the withdrawals in problem.contributions need"
         )),
         _ => Ok(()),
     }
@@ -39,7 +38,7 @@ pub fn check_bank(periods: &[Dynamics], liquidated: f64) -> Result<(), String> {
     match periods.iter().position(is_empty) {
         None => Ok(()),
         Some(index) => Err(format!(
-            "must be more: all sold and left in the bank, it does not last to the end of period {}, for what problem.contributions withdraws",
+            "must be more: even if all is sold and kept in the bank, the withdrawals in problem.contributions empty it by the end of period {}",
             index + 1
         )),
     }

@@ -489,7 +489,7 @@ mod tests {
         assert_eq!(usual_windows(84), [Some(40), Some(80), None]);
         assert_eq!(usual_windows(48), [Some(40), None]);
         assert_eq!(usual_windows(30), [Some(15), None]);
-        let short = "window is 8: must be at most 7: the record has 11 periods, of which a year of 4 is lived through";
+        let short = "window is 8: must be at most 7: the record has 11 periods, and a year of 4 must follow the window";
         assert_eq!(message(record(11), usual.clone()), short);
         assert_eq!(
             message(record(30), AssetsChoices { every: 0, ..usual.clone() }),
@@ -499,6 +499,6 @@ mod tests {
         let still = message(still, usual.clone());
         assert!(still.contains("must vary") && still.ends_with("in the 8 periods before period 9"), "{still}");
         let alike = AssetsRecord { assets: vec!["a".into(), "a".into()], ..record(30) };
-        assert_eq!(message(alike, usual), "assets[1] is a: must be a name of its own");
+        assert_eq!(message(alike, usual), "assets[1] is a: must differ from the other names");
     }
 }
