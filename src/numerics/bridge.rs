@@ -235,9 +235,10 @@ impl Weights {
     fn take(&mut self) -> GapWeights {
         let touched = std::mem::take(&mut self.touched);
         let weights = &mut self.weights[touched.clone()];
-        let taken = GapWeights { first: touched.start, weights: weights.iter().map(|weight| *weight as f32).collect() };
+        let collected =
+            GapWeights { first: touched.start, weights: weights.iter().map(|weight| *weight as f32).collect() };
         weights.fill(0.0);
-        taken
+        collected
     }
 }
 

@@ -296,8 +296,8 @@ mod tests {
         let middle = |whole: &AbsoluteBridges, unit: &AbsoluteBridges, node: usize| -> Vec<f64> {
             // If the direction is small its last bit matters, so such paths are left out; the length is independent of
             // it.
-            let told = |(_, direction): &(f64, f64)| *direction > 1000.0 * unit.units[node];
-            let ratios = whole.at(node).zip(unit.at(node)).filter(told);
+            let is_large = |(_, direction): &(f64, f64)| *direction > 1000.0 * unit.units[node];
+            let ratios = whole.at(node).zip(unit.at(node)).filter(is_large);
             ratios.map(|(value, direction)| (value / direction).powi(2)).collect()
         };
         let (directions, paths) = (AbsoluteBridges::simulate(10, 2000, 7), AbsoluteBridges::whole(10, 2000, 7));

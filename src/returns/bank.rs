@@ -46,12 +46,12 @@ impl Bank<'_> {
     ///
     /// # Errors
     /// A question about the unit of the rates.
-    pub fn rates(&self, used: usize, unit: Option<Unit>, said: &Choices) -> Result<Result<BankRate, String>, Stop> {
+    pub fn rates(&self, used: usize, unit: Option<Unit>, choices: &Choices) -> Result<Result<BankRate, String>, Stop> {
         let cells = &self.cells[self.cells.len() - used..];
         let is_percent = self.says_percent() || unit == Some(Unit::Percent);
-        let by_hundred = match said.rate_unit {
+        let by_hundred = match choices.rate_unit {
             Some(RateUnit::Unused) => return Ok(Err("it is left out as was said".to_owned())),
-            Some(said) => said == RateUnit::Percent,
+            Some(rate_unit) => rate_unit == RateUnit::Percent,
             None if is_percent && self.middle(cells) * self.periods / 100.0 > LARGEST_RATE => {
                 return Err(self.ask(cells));
             }
@@ -103,6 +103,6 @@ impl Bank<'_> {
         options.push(("Neither: leave the column out".to_owned(), unused));
         let question =
             format!("What is {text} in column {}, which says what the bank pays a period?", self.column.name);
-        Stop::asked("rate_unit", question, options)
+        Stop::question("rate_unit", question, options)
     }
 }

@@ -98,7 +98,7 @@ pub struct CellRows<'a> {
 impl<'a> CellRows<'a> {
     /// # Errors
     /// The text is too long or no text, or a comma in it has two possible meanings.
-    pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
+    pub fn of(text: &'a str, choices: &Choices) -> Result<Self, Stop> {
         let text = text.trim_start_matches('\u{feff}');
         let end = if text.contains('\n') { '\n' } else { '\r' };
         check(text, end)?;
@@ -112,7 +112,7 @@ impl<'a> CellRows<'a> {
         if lines.is_empty() {
             return Err(Stop::refused("There are no numbers in the text."));
         }
-        let separator = declared.map_or_else(|| separator(&lines, said), Ok)?;
+        let separator = declared.map_or_else(|| separator(&lines, choices), Ok)?;
         let mut rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
         let filled = |row: &Vec<Cell>| row.iter().rposition(|cell| !cell.text.is_empty()).map_or(0, |last| last + 1);
         rows.retain(|row| filled(row) > 0);
@@ -168,7 +168,7 @@ fn numeric<'a>(lines: &[TextLine<'a>]) -> Vec<TextLine<'a>> {
     if found.len() < 2 { lines.to_vec() } else { found }
 }
 
-fn separator(lines: &[TextLine], said: &Choices) -> Result<char, Stop> {
+fn separator(lines: &[TextLine], choices: &Choices) -> Result<char, Stop> {
     let lines = &numeric(lines)[..];
     let holding = |wanted: char| {
         let outside = |line: &&TextLine| line.text.split('"').step_by(2).any(|unquoted| unquoted.contains(wanted));
@@ -180,7 +180,7 @@ fn separator(lines: &[TextLine], said: &Choices) -> Result<char, Stop> {
         return Ok(plain);
     }
     if holding(COMMA) > 0 {
-        return match said.comma_parts {
+        return match choices.comma_parts {
             Some(parts) => Ok(if parts { COMMA } else { BLANK }),
             None => comma(lines),
         };
@@ -207,7 +207,7 @@ fn comma(lines: &[TextLine]) -> Result<char, Stop> {
     let parts = |parts| Choices { comma_parts: Some(parts), ..Choices::default() };
     let options =
         vec![(format!("One number: {word}"), parts(false)), (format!("Numbers of their own: {parted}"), parts(true))];
-    Err(Stop::asked("comma_parts", format!("Is {word} one number, or are {parted} numbers of their own?"), options))
+    Err(Stop::question("comma_parts", format!("Is {word} one number, or are {parted} numbers of their own?"), options))
 }
 
 /// Counts the cells that would be neither numbers nor dates if lines were split by `separator`; a heading is not
@@ -289,8 +289,8 @@ fn closing(text: &str) -> Option<usize> {
 }
 
 /// Returns the decimal mark of `cells`. If 1,234 can be read both ways, the caller is asked.
-pub fn mark<'a>(cells: impl Iterator<Item = &'a Cell<'a>>, said: &Choices) -> Result<Mark, Stop> {
-    if let Some(comma) = said.decimal_comma {
+pub fn mark<'a>(cells: impl Iterator<Item = &'a Cell<'a>>, choices: &Choices) -> Result<Mark, Stop> {
+    if let Some(comma) = choices.decimal_comma {
         return Ok(if comma { Mark::Comma } else { Mark::Point });
     }
     let numeric: Vec<&Cell> = cells.filter(|cell| looks_numeric(&cell.text)).collect();
@@ -306,7 +306,7 @@ pub fn mark<'a>(cells: impl Iterator<Item = &'a Cell<'a>>, said: &Choices) -> Re
                 (format!("{word}: {} is {value}", doubtful.text), choices)
             };
             let options = vec![option("Yes", true, Mark::Comma), option("No", false, Mark::Point)];
-            Err(Stop::asked("decimal_comma", format!("Is the comma in {} a decimal mark?", doubtful.text), options))
+            Err(Stop::question("decimal_comma", format!("Is the comma in {} a decimal mark?", doubtful.text), options))
         }
     }
 }

@@ -257,7 +257,7 @@ pub fn numbered(form: Form, texts: &[&str]) -> Option<String> {
         _ => return None,
     };
     let first = texts.first()?;
-    Some(format!("The dates are {what}: {first} is {}.", told(form.date(first)?, None)))
+    Some(format!("The dates are {what}: {first} is {}.", in_words(form.date(first)?, None)))
 }
 
 /// Returns true for whole numbers of four digits that all go up, or all go down, by one.
@@ -269,7 +269,7 @@ fn are_years(texts: &[&str]) -> bool {
 }
 
 /// Returns the form of a column of dates. If day and month could be swapped, the caller is asked.
-pub fn form(texts: &[&str], said: &Choices) -> Result<Form, Stop> {
+pub fn form(texts: &[&str], choices: &Choices) -> Result<Form, Stop> {
     let found = best(texts);
     let first = found.first().copied().unwrap_or(if are_serials(texts) { SERIAL } else { YEAR });
     let month_first = match first {
@@ -280,21 +280,21 @@ pub fn form(texts: &[&str], said: &Choices) -> Result<Form, Stop> {
     if !found.contains(&month_first) {
         return Ok(first);
     }
-    if let Some(day_first) = said.day_first {
+    if let Some(day_first) = choices.day_first {
         return Ok(if day_first { first } else { month_first });
     }
     let differs = |text: &&&str| first.date(text) != month_first.date(text);
     let Some(doubtful) = texts.iter().find(differs) else { return Ok(first) };
     let option = |form: Form, day_first| {
-        let words = form.date(doubtful).map_or(String::new(), |date| told(date, None));
+        let words = form.date(doubtful).map_or(String::new(), |date| in_words(date, None));
         (words, Choices { day_first: Some(day_first), ..Choices::default() })
     };
     let options = vec![option(first, true), option(month_first, false)];
-    Err(Stop::asked("day_first", format!("Which day is {doubtful}?"), options))
+    Err(Stop::question("day_first", format!("Which day is {doubtful}?"), options))
 }
 
 /// Returns a date in words, to the precision of the frequency.
-pub fn told(date: Date, frequency: Option<Frequency>) -> String {
+pub fn in_words(date: Date, frequency: Option<Frequency>) -> String {
     let (year, month) = (date.year(), MONTHS[usize::from(date.month().unsigned_abs()) - 1]);
     match frequency {
         Some(Frequency::Yearly) => year.to_string(),

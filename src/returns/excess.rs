@@ -12,11 +12,11 @@ use super::outcome::Stop;
 ///
 /// # Errors
 /// A question, no column of the bank to add, or a cell of that column that breaks a rule.
-pub fn whole(name: &str, returns: Returns, bank: Option<&Bank>, said: &Choices) -> Result<Returns, Stop> {
+pub fn whole(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -> Result<Returns, Stop> {
     let is_return = returns.kind == Kind::Simple || returns.kind == Kind::Log;
-    match said.excess {
+    match choices.excess {
         None if is_return && ColumnHeading::of(name).is_excess => Err(ask(name, bank)),
-        Some(true) if is_return => added(name, returns, bank, said),
+        Some(true) if is_return => added(name, returns, bank, choices),
         _ => Ok(returns),
     }
 }
@@ -35,16 +35,16 @@ fn ask(name: &str, bank: Option<&Bank>) -> Stop {
              whole returns all the same?"
         ),
     };
-    Stop::asked("excess", question, options)
+    Stop::question("excess", question, options)
 }
 
-fn added(name: &str, returns: Returns, bank: Option<&Bank>, said: &Choices) -> Result<Returns, Stop> {
+fn added(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -> Result<Returns, Stop> {
     let Some(bank) = bank else {
         return Err(Stop::refused(format!(
             "Column {name} holds returns beyond the bank, and no column such as rf says what that paid: add one."
         )));
     };
-    let paid = bank.rates(returns.simple.len(), returns.unit, said)?;
+    let paid = bank.rates(returns.simple.len(), returns.unit, choices)?;
     let paid = paid.map_err(|reason| Stop::refused(format!("Column {} is not added: {reason}.", bank.column.name)))?;
     let simple: Vec<f64> = returns.simple.iter().zip(&paid.rates).map(|(beyond, rate)| beyond + rate).collect();
     if let Some(index) = simple.iter().position(|simple| *simple <= -1.0) {

@@ -59,11 +59,11 @@ impl KeptRows {
     ///
     /// # Errors
     /// Among returns, and among prices that are not daily, a hole may be a missing period, so the caller is asked.
-    pub fn check_holes(&mut self, chosen: &[&Column], are_daily_prices: bool, said: &Choices) -> Result<(), Stop> {
+    pub fn check_holes(&mut self, chosen: &[&Column], are_daily_prices: bool, choices: &Choices) -> Result<(), Stop> {
         let Some(hole) = self.holes.first().copied() else { return Ok(()) };
         let odd = chosen.iter().find(|column| column.cells[hole].is_missing()).unwrap_or(&chosen[0]);
         let (count, all) = (self.holes.len(), self.rows.len() + self.holes.len());
-        if are_daily_prices || said.gaps == Some(true) {
+        if are_daily_prices || choices.gaps == Some(true) {
             let (rows, line) = (counted(count, "row"), odd.cells[hole].line());
             self.remarks.push(format!("{rows} without a number passed over, the first in line {line}."));
             return Ok(());
@@ -73,7 +73,7 @@ impl KeptRows {
             odd.cells[hole].called(&odd.name)
         );
         let choices = Choices { gaps: Some(true), ..Choices::default() };
-        Err(Stop::asked("gaps", question, vec![("Leave the rows out".to_owned(), choices)]))
+        Err(Stop::question("gaps", question, vec![("Leave the rows out".to_owned(), choices)]))
     }
 }
 

@@ -68,21 +68,21 @@ pub struct Returns {
 impl Numbers<'_> {
     /// # Errors
     /// A question or a refusal.
-    pub fn returns(&self, said: &Choices, beside: &RecordContext) -> Result<Returns, Stop> {
+    pub fn returns(&self, choices: &Choices, beside: &RecordContext) -> Result<Returns, Stop> {
         let signs = self.percent_signs()?;
         let is_money = self.marks_of_money()?;
-        let kind = said.kind.map_or_else(|| self.kind(signs, is_money), Ok)?;
+        let kind = choices.kind.map_or_else(|| self.kind(signs, is_money), Ok)?;
         let unit = match kind {
             Kind::Price | Kind::Gross => None,
-            Kind::Cumulated => Some(self.cumulated_unit(signs, said)?),
-            Kind::Simple | Kind::Log => Some(self.unit(signs, said, beside)?),
+            Kind::Cumulated => Some(self.cumulated_unit(signs, choices)?),
+            Kind::Simple | Kind::Log => Some(self.unit(signs, choices, beside)?),
         };
         let returns = self.read_as(kind, unit)?;
         let (_, deviation) = moments(&returns.simple);
         if deviation == 0.0 && returns.simple.len() > 1 {
             return Err(Stop::refused("The numbers do not vary: there is nothing to learn from them."));
         }
-        if said.unusual == Some(true) { Ok(returns) } else { self.doubted(returns, beside) }
+        if choices.unusual == Some(true) { Ok(returns) } else { self.doubted(returns, beside) }
     }
 
     /// Returns true if the cells have percent signs. If some cells have one and others have none, they cannot mean the
@@ -170,7 +170,7 @@ impl Numbers<'_> {
         if is_slow(&self.values) {
             options.insert(1, option(SINCE_START, Kind::Cumulated));
         }
-        Stop::asked("kind", question, options)
+        Stop::question("kind", question, options)
     }
 
     fn ask_slow(&self) -> Stop {
@@ -202,7 +202,7 @@ impl Numbers<'_> {
             }
         }
         options.push(option("Returns of one period each", Kind::Simple));
-        Stop::asked("kind", question, options)
+        Stop::question("kind", question, options)
     }
 
     /// Converts the numbers to returns, and refuses the first cell that cannot be of this kind.
@@ -275,7 +275,7 @@ impl Numbers<'_> {
         if self.read_as(choices.kind.unwrap_or(kind), choices.unit.or(unit)).is_ok() {
             options.push((otherwise.to_owned(), choices));
         }
-        Err(Stop::asked("unusual", format!("{} Is that right?", found.join(" ")), options))
+        Err(Stop::question("unusual", format!("{} Is that right?", found.join(" ")), options))
     }
 }
 

@@ -15,14 +15,19 @@ use crate::control::request::frequency::Frequency;
 ///
 /// # Errors
 /// A question, or a refusal of rows that are in no order, a date given twice, or a date in another form.
-pub fn ordered(column: Option<&Column>, times: Option<&Column>, rows: &[usize], said: &Choices) -> Result<Order, Stop> {
-    let undated = Order { dates: None, is_turned: said.newest_first == Some(true), frequency: None, remark: None };
+pub fn ordered(
+    column: Option<&Column>,
+    times: Option<&Column>,
+    rows: &[usize],
+    choices: &Choices,
+) -> Result<Order, Stop> {
+    let undated = Order { dates: None, is_turned: choices.newest_first == Some(true), frequency: None, remark: None };
     let Some(column) = column else { return Ok(undated) };
     let given = given(column);
     if !are_understood(&given) {
-        return if said.newest_first.is_some() { Ok(undated) } else { Err(ask_the_end(&given)) };
+        return if choices.newest_first.is_some() { Ok(undated) } else { Err(ask_the_end(&given)) };
     }
-    let form = form(&given, said)?;
+    let form = form(&given, choices)?;
     let mut cells = column.at(rows);
     let date = |cell: &&Cell| {
         form.date(&cell.text).ok_or_else(|| cell.refused(&column.name, "must be a date in the form of the others"))
@@ -39,23 +44,23 @@ pub fn ordered(column: Option<&Column>, times: Option<&Column>, rows: &[usize], 
     let written: Vec<&str> = cells.iter().map(|cell| cell.text.as_ref()).collect();
     let frequency = match Frequency::of(&dates, &written) {
         Ok(frequency) => Some(frequency),
-        Err(_) if said.gaps == Some(true) => Frequency::typical(&dates),
+        Err(_) if choices.gaps == Some(true) => Frequency::typical(&dates),
         Err(found) => {
             let question = format!("{}: {}", cells[found.index].called(&column.name), found.rule);
             let choices = Choices { gaps: Some(true), ..Choices::default() };
-            return Err(Stop::asked("gaps", question, vec![("Take the rows as they are".to_owned(), choices)]));
+            return Err(Stop::question("gaps", question, vec![("Take the rows as they are".to_owned(), choices)]));
         }
     };
     Ok(Order { remark: numbered(form, &written), dates: Some(dates), is_turned, frequency })
 }
 
 /// Returns true if the newest row comes first, as far as the dates or the choices tell.
-pub fn is_newest_first(column: Option<&Column>, said: &Choices) -> bool {
-    let Some(column) = column else { return said.newest_first == Some(true) };
+pub fn is_newest_first(column: Option<&Column>, choices: &Choices) -> bool {
+    let Some(column) = column else { return choices.newest_first == Some(true) };
     let given = given(column);
-    match form(&given, said) {
+    match form(&given, choices) {
         Ok(form) if are_understood(&given) => falls(&read_as(form, &given)),
-        _ => said.newest_first == Some(true),
+        _ => choices.newest_first == Some(true),
     }
 }
 
@@ -77,7 +82,7 @@ fn ask_the_end(given: &[&str]) -> Stop {
     };
     let question =
         format!("The dates are not understood, such as {}. Which row is the oldest?", given.first().unwrap_or(&""));
-    Stop::asked("newest_first", question, vec![option("The first row", false), option("The last row", true)])
+    Stop::question("newest_first", question, vec![option("The first row", false), option("The last row", true)])
 }
 
 /// # Errors

@@ -67,7 +67,7 @@ impl Stop {
         }
     }
 
-    pub fn asked(asks: &'static str, question: impl Into<String>, options: Vec<(String, Choices)>) -> Self {
+    pub fn question(asks: &'static str, question: impl Into<String>, options: Vec<(String, Choices)>) -> Self {
         let option = |(label, choices)| Answer { label, choices, sentence: None };
         let options = options.into_iter().map(option).collect();
         Stop::Asked(vec![Question { asks, question: question.into(), options }])
@@ -84,6 +84,6 @@ pub(super) fn both<A, B>(one: Result<A, Stop>, other: Result<B, Stop>) -> Result
         (Ok(one), Ok(other)) => Ok((one, other)),
         (Err(Stop::Asked(one)), Err(Stop::Asked(other))) => Err(Stop::Asked([one, other].concat())),
         (Err(refused @ Stop::Refused { .. }), _) | (_, Err(refused @ Stop::Refused { .. })) => Err(refused),
-        (Err(asked), _) | (_, Err(asked)) => Err(asked),
+        (Err(question), _) | (_, Err(question)) => Err(question),
     }
 }

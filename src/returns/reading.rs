@@ -46,9 +46,9 @@ pub enum Reading {
     },
 }
 
-/// Reads `text`, given the choices in `said`. Reads at most 8 MB of text, in time proportional to its length.
-pub fn read(text: &str, said: &Choices) -> Reading {
-    let (outcome, columns) = outcome(text, said);
+/// Reads `text`, given the `choices`. Reads at most 8 MB of text, in time proportional to its length.
+pub fn read(text: &str, choices: &Choices) -> Reading {
+    let (outcome, columns) = outcome(text, choices);
     match outcome {
         Ok(record) => Reading::Read(record),
         Err(Stop::Refused { sentence, place }) => Reading::Refused { sentence, place },
@@ -56,7 +56,7 @@ pub fn read(text: &str, said: &Choices) -> Reading {
             let count: usize = questions.iter().map(|question| question.options.len()).sum();
             if ROUNDS * count * text.len() <= TRIED {
                 let options = questions.iter_mut().flat_map(|question| &mut question.options);
-                options.for_each(|option| option.sentence = meaning(text, said, option));
+                options.for_each(|option| option.sentence = meaning(text, choices, option));
             }
             Reading::Asked { questions, columns }
         }
@@ -64,14 +64,14 @@ pub fn read(text: &str, said: &Choices) -> Reading {
 }
 
 /// Returns the sentence of the record that an answer leads to, taking the first option of every further question.
-fn meaning(text: &str, said: &Choices, option: &Answer) -> Option<String> {
-    let mut said = said.with(&option.choices);
+fn meaning(text: &str, choices: &Choices, option: &Answer) -> Option<String> {
+    let mut choices = choices.with(&option.choices);
     for _ in 0..ROUNDS {
-        match outcome(text, &said).0 {
+        match outcome(text, &choices).0 {
             Ok(record) => return Some(record.sentence),
             Err(Stop::Asked(questions)) => {
                 let first = questions.into_iter().find_map(|question| question.options.into_iter().next())?;
-                said = first.choices.with(&said);
+                choices = first.choices.with(&choices);
             }
             Err(Stop::Refused { .. }) => return None,
         }
@@ -79,26 +79,26 @@ fn meaning(text: &str, said: &Choices, option: &Answer) -> Option<String> {
     None
 }
 
-fn outcome(text: &str, said: &Choices) -> (Result<Record, Stop>, Vec<ColumnFound>) {
-    match Sheet::of(text, said) {
-        Ok(sheet) => (record(&sheet, said), sheet.found()),
+fn outcome(text: &str, choices: &Choices) -> (Result<Record, Stop>, Vec<ColumnFound>) {
+    match Sheet::of(text, choices) {
+        Ok(sheet) => (record(&sheet, choices), sheet.found()),
         Err(stop) => (Err(stop), Vec::new()),
     }
 }
 
-fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
-    let chosen = sheet.chosen(said)?;
+fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
+    let chosen = sheet.chosen(choices)?;
     let dates = sheet.column(Holds::Dates);
-    let mut kept = KeptRows::of(&chosen, is_newest_first(dates, said))?;
-    let mark = mark(chosen.iter().flat_map(|column| column.at(&kept.rows)), said)?;
+    let mut kept = KeptRows::of(&chosen, is_newest_first(dates, choices))?;
+    let mark = mark(chosen.iter().flat_map(|column| column.at(&kept.rows)), choices)?;
     let numbers = chosen.iter().map(|column| numbers(column, column.at(&kept.rows), mark));
     let mut numbers = numbers.collect::<Result<Vec<Numbers>, Stop>>()?;
     if kept.rows.len() < FEWEST {
         return Err(Stop::refused("One number is no record of returns: at least two are needed."));
     }
     // The question about holes comes before the one about the periods that are missing because of them.
-    let lenient = Choices { gaps: Some(true), ..said.clone() };
-    let order = ordered(dates, sheet.times(), &kept.rows, if kept.holes.is_empty() { said } else { &lenient });
+    let lenient = Choices { gaps: Some(true), ..choices.clone() };
+    let order = ordered(dates, sheet.times(), &kept.rows, if kept.holes.is_empty() { choices } else { &lenient });
     let is_turned = order.as_ref().is_ok_and(|order| order.is_turned);
     if is_turned {
         numbers.iter_mut().for_each(|numbers| {
@@ -114,33 +114,33 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
         }
         Bank { column, cells, mark, periods: beside.periods }
     });
-    beside.bank = bank.as_ref().filter(|_| said.rate_unit.is_none()).and_then(Bank::beyond);
+    beside.bank = bank.as_ref().filter(|_| choices.rate_unit.is_none()).and_then(Bank::beyond);
     let is_one = numbers.len() == 1;
     let of = |numbers: &Numbers| {
         let read = numbers
-            .returns(said, &beside)
-            .and_then(|returns| excess::whole(numbers.name, returns, bank.as_ref(), said));
+            .returns(choices, &beside)
+            .and_then(|returns| excess::whole(numbers.name, returns, bank.as_ref(), choices));
         read.map_err(|stop| if is_one { stop } else { stop.about(numbers.name) })
     };
     let returns = numbers.iter().map(of).collect::<Result<Vec<Returns>, Stop>>();
     let (mut order, returns) = both(order, returns)?;
     if !kept.holes.is_empty() {
         let are_prices = returns.iter().all(|returns| returns.kind == Kind::Price);
-        kept.check_holes(&chosen, are_prices && order.frequency == Some(Frequency::Daily), said)?;
-        order = ordered(dates, sheet.times(), &kept.rows, said)?;
+        kept.check_holes(&chosen, are_prices && order.frequency == Some(Frequency::Daily), choices)?;
+        order = ordered(dates, sheet.times(), &kept.rows, choices)?;
     }
     let count = returns[0].simple.len();
-    alike(&chosen, &returns, said)?;
+    alike(&chosen, &returns, choices)?;
     if count < FEWEST {
         return Err(Stop::refused("Two prices make one return: at least two returns are needed."));
     }
-    let used = said.latest.unwrap_or(count).clamp(FEWEST, count);
+    let used = choices.latest.unwrap_or(count).clamp(FEWEST, count);
     let mut remarks = Vec::new();
-    let rate = bank.as_ref().map(|bank| bank.rates(used, returns[0].unit, said)).transpose()?.and_then(|found| {
+    let rate = bank.as_ref().map(|bank| bank.rates(used, returns[0].unit, choices)).transpose()?.and_then(|found| {
         let name = bank.as_ref().map_or("", |bank| bank.column.name.as_str());
         found.map_err(|reason| remarks.push(format!("Column {name} is not used: {reason}."))).ok()
     });
-    if let Some(name) = bank.as_ref().map(|bank| &bank.column.name).filter(|_| said.excess == Some(true)) {
+    if let Some(name) = bank.as_ref().map(|bank| &bank.column.name).filter(|_| choices.excess == Some(true)) {
         remarks.push(format!("What the bank paid, in column {name}, is added to returns beyond it."));
     }
     if order.is_turned && order.dates.is_some() {
@@ -159,7 +159,7 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
 }
 
 /// Requires columns that are read together to be of one kind and in one unit.
-fn alike(chosen: &[&Column], returns: &[Returns], said: &Choices) -> Result<(), Stop> {
+fn alike(chosen: &[&Column], returns: &[Returns], choices: &Choices) -> Result<(), Stop> {
     let first = &returns[0];
     let other = |differs: &dyn Fn(&Returns) -> bool| returns.iter().position(differs);
     if let Some(index) = other(&|other| other.simple.len() != first.simple.len()) {
@@ -172,7 +172,7 @@ fn alike(chosen: &[&Column], returns: &[Returns], said: &Choices) -> Result<(), 
             what(index)
         )));
     }
-    let odd = other(&|other| other.unit != first.unit).filter(|_| said.unit.is_none());
+    let odd = other(&|other| other.unit != first.unit).filter(|_| choices.unit.is_none());
     let Some(odd) = odd else { return Ok(()) };
     let option = |label: &str, unit| (label.to_owned(), Choices { unit: Some(unit), ..Choices::default() });
     let options = vec![option("Percent, all of them", Unit::Percent), option("Fractions, all of them", Unit::Fraction)];
@@ -181,7 +181,7 @@ fn alike(chosen: &[&Column], returns: &[Returns], said: &Choices) -> Result<(), 
         "Column {} looks like percent and column {} like fractions. What are they all?",
         chosen[percent].name, chosen[fractions].name
     );
-    Err(Stop::asked("unit", question, options))
+    Err(Stop::question("unit", question, options))
 }
 
 fn numbers<'a>(column: &'a Column, cells: Vec<&'a Cell<'a>>, mark: Mark) -> Result<Numbers<'a>, Stop> {

@@ -5,7 +5,7 @@ use serde::{Serialize, Serializer};
 use utoipa::ToSchema;
 
 use super::choices::{Kind, Unit};
-use super::dates::told;
+use super::dates::in_words;
 use super::kind::{Returns, called};
 use super::moments::moments;
 use super::sheet::ColumnFound;
@@ -169,7 +169,7 @@ impl Record {
         let Series { kind, unit, .. } = self.series[0];
         let alike = self.series.iter().all(|other| (other.kind, other.unit) == (kind, unit));
         let what = if alike { self.series[0].what() } else { "returns" };
-        let day = |date| told(date, self.frequency);
+        let day = |date| in_words(date, self.frequency);
         let span = span.map_or(String::new(), |(first, last)| format!(", {} to {}", day(first), day(last)));
         let names: Vec<&str> = self.series.iter().map(|series| series.column.as_str()).collect();
         let place = match names[..] {

@@ -112,8 +112,8 @@ pub fn plain(name: &str) -> String {
 impl<'a> Sheet<'a> {
     /// # Errors
     /// Lines have different lengths, there are no numbers, or it is unclear whether the numbers form columns.
-    pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
-        let CellRows { rows, remarks: lines } = CellRows::of(text, said)?;
+    pub fn of(text: &'a str, choices: &Choices) -> Result<Self, Stop> {
+        let CellRows { rows, remarks: lines } = CellRows::of(text, choices)?;
         let Table { heading, rows, mut remarks } = Table::of(rows)?;
         if lines > 0 {
             remarks.push(format!("{} of remarks passed over.", counted(lines, "line")));
@@ -123,12 +123,12 @@ impl<'a> Sheet<'a> {
         let is_plain =
             heading.is_none() && rows.iter().flatten().all(|cell| cell.is_missing() || is_number(&cell.text));
         let is_run = heading.is_none() && rows.len() == 1;
-        if is_narrow || is_run || (is_plain && (widths.len() > 1 || said.one_record == Some(true))) {
+        if is_narrow || is_run || (is_plain && (widths.len() > 1 || choices.one_record == Some(true))) {
             return run(rows, heading).map(|column| Sheet { columns: vec![column], remarks });
         }
         let columns = columns(rows, heading)?;
         let is_open =
-            is_plain && said.one_record.is_none() && columns.iter().all(|column| column.holds == Holds::Values);
+            is_plain && choices.one_record.is_none() && columns.iter().all(|column| column.holds == Holds::Values);
         if is_open { Err(layout(&columns)) } else { Ok(Sheet { columns, remarks }) }
     }
 
@@ -152,21 +152,21 @@ impl<'a> Sheet<'a> {
     }
 
     /// Returns the columns to read: the chosen ones, the one with the best heading, or the only one.
-    pub fn chosen(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
-        let chosen = self.meant(said)?;
+    pub fn chosen(&self, choices: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
+        let chosen = self.meant(choices)?;
         match chosen.iter().find_map(|column| Some((column, aside(&column.name)?))) {
             Some((column, reason)) => Err(set_aside(&column.name, reason)),
             None => Ok(chosen),
         }
     }
 
-    fn meant(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
-        if said.columns.len() > self.columns.len() {
-            let (named, there) = (said.columns.len(), self.columns.len());
+    fn meant(&self, choices: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
+        if choices.columns.len() > self.columns.len() {
+            let (named, there) = (choices.columns.len(), self.columns.len());
             return Err(Stop::refused(format!("{named} columns are named: there are {there}.")));
         }
-        if !said.columns.is_empty() {
-            let named = said.columns.iter().map(|name| self.named(name)).collect::<Result<Vec<_>, Stop>>()?;
+        if !choices.columns.is_empty() {
+            let named = choices.columns.iter().map(|name| self.named(name)).collect::<Result<Vec<_>, Stop>>()?;
             let again = |index: usize| named[..index].iter().any(|before| std::ptr::eq(*before, named[index]));
             return match (0..named.len()).find(|&index| again(index)) {
                 Some(index) => Err(Stop::refused(format!("Column {} is named twice.", named[index].name))),
@@ -311,7 +311,7 @@ fn ask(values: &[&Column]) -> Stop {
         (label, Choices { columns: vec![column.name.clone()], ..Choices::default() })
     };
     let options = values.iter().take(OFFERED).map(option).collect();
-    Stop::asked("columns", "Which column holds the returns or prices?", options)
+    Stop::question("columns", "Which column holds the returns or prices?", options)
 }
 
 fn layout(columns: &[Column]) -> Stop {
@@ -320,5 +320,5 @@ fn layout(columns: &[Column]) -> Stop {
     let options =
         vec![option("One record, read line by line".into(), true), option(format!("{} columns", columns.len()), false)];
     let question = format!("Are these {count} numbers of one record, or columns of different things?");
-    Stop::asked("one_record", question, options)
+    Stop::question("one_record", question, options)
 }

@@ -94,7 +94,7 @@ fn dated<'a>(mut rows: Vec<TableRow<'a>>, block: &DatedBlock) -> Result<Table<'a
     let after = rows.split_off(block.end);
     if let Some(first) = after.first() {
         block.check_end(first, &after)?;
-        remarks.push(told_after(&after));
+        remarks.push(remark_after(&after));
     }
     let start =
         block.start - rows[..block.start].iter().rev().take_while(|row| block.is_misdated(row, numbers(row))).count();
@@ -186,7 +186,7 @@ fn left_out(rows: &[TableRow], place: &str) -> String {
 
 /// Describes the lines after the table. They are a second table if two rows have a number or a date, and a number next
 /// to it.
-fn told_after(after: &[TableRow]) -> String {
+fn remark_after(after: &[TableRow]) -> String {
     let is_row = |row: &&TableRow| {
         let starts = row.first().is_some_and(|cell| has_digit(&cell.text) && !is_total(&cell.text));
         starts && row[1..].iter().any(|cell| is_number(&cell.text))

@@ -45,11 +45,11 @@ pub fn names_percent(name: &str) -> bool {
 
 impl Numbers<'_> {
     /// Decides the unit of gains since a start: in percent they reach larger numbers than fractions do.
-    pub fn cumulated_unit(&self, signs: bool, said: &Choices) -> Result<Unit, Stop> {
+    pub fn cumulated_unit(&self, signs: bool, choices: &Choices) -> Result<Unit, Stop> {
         if signs || names_percent(self.name) {
-            return Ok(said.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
+            return Ok(choices.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
         }
-        match said.unit {
+        match choices.unit {
             Some(unit) => Ok(unit),
             None if middle(&self.values).abs() > SURELY_CUMULATED_PERCENT => Ok(Unit::Percent),
             None => Err(self.ask_unit("")),
@@ -58,11 +58,11 @@ impl Numbers<'_> {
 
     /// Decides the unit as chosen or as written, or else by how much the numbers vary and average in a year. The bulk
     /// of the numbers decides for fractions; percent must also hold for all of them, so that no odd number decides it.
-    pub fn unit(&self, signs: bool, said: &Choices, beside: &RecordContext) -> Result<Unit, Stop> {
+    pub fn unit(&self, signs: bool, choices: &Choices, beside: &RecordContext) -> Result<Unit, Stop> {
         if signs || names_percent(self.name) {
-            return Ok(said.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
+            return Ok(choices.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
         }
-        if let Some(unit) = said.unit {
+        if let Some(unit) = choices.unit {
             return Ok(unit);
         }
         let bulk = bulk(&self.values);
@@ -93,7 +93,7 @@ impl Numbers<'_> {
             (format!("Fractions: {text} is {}", percent(value)), Choices::from(Unit::Fraction)),
             (format!("Percent: {text} is {}", percent(value / 100.0)), Choices::from(Unit::Percent)),
         ];
-        Stop::asked("unit", format!("Are the returns fractions or percent? What is {text}?{doubt}"), options)
+        Stop::question("unit", format!("Are the returns fractions or percent? What is {text}?{doubt}"), options)
     }
 
     /// Returns a sentence why numbers that vary little may be a calm record in percent, or `None` if they look like
@@ -104,22 +104,22 @@ impl Numbers<'_> {
         let deviation_per_year = moments(bulk).1 * periods.sqrt();
         let (all_mean, all_deviation) = moments(&self.values);
         let is_period = beside.noun();
-        let told = |what: String| {
+        let doubt = |what: String| {
             let of = if is_dated { String::new() } else { format!(", if each is of a {is_period}") };
             Some(format!(" As fractions {what}{of}."))
         };
         if self.earns_too_much(bulk, periods) {
-            return told(format!("they average {} a year", percent_a_year(all_mean, periods)));
+            return doubt(format!("they average {} a year", percent_a_year(all_mean, periods)));
         }
         if is_dated && deviation_per_year > LARGE_DEVIATION {
-            return told(format!("their deviation is {} a year", percent(all_deviation * periods.sqrt())));
+            return doubt(format!("their deviation is {} a year", percent(all_deviation * periods.sqrt())));
         }
         if deviation_per_year / 100.0 < SMALL_DEVIATION {
             return None;
         }
         match bank {
-            Some(rate) => told(format!("the bank pays {} a year", percent(rate))),
-            None if is_coarse(&self.cells) => told("all of them are whole percents".to_owned()),
+            Some(rate) => doubt(format!("the bank pays {} a year", percent(rate))),
+            None if is_coarse(&self.cells) => doubt("all of them are whole percents".to_owned()),
             None => None,
         }
     }

@@ -156,8 +156,8 @@ impl Store {
         let mut page: Vec<AuditRow> = self.list("reading the audit", page, decode).await?;
         if let (Some(object), None) = (&filter.object, after) {
             let observed = self.observed(object, limit).await?;
-            let asked = |row: &AuditRow| filter.tenant.as_ref().is_none_or(|tenant| row.tenant == *tenant);
-            page.extend(observed.into_iter().filter(asked));
+            let is_wanted = |row: &AuditRow| filter.tenant.as_ref().is_none_or(|tenant| row.tenant == *tenant);
+            page.extend(observed.into_iter().filter(is_wanted));
             page.sort_by_key(|row| std::cmp::Reverse(row.at_ms));
         }
         Ok(page)

@@ -94,8 +94,8 @@ fn begin(partial: &Path) -> Result<File, StoreError> {
 pub async fn restore(from: &Path, dir: &Path, damage: Damage, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     let held = lock(dir)?;
     let (database, partial) = (dir.join(DATABASE), dir.join(DATABASE).with_extension("partial"));
-    for taken in [database.clone(), beside(&database, "-wal"), beside(&database, "-journal")] {
-        refuse_existing(&taken)?;
+    for file in [database.clone(), beside(&database, "-wal"), beside(&database, "-journal")] {
+        refuse_existing(&file)?;
     }
     // Files left by an interrupted restore; the lock guarantees that no restore is using them.
     let leftovers = ["", "-wal", "-shm", "-journal"].map(|end| beside(&partial, end));

@@ -311,7 +311,7 @@ impl EntryRow {
     }
 
     /// Verifies an observation's seal and returns it as an audit row.
-    pub(super) fn told(row: &StoreRow) -> Result<AuditRow, Failure> {
+    pub(super) fn audit_row(row: &StoreRow) -> Result<AuditRow, Failure> {
         let observation = EntryRow::from_row(row)?;
         Ok(AuditRow {
             sequence: 0,

@@ -61,11 +61,11 @@ impl Store {
 
     /// Returns whether a user asked for the job to stop; false if there is no such job.
     pub async fn is_to_stop(&self, job: &str) -> Result<bool, StoreError> {
-        let asked = query("SELECT cancel_requested FROM jobs WHERE job = $1").bind(job);
-        let asked = self.probe("asking whether a job is to stop", asked, |rows| {
+        let find = query("SELECT cancel_requested FROM jobs WHERE job = $1").bind(job);
+        let requested = self.probe("checking whether a job must stop", find, |rows| {
             rows.first().map(|row| row.get("cancel_requested")).transpose()
         });
-        Ok(asked.await?.unwrap_or(false))
+        Ok(requested.await?.unwrap_or(false))
     }
 
     /// Returns at most `limit` jobs of a tenant, newest first; `after` is the `sequence` of the last row of the page

@@ -159,7 +159,7 @@ impl Store {
                 let of = Worded { tenant: &tenant, kind, sequence };
                 let (labels, grown) = put(connection, of, &object, &change).await?;
                 quotas::take(connection, &tenant, grown, quotas).await?;
-                audit_chain::record(connection, (quotas, &actor), &tenant, deed, &object, &told(&change)).await?;
+                audit_chain::record(connection, (quotas, &actor), &tenant, deed, &object, &outcome(&change)).await?;
                 Ok(Some(labels))
             }
             .boxed()
@@ -176,7 +176,7 @@ async fn stored(connection: &mut StoreConnection<'_>, tenant: &Tenant, object: &
 const FIND: &str = "SELECT name, notes, tags FROM labels WHERE tenant = $1 AND object = $2";
 
 /// Returns which labels were changed, for the audit.
-fn told(change: &Relabel) -> String {
+fn outcome(change: &Relabel) -> String {
     let given = [("name", change.name.is_some()), ("notes", change.notes.is_some()), ("tags", change.tags.is_some())];
     let named: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
     format!("set {}", named.join(", "))

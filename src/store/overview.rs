@@ -131,15 +131,15 @@ pub struct SessionList {
 
 impl Store {
     /// Lists a page of the sessions of a tenant.
-    pub async fn sessions(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<SessionList, StoreError> {
+    pub async fn sessions(&self, tenant: &Tenant, query: &SessionQuery) -> Result<SessionList, StoreError> {
         let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last: None };
-        let look_at = match self.rarest_of(tenant, asked).await? {
+        let look_at = match self.rarest_of(tenant, query).await? {
             None => vec![Among::All],
-            Some(rarest) if asked.order == SessionOrder::Created => rarest.windows(),
+            Some(rarest) if query.order == SessionOrder::Created => rarest.windows(),
             Some(rarest) => vec![rarest.all()],
         };
         for among in look_at {
-            list = self.list("listing sessions", asked.page(tenant, &among), |rows| asked.listed(rows)).await?;
+            list = self.list("listing sessions", query.page(tenant, &among), |rows| query.listed(rows)).await?;
             if list.last.is_some() {
                 break;
             }
@@ -147,22 +147,22 @@ impl Store {
         Ok(list)
     }
 
-    async fn rarest_of(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<Option<Rarest>, StoreError> {
+    async fn rarest_of(&self, tenant: &Tenant, query: &SessionQuery) -> Result<Option<Rarest>, StoreError> {
         let word = |given: &Option<String>| given.clone().unwrap_or_default();
-        self.rarest(tenant, &word(&asked.search), &word(&asked.tag)).await
+        self.rarest(tenant, &word(&query.search), &word(&query.tag)).await
     }
 
     /// Counts the sessions of a tenant that match.
-    pub async fn total(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<usize, StoreError> {
+    pub async fn total(&self, tenant: &Tenant, query: &SessionQuery) -> Result<usize, StoreError> {
         let decode = |rows: &[StoreRow]| rows.first().map_or(Ok(0), |row| from_sql(row.get("total")?));
-        let among = self.rarest_of(tenant, asked).await?.map_or(Among::All, Rarest::all);
-        self.list("counting sessions", asked.count(tenant, &among), decode).await
+        let among = self.rarest_of(tenant, query).await?.map_or(Among::All, Rarest::all);
+        self.list("counting sessions", query.count(tenant, &among), decode).await
     }
 
     /// Counts the matching sessions that need attention; ignores the filter by state.
-    pub async fn care(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<CareCounts, StoreError> {
-        let among = self.rarest_of(tenant, asked).await?.map_or(Among::All, Rarest::all);
-        self.list("counting sessions that need care", asked.caring(tenant, &among), CareCounts::from_rows).await
+    pub async fn care(&self, tenant: &Tenant, query: &SessionQuery) -> Result<CareCounts, StoreError> {
+        let among = self.rarest_of(tenant, query).await?.map_or(Among::All, Rarest::all);
+        self.list("counting sessions that need care", query.caring(tenant, &among), CareCounts::from_rows).await
     }
 }
 

@@ -235,7 +235,7 @@ async fn delete(
     let bytes = Usage::of_bytes(ROW_BYTES + row.get::<i64>("bytes")?);
     let of = Worded { tenant: &tenant, kind: Labelled::Policy, sequence: disowned.get("sequence")? };
     let bytes = bytes.and(labels::remove(connection, of, &id).await?);
-    quotas::change(connection, &tenant, bytes.given_back()).await?;
+    quotas::change(connection, &tenant, bytes.negated()).await?;
     audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, AuditAction::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)
 }

@@ -78,7 +78,8 @@ impl Usage {
         Usage { sessions: self.sessions + other.sessions, bytes: self.bytes.saturating_add(other.bytes) }
     }
 
-    pub(super) fn given_back(self) -> Self {
+    /// Returns the change of the totals that frees this usage.
+    pub(super) fn negated(self) -> Self {
         Usage { sessions: -self.sessions, bytes: -self.bytes }
     }
 }

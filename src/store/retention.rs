@@ -107,5 +107,5 @@ async fn remove(connection: &mut StoreConnection<'_>, row: &JobRow) -> Result<()
     let report = connection.row(report.bind(job)).await?;
     let bytes: i64 = report.map_or(Ok(0), |row| row.get("bytes"))?;
     connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(job)).await?;
-    quotas::change(connection, &row.tenant, Usage::of_bytes(ROW_BYTES + bytes).given_back()).await.map(drop)
+    quotas::change(connection, &row.tenant, Usage::of_bytes(ROW_BYTES + bytes).negated()).await.map(drop)
 }

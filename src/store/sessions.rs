@@ -121,7 +121,7 @@ impl Store {
             "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
              WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
         );
-        let decode = |rows: &[StoreRow]| rows.iter().map(EntryRow::told).collect();
+        let decode = |rows: &[StoreRow]| rows.iter().map(EntryRow::audit_row).collect();
         self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
     }
 
@@ -251,7 +251,7 @@ async fn delete(
     let usage = Usage::of_session(row.get("start_bytes")?, row.get("room")?, row.get("assets")?);
     let of = Worded { tenant: &tenant, kind: Labelled::Session, sequence: row.get("sequence")? };
     let usage = usage.and(labels::remove(connection, of, &session).await?);
-    quotas::change(connection, &tenant, usage.given_back()).await?;
+    quotas::change(connection, &tenant, usage.negated()).await?;
     let outcome = format!("deleted, with {entries} entries");
     audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, AuditAction::DeleteSession, &session, &outcome)
         .await?;

@@ -69,8 +69,8 @@ mod tests {
         for refused in ["mysql://u:secret@h/d", "secret", "postgres://u:secret@h:secret/d"] {
             let error = refused.parse::<PostgresUrl>().unwrap_err();
             let causes = std::iter::successors(std::error::Error::source(&error), |cause| cause.source());
-            let said = causes.fold(format!("{error} {error:?}"), |said, cause| format!("{said} {cause}"));
-            assert!(!said.contains("secret"), "{said}");
+            let text = causes.fold(format!("{error} {error:?}"), |text, cause| format!("{text} {cause}"));
+            assert!(!text.contains("secret"), "{text}");
         }
     }
 
