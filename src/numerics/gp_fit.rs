@@ -57,7 +57,7 @@ pub enum FitError {
     #[error(transparent)]
     Singular(#[from] Singular),
     /// The stop signal was raised.
-    #[error("the search was asked to stop")]
+    #[error("the search was stopped")]
     Stopped,
 }
 

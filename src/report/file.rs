@@ -21,7 +21,7 @@ const BESIDE: &str = " from \"./";
 /// A report that cannot be written.
 #[derive(Debug, Error)]
 pub enum FileError {
-    #[error("there is no file {name:?} to draw the report with")]
+    #[error("the file {name:?}, which draws the report, is missing")]
     Missing { name: String },
     #[error("writing the data of the report")]
     Json(#[from] serde_json::Error),
@@ -163,6 +163,6 @@ mod tests {
     #[test]
     fn a_module_that_is_not_there_is_named() {
         let error = html(files, "gone.js", "", &0, &[]).unwrap_err();
-        assert_eq!(error.to_string(), "there is no file \"gone.js\" to draw the report with");
+        assert_eq!(error.to_string(), "the file \"gone.js\", which draws the report, is missing");
     }
 }
