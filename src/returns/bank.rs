@@ -50,7 +50,7 @@ impl Bank<'_> {
         let cells = &self.cells[self.cells.len() - used..];
         let is_percent = self.says_percent() || unit == Some(Unit::Percent);
         let by_hundred = match choices.rate_unit {
-            Some(RateUnit::Unused) => return Ok(Err("it is left out as was said".to_owned())),
+            Some(RateUnit::Unused) => return Ok(Err("your choices leave it out".to_owned())),
             Some(rate_unit) => rate_unit == RateUnit::Percent,
             None if is_percent && self.middle(cells) * self.periods / 100.0 > LARGEST_RATE => {
                 return Err(self.ask(cells));
@@ -100,9 +100,9 @@ impl Bank<'_> {
         if cells.iter().all(fits) {
             options.push(option("Fractions", 1.0, RateUnit::Fraction));
         }
-        options.push(("Neither: leave the column out".to_owned(), unused));
+        options.push(("Neither: ignore the column".to_owned(), unused));
         let question =
-            format!("What is {text} in column {}, which says what the bank pays a period?", self.column.name);
+            format!("What is {text} in column {}, which holds the bank rate of each period?", self.column.name);
         Stop::question("rate_unit", question, options)
     }
 }

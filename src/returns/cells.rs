@@ -24,7 +24,7 @@ const LONGEST_MISSING: usize = 4;
 /// The most letters of a value that are shown.
 const SHOWN: usize = 60;
 pub const SPREADSHEET: &str = "This is a spreadsheet file. Save it as CSV, or copy the column and paste it.";
-pub const NO_TEXT: &str = "This is no text in UTF-8, UTF-16 or Windows-1252. Save it as CSV in UTF-8.";
+pub const NO_TEXT: &str = "This is not text in UTF-8, UTF-16 or Windows-1252. Save it as CSV in UTF-8.";
 
 /// The text between two separators.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,7 +133,7 @@ fn check(text: &str, end: char) -> Result<(), Stop> {
         (text.chars().filter(|letter| letter.is_whitespace() || ",;|".contains(*letter)).count(), MOST_CELLS, "cells"),
     ];
     if let Some((found, most, what)) = bounds.into_iter().find(|(found, most, _)| found > most) {
-        return Err(Stop::refused(format!("The text has {found} {what}: must have at most {most}.")));
+        return Err(Stop::refused(format!("The text has {found} {what}: it must have at most {most}.")));
     }
     if text.starts_with("PK\u{3}\u{4}") {
         return Err(Stop::refused(SPREADSHEET));
@@ -206,8 +206,8 @@ fn comma(lines: &[TextLine]) -> Result<char, Stop> {
     let (word, parted) = (&word.text, word.text.replace(COMMA, " and "));
     let parts = |parts| Choices { comma_parts: Some(parts), ..Choices::default() };
     let options =
-        vec![(format!("One number: {word}"), parts(false)), (format!("Numbers of their own: {parted}"), parts(true))];
-    Err(Stop::question("comma_parts", format!("Is {word} one number, or are {parted} numbers of their own?"), options))
+        vec![(format!("One number: {word}"), parts(false)), (format!("Separate numbers: {parted}"), parts(true))];
+    Err(Stop::question("comma_parts", format!("Is {word} one number, or are {parted} separate numbers?"), options))
 }
 
 /// Counts the cells that would be neither numbers nor dates if lines were split by `separator`; a heading is not

@@ -24,15 +24,16 @@ pub fn whole(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choice
 fn ask(name: &str, bank: Option<&Bank>) -> Stop {
     let excess = |excess| Choices { excess: Some(excess), ..Choices::default() };
     let add = bank.map(|bank| (format!("Yes: add column {}", bank.column.name), excess(true)));
-    let options = add.into_iter().chain([("No: they are whole returns".to_owned(), excess(false))]).collect();
+    let options =
+        add.into_iter().chain([("No: the returns already include the bank rate".to_owned(), excess(false))]).collect();
     let question = match bank {
         Some(bank) => format!(
-            "Column {name} is headed as returns beyond the bank, which column {} has. Add the bank\u{2019}s?",
+            "Column {name} is headed as returns in excess of the bank rate, which is in column {}. Add the bank rate?",
             bank.column.name
         ),
         None => format!(
-            "Column {name} is headed as returns beyond the bank, and no column such as rf says what that paid, to be added. Are they \
-             whole returns all the same?"
+            "Column {name} is headed as returns in excess of the bank rate, but no column such as rf holds that rate. Must the \
+             bank rate be added?"
         ),
     };
     Stop::question("excess", question, options)
@@ -41,7 +42,7 @@ fn ask(name: &str, bank: Option<&Bank>) -> Stop {
 fn added(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -> Result<Returns, Stop> {
     let Some(bank) = bank else {
         return Err(Stop::refused(format!(
-            "Column {name} holds returns beyond the bank, and no column such as rf says what that paid: add one."
+            "Column {name} holds returns in excess of the bank rate, but no column such as rf holds that rate. Add one."
         )));
     };
     let paid = bank.rates(returns.simple.len(), returns.unit, choices)?;
@@ -49,7 +50,7 @@ fn added(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -
     let simple: Vec<f64> = returns.simple.iter().zip(&paid.rates).map(|(beyond, rate)| beyond + rate).collect();
     if let Some(index) = simple.iter().position(|simple| *simple <= -1.0) {
         let cell = bank.cells[bank.cells.len() - simple.len() + index].called(&bank.column.name);
-        return Err(Stop::refused(format!("{cell}: with it {name} would lose all and more.")));
+        return Err(Stop::refused(format!("{cell}: adding it would give {name} a loss of 100 % or more.")));
     }
     let logarithmic = simple.iter().map(|simple| simple.ln_1p()).collect();
     Ok(Returns { simple, logarithmic, ..returns })

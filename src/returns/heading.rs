@@ -212,11 +212,11 @@ pub fn aside(name: &str) -> Option<&'static str> {
     let core = core(name);
     let is = |headings: &[&str]| headings.contains(&core.as_str());
     if is(&COUNTS) || words(name).iter().any(|word| VOLUMES.contains(&word.as_str())) {
-        Some("counts what was traded")
+        Some("holds the traded volume")
     } else if is(&OTHER_PRICES) {
-        Some("is no return and not the last price of its period")
+        Some("holds neither returns nor the last price of each period")
     } else if is(&FACTORS) {
-        Some("is what one portfolio gained over another")
+        Some("holds the gain of one portfolio over another")
     } else {
         None
     }

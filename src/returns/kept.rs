@@ -29,7 +29,7 @@ impl KeptRows {
         let mut remarks = Vec::new();
         let blank = chosen[0].cells.len() - (last + 1 - first);
         if blank > 0 {
-            remarks.push(format!("{} before or after the numbers left out.", counted(blank, "blank row")));
+            remarks.push(format!("Left out {} before or after the numbers.", counted(blank, "blank row")));
         }
         let ends = |at: usize, of: fn(&(usize, usize)) -> usize| spans.iter().position(|span| of(span) == at);
         let (short, newest) = if is_newest_first {
@@ -38,8 +38,8 @@ impl KeptRows {
             (ends(earliest_last, |span| span.1).filter(|_| earliest_last < last), last)
         };
         if let Some(short) = short {
-            let rule = "must be a number, as the other columns have one in the newest row: leave out the column, or the rows \
-                        that are newer than its last number";
+            let rule = "must be a number, because the other columns have one in the newest row; leave out the column, or the \
+                        rows that are newer than its last number";
             return Err(chosen[short].cells[newest].refused(&chosen[short].name, rule));
         }
         let (from, to) = if is_newest_first { (first, earliest_last) } else { (latest_first, last) };
@@ -65,11 +65,11 @@ impl KeptRows {
         let (count, all) = (self.holes.len(), self.rows.len() + self.holes.len());
         if are_daily_prices || choices.gaps == Some(true) {
             let (rows, line) = (counted(count, "row"), odd.cells[hole].line());
-            self.remarks.push(format!("{rows} without a number passed over, the first in line {line}."));
+            self.remarks.push(format!("Skipped {rows} without a number, the first in line {line}."));
             return Ok(());
         }
         let question = format!(
-            "{}: there is no number in {count} of {all} rows. Are they left out, though each may be a period that is missing?",
+            "{}: there is no number in {count} of {all} rows. Leave such rows out, although each may be a missing period?",
             odd.cells[hole].called(&odd.name)
         );
         let choices = Choices { gaps: Some(true), ..Choices::default() };

@@ -24,7 +24,7 @@ const LARGEST_STEP: f64 = 0.3;
 /// The service's bound on the size of a log-return.
 const LARGEST_LOG_RETURN: f64 = 5.0;
 
-const SINCE_START: &str = "Gains since the start, cumulated";
+const SINCE_START: &str = "Cumulative gains since the start";
 
 /// Numbers of one column, oldest first, with their cells.
 pub struct Numbers<'a> {
@@ -90,9 +90,9 @@ impl Numbers<'_> {
     fn percent_signs(&self) -> Result<bool, Stop> {
         let signs = self.cells.first().is_some_and(|cell| has_percent(&cell.text));
         let rule = if signs {
-            "lacks a percent sign, unlike the cells before"
+            "must have a percent sign, like the cells before it"
         } else {
-            "has a percent sign, unlike the cells before"
+            "must have no percent sign, like the cells before it"
         };
         let odd = self.cells.iter().find(|cell| has_percent(&cell.text) != signs);
         odd.map_or(Ok(signs), |odd| Err(odd.refused(self.name, rule)))
@@ -103,7 +103,7 @@ impl Numbers<'_> {
         let mut marked = self.cells.iter().filter_map(|cell| Some((cell, money(&cell.text)?)));
         let Some((_, first)) = marked.next() else { return Ok(false) };
         match marked.find(|(_, mark)| *mark != first) {
-            Some((cell, _)) => Err(cell.refused(self.name, &format!("must be in {first}, as the cells before"))),
+            Some((cell, _)) => Err(cell.refused(self.name, &format!("must be in {first}, like the cells before it"))),
             None => Ok(true),
         }
     }
@@ -125,9 +125,7 @@ impl Numbers<'_> {
             return if is_slow(&self.values) { Err(self.ask_slow()) } else { Ok(Kind::Simple) };
         }
         if is_around_one(&bulk(&self.values)) && !heading.is_level {
-            return Err(
-                self.ask_kind("Are these prices, what 1 becomes in a period, or returns that are all above zero?")
-            );
+            return Err(self.ask_kind("Are these prices, growth factors, or returns that are all above zero?"));
         }
         // An index of total return holds no returns, even if its heading says so.
         let as_returns = middle(&self.values) / 100.0 <= LARGEST_MEAN;
@@ -165,7 +163,7 @@ impl Numbers<'_> {
         let option = |label: &str, kind| (label.to_owned(), Choices::from(kind));
         let mut options = vec![option("Prices", Kind::Price), option("Returns", Kind::Simple)];
         if is_around_one(&bulk(&self.values)) {
-            options.insert(1, option("What 1 becomes in a period: 1.01 is a return of 1 %", Kind::Gross));
+            options.insert(1, option("Growth factors: 1.01 is a return of 1 %", Kind::Gross));
         }
         if is_slow(&self.values) {
             options.insert(1, option(SINCE_START, Kind::Cumulated));
@@ -174,18 +172,18 @@ impl Numbers<'_> {
     }
 
     fn ask_slow(&self) -> Stop {
-        let question = "Each number is near the one before, as gains cumulated since the start are and returns of a period are \
-                        not. What are they?";
+        let question = "Each number is near the one before. That is usual for cumulative gains since the start, but not for \
+                        returns of one period. What are these numbers?";
         self.ask_gains(question, GainSpan::SinceStart)
     }
 
     fn ask_span(&self, span: GainSpan) -> Stop {
         let question = match span {
             GainSpan::SinceStart => {
-                format!("Column {} is headed as gains cumulated since the start. What are its numbers?", self.name)
+                format!("Column {} is headed as cumulative gains since the start. What are its numbers?", self.name)
             }
             GainSpan::Other => format!(
-                "Column {} is headed as gains over another span than that of its row. Are they returns of one period each?",
+                "Column {} is headed as gains over a span other than that of its row. Are they returns of one period each?",
                 self.name
             ),
         };
@@ -210,22 +208,26 @@ impl Numbers<'_> {
         let hundred = if unit == Some(Unit::Percent) { 100.0 } else { 1.0 };
         let simple: Vec<f64> = match kind {
             Kind::Price => {
-                self.refuse(&self.values, |value| value <= 0.0, "must be above 0, as a price is")?;
+                self.refuse(&self.values, |value| value <= 0.0, "must be above 0; remove the row or give a price")?;
                 self.values.windows(2).map(|pair| pair[1] / pair[0] - 1.0).collect()
             }
             Kind::Cumulated => {
                 let level = |value: f64| 1.0 + value / hundred;
-                let rule = format!("must be above -{hundred}: it would be a loss of all and more");
+                let rule = format!("must be above -{hundred}; this is a loss of 100 % or more");
                 self.refuse(&self.values, |value| level(value) <= 0.0, &rule)?;
                 self.values.windows(2).map(|pair| level(pair[1]) / level(pair[0]) - 1.0).collect()
             }
             Kind::Gross => {
-                self.refuse(&self.values, |value| value <= 0.0, "must be above 0, as what 1 becomes is")?;
+                self.refuse(
+                    &self.values,
+                    |value| value <= 0.0,
+                    "must be above 0; give a growth factor, such as 1.01 for a return of 1 %",
+                )?;
                 self.values.iter().map(|value| value - 1.0).collect()
             }
             Kind::Log => self.values.iter().map(|value| (value / hundred).exp_m1()).collect(),
             Kind::Simple => {
-                let rule = format!("must be above -{hundred}: it would be a loss of all and more");
+                let rule = format!("must be above -{hundred}; this is a loss of 100 % or more");
                 self.refuse(&self.values, |value| value / hundred <= -1.0, &rule)?;
                 self.values.iter().map(|value| value / hundred).collect()
             }
@@ -235,7 +237,7 @@ impl Numbers<'_> {
             Kind::Price => self.values.windows(2).map(|pair| (pair[1] / pair[0]).ln()).collect(),
             _ => simple.iter().map(|value| value.ln_1p()).collect(),
         };
-        let rule = format!("would be a log-return beyond {LARGEST_LOG_RETURN}");
+        let rule = format!("must give a log-return between -{LARGEST_LOG_RETURN} and {LARGEST_LOG_RETURN}");
         self.refuse(&logarithmic, |value| value.abs() > LARGEST_LOG_RETURN, &rule)?;
         Ok(Returns { kind, unit, simple, logarithmic })
     }
@@ -255,10 +257,10 @@ impl Numbers<'_> {
         // Log-returns are not checked for jumps: files that hold logarithms record crashes as they were.
         let jump = jump(logarithmic).filter(|_| kind != Kind::Log).map(|index| {
             let (cell, gain) = (self.cells[from + index].called(self.name), percent(simple[index]));
-            format!("{cell}: a return of {gain} is far from all others, as after a split or a slip.")
+            format!("{cell}: a return of {gain} is far from all others, as after a split or a typing error.")
         });
         let moments = unusual_moments(simple, beside.periods).map(|moments| {
-            let of = if beside.is_dated { String::new() } else { format!(", if each is of a {}", beside.noun()) };
+            let of = if beside.is_dated { String::new() } else { format!(", if each covers a {}", beside.noun()) };
             format!("Read as {}, the {} numbers give {moments}{of}.", called(kind, unit), self.values.len())
         });
         let found: Vec<String> = jump.into_iter().chain(moments).collect();
@@ -271,7 +273,7 @@ impl Numbers<'_> {
             (_, Some(Unit::Fraction)) => ("No, they are in percent", Choices::from(Unit::Percent)),
             _ => ("No, they are prices", Choices::from(Kind::Price)),
         };
-        let mut options = vec![("Yes, take them so".to_owned(), confirmed)];
+        let mut options = vec![("Yes, that is right".to_owned(), confirmed)];
         if self.read_as(choices.kind.unwrap_or(kind), choices.unit.or(unit)).is_ok() {
             options.push((otherwise.to_owned(), choices));
         }
@@ -283,8 +285,8 @@ impl Numbers<'_> {
 pub fn called(kind: Kind, unit: Option<Unit>) -> &'static str {
     match (kind, unit) {
         (Kind::Price, _) => "returns of prices",
-        (Kind::Gross, _) => "returns of what 1 becomes",
-        (Kind::Cumulated, _) => "returns of cumulated gains",
+        (Kind::Gross, _) => "returns of growth factors",
+        (Kind::Cumulated, _) => "returns of cumulative gains",
         (Kind::Simple, Some(Unit::Percent)) => "simple returns in percent",
         (Kind::Simple, _) => "simple returns as fractions",
         (Kind::Log, Some(Unit::Percent)) => "log-returns in percent",

@@ -28,7 +28,7 @@ impl MonthsOfYears {
         match (0..january).find(is_years) {
             Some(year) => Ok(Some(MonthsOfYears { year, january })),
             None => Err(Stop::refused(
-                "The columns are the months of a year, and no column of years such as 2008 stands before them.",
+                "The columns are the months of a year, but no column of years such as 2008 comes before them. Add one.",
             )),
         }
     }

@@ -30,7 +30,7 @@ pub fn ordered(
     let form = form(&given, choices)?;
     let mut cells = column.at(rows);
     let date = |cell: &&Cell| {
-        form.date(&cell.text).ok_or_else(|| cell.refused(&column.name, "must be a date in the form of the others"))
+        form.date(&cell.text).ok_or_else(|| cell.refused(&column.name, "must be a date in the same form as the others"))
     };
     let mut dates = cells.iter().map(date).collect::<Result<Vec<Date>, Stop>>()?;
     let is_turned = falls(&dates);
@@ -48,7 +48,7 @@ pub fn ordered(
         Err(found) => {
             let question = format!("{}: {}", cells[found.index].called(&column.name), found.rule);
             let choices = Choices { gaps: Some(true), ..Choices::default() };
-            return Err(Stop::question("gaps", question, vec![("Take the rows as they are".to_owned(), choices)]));
+            return Err(Stop::question("gaps", question, vec![("Use the rows as they are".to_owned(), choices)]));
         }
     };
     Ok(Order { remark: numbered(form, &written), dates: Some(dates), is_turned, frequency })
@@ -81,7 +81,7 @@ fn ask_the_end(given: &[&str]) -> Stop {
         (label.to_owned(), Choices { newest_first: Some(newest_first), ..Choices::default() })
     };
     let question =
-        format!("The dates are not understood, such as {}. Which row is the oldest?", given.first().unwrap_or(&""));
+        format!("The dates, such as {}, cannot be read. Which row is the oldest?", given.first().unwrap_or(&""));
     Stop::question("newest_first", question, vec![option("The first row", false), option("The last row", true)])
 }
 
@@ -96,7 +96,7 @@ fn check_days(column: &Column, cells: &[&Cell], dates: &[Date], times: &[&Cell])
     let Some(index) = (0..dates.len().saturating_sub(1)).find(is_finer) else { return Ok(()) };
     let (before, time) = (&times[index].text, &times[index + 1].text);
     let rule = format!(
-        "{time} is of the same day as {before}, the row before: rows finer than a day are not read, give one row a day"
+        "{time} is on the same day as {before}, the row before; give one row a day, because times are not read"
     );
     Err(cells[index + 1].refused(&column.name, &rule))
 }

@@ -94,7 +94,7 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
     let numbers = chosen.iter().map(|column| numbers(column, column.at(&kept.rows), mark));
     let mut numbers = numbers.collect::<Result<Vec<Numbers>, Stop>>()?;
     if kept.rows.len() < FEWEST {
-        return Err(Stop::refused("One number is no record of returns: at least two are needed."));
+        return Err(Stop::refused("One number is not a record of returns: give at least two."));
     }
     // The question about holes comes before the one about the periods that are missing because of them.
     let lenient = Choices { gaps: Some(true), ..choices.clone() };
@@ -132,7 +132,9 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
     let count = returns[0].simple.len();
     alike(&chosen, &returns, choices)?;
     if count < FEWEST {
-        return Err(Stop::refused("Two prices make one return: at least two returns are needed."));
+        return Err(Stop::refused(
+            "Two prices give one return, but at least two returns are needed. Give another price.",
+        ));
     }
     let used = choices.latest.unwrap_or(count).clamp(FEWEST, count);
     let mut remarks = Vec::new();
@@ -141,10 +143,10 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
         found.map_err(|reason| remarks.push(format!("Column {name} is not used: {reason}."))).ok()
     });
     if let Some(name) = bank.as_ref().map(|bank| &bank.column.name).filter(|_| choices.excess == Some(true)) {
-        remarks.push(format!("What the bank paid, in column {name}, is added to returns beyond it."));
+        remarks.push(format!("The bank rate in column {name} is added to the returns in excess of it."));
     }
     if order.is_turned && order.dates.is_some() {
-        remarks.push("The rows came newest first and are turned round.".to_owned());
+        remarks.push("The rows came newest first and are reversed.".to_owned());
     }
     remarks.extend(order.remark.take().into_iter().chain(kept.remarks).chain(sheet.remarks.iter().cloned()));
     let found = ColumnContents {
@@ -165,7 +167,7 @@ fn alike(chosen: &[&Column], returns: &[Returns], choices: &Choices) -> Result<(
     if let Some(index) = other(&|other| other.simple.len() != first.simple.len()) {
         let what = |index: usize| called(returns[index].kind, returns[index].unit);
         return Err(Stop::refused(format!(
-            "Column {} reads as {} and column {} as {}: read them one at a time, or make them alike.",
+            "Column {} holds {}, and column {} holds {}. Read them one at a time, or give both in one form.",
             chosen[0].name,
             what(0),
             chosen[index].name,
@@ -175,10 +177,10 @@ fn alike(chosen: &[&Column], returns: &[Returns], choices: &Choices) -> Result<(
     let odd = other(&|other| other.unit != first.unit).filter(|_| choices.unit.is_none());
     let Some(odd) = odd else { return Ok(()) };
     let option = |label: &str, unit| (label.to_owned(), Choices { unit: Some(unit), ..Choices::default() });
-    let options = vec![option("Percent, all of them", Unit::Percent), option("Fractions, all of them", Unit::Fraction)];
+    let options = vec![option("All in percent", Unit::Percent), option("All as fractions", Unit::Fraction)];
     let (percent, fractions) = if first.unit == Some(Unit::Percent) { (0, odd) } else { (odd, 0) };
     let question = format!(
-        "Column {} looks like percent and column {} like fractions. What are they all?",
+        "Column {} looks like percent, and column {} like fractions. Which of the two are they all?",
         chosen[percent].name, chosen[fractions].name
     );
     Err(Stop::question("unit", question, options))
@@ -190,7 +192,7 @@ fn numbers<'a>(column: &'a Column, cells: Vec<&'a Cell<'a>>, mark: Mark) -> Resu
             Some(value) if value.is_finite() => return Ok(value),
             Some(_) => "must be a finite number",
             None if mark == Mark::Comma && number(&cell.text, Mark::Point).is_some() => {
-                "must be a number with a decimal comma, as the others are"
+                "must be a number with a decimal comma, like the others"
             }
             None => "must be a number",
         };

@@ -180,8 +180,8 @@ impl Record {
         };
         let turned = match (&self.dates, self.newest_first) {
             (Some(_), _) => "",
-            (None, true) => ", without dates, taken newest first and turned round",
-            (None, false) => ", without dates, taken oldest first",
+            (None, true) => ", without dates, read newest first and reversed",
+            (None, false) => ", without dates, read oldest first",
         };
         format!("{latest}{adjective} {what}{span}{place}{turned}.")
     }
@@ -201,7 +201,7 @@ impl Record {
         };
         let bank = self.rate.iter().map(|BankRate { column, rates }| {
             let last = rates.last().map_or(String::new(), |rate| percent(*rate));
-            format!("What the bank pays is in column {column}: {last} in the last {noun}.")
+            format!("The bank rate is in column {column}: {last} in the last {noun}.")
         });
         self.series.iter().map(of).chain(bank).collect()
     }

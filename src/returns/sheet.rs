@@ -116,7 +116,7 @@ impl<'a> Sheet<'a> {
         let CellRows { rows, remarks: lines } = CellRows::of(text, choices)?;
         let Table { heading, rows, mut remarks } = Table::of(rows)?;
         if lines > 0 {
-            remarks.push(format!("{} of remarks passed over.", counted(lines, "line")));
+            remarks.push(format!("Skipped {} of comments.", counted(lines, "line")));
         }
         let widths: HashSet<usize> = rows.iter().map(Vec::len).collect();
         let is_narrow = widths.len() == 1 && widths.contains(&1);
@@ -163,7 +163,7 @@ impl<'a> Sheet<'a> {
     fn meant(&self, choices: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
         if choices.columns.len() > self.columns.len() {
             let (named, there) = (choices.columns.len(), self.columns.len());
-            return Err(Stop::refused(format!("{named} columns are named: there are {there}.")));
+            return Err(Stop::refused(format!("{named} columns are named, but there are {there}.")));
         }
         if !choices.columns.is_empty() {
             let named = choices.columns.iter().map(|name| self.named(name)).collect::<Result<Vec<_>, Stop>>()?;
@@ -204,7 +204,9 @@ impl<'a> Sheet<'a> {
         let found = found.or_else(|| self.columns.iter().find(|column| plain(&column.name) == plain(name)));
         let names =
             || self.columns.iter().map(|column| column.name.as_str()).take(OFFERED).collect::<Vec<_>>().join(", ");
-        found.or_else(number).ok_or_else(|| Stop::refused(format!("There is no column {name}: there are {}.", names())))
+        found
+            .or_else(number)
+            .ok_or_else(|| Stop::refused(format!("There is no column {name}. The columns are {}.", names())))
     }
 
     fn without_numbers(&self) -> Stop {
@@ -215,8 +217,8 @@ impl<'a> Sheet<'a> {
         let others = self.columns.iter().filter(|column| column.holds != Holds::Dates);
         let cell = others.flat_map(|column| column.cells.iter().map(|cell| (cell, column.name.as_str())));
         match cell.clone().find(|(cell, _)| !cell.text.is_empty()) {
-            Some((cell, name)) => cell.refused(name, "must be a number in one column at least"),
-            None => Stop::refused("There are dates, and no returns beside them."),
+            Some((cell, name)) => cell.refused(name, "must be a number in at least one column"),
+            None => Stop::refused("There are dates, but no returns next to them."),
         }
     }
 }
@@ -226,12 +228,12 @@ fn run<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<Colum
     let name = heading.and_then(|heading| heading.first().map(|cell| cell.text.to_string())).unwrap_or_default();
     let cells: Vec<Cell> = rows.into_iter().flatten().filter(|cell| !cell.text.is_empty()).collect();
     if cells.len() > MOST_LINES {
-        return Err(Stop::refused(format!("The text has {} numbers: must have at most {MOST_LINES}.", cells.len())));
+        return Err(Stop::refused(format!("The text has {} numbers: it must have at most {MOST_LINES}.", cells.len())));
     }
     let column = Column { name, holds: Holds::Values, cells };
     if are_dates(&column.texts(), true) {
         let Some(first) = column.cells.first() else { return Err(Stop::refused("There are no numbers in the text.")) };
-        return Err(first.refused(&column.name, "must have a return beside it, being a date"));
+        return Err(first.refused(&column.name, "must have a return next to it, because it is a date"));
     }
     Ok(column)
 }
@@ -240,14 +242,14 @@ fn columns<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<V
     let width = heading.as_ref().or(rows.first()).map_or(0, Vec::len);
     if let Some(odd) = rows.iter().find(|row| row.len() != width) {
         let rule = format!(
-            "ends a line of {} cells, where there must be {width} as in the first: a number with a comma in it must stand in \
-             quotes, or cells be parted by semicolons",
+            "ends a line of {} cells, but the first line has {width}; put a number with a comma in quotes, or separate \
+             cells by semicolons",
             odd.len()
         );
         return Err(odd[odd.len() - 1].refused("", &rule));
     }
     if width > MOST_COLUMNS {
-        return Err(Stop::refused(format!("The text has {width} columns: must have at most {MOST_COLUMNS}.")));
+        return Err(Stop::refused(format!("The text has {width} columns: it must have at most {MOST_COLUMNS}.")));
     }
     if let Some(heading) = &heading
         && let Some(months) = MonthsOfYears::of(heading, &rows)?
@@ -301,7 +303,7 @@ fn judge(columns: &mut [Column]) {
 }
 
 fn set_aside(name: &str, reason: &str) -> Stop {
-    Stop::refused(format!("Column {name} {reason}: name another column, or head it otherwise if it is an asset."))
+    Stop::refused(format!("Column {name} {reason}. Name another column, or change its heading if it is an asset."))
 }
 
 fn ask(values: &[&Column]) -> Stop {
@@ -319,6 +321,6 @@ fn layout(columns: &[Column]) -> Stop {
     let option = |label: String, one_record| (label, Choices { one_record: Some(one_record), ..Choices::default() });
     let options =
         vec![option("One record, read line by line".into(), true), option(format!("{} columns", columns.len()), false)];
-    let question = format!("Are these {count} numbers of one record, or columns of different things?");
+    let question = format!("Are these {count} numbers of one record, or columns of different records?");
     Stop::question("one_record", question, options)
 }

@@ -77,9 +77,7 @@ impl<'a> Table<'a> {
     pub fn of(rows: Vec<TableRow<'a>>) -> Result<Self, Stop> {
         if !rows.iter().flatten().any(|cell| has_digit(&cell.text)) {
             let word = rows.iter().flatten().find(|cell| !cell.text.is_empty()).map_or(String::new(), Cell::shown);
-            return Err(Stop::refused(format!(
-                "There are no numbers in the text: it has words alone, such as {word:?}."
-            )));
+            return Err(Stop::refused(format!("There are no numbers in the text, only words such as {word:?}.")));
         }
         match DatedBlock::longest(&rows) {
             Some(block) => dated(rows, &block),
@@ -108,7 +106,7 @@ fn dated<'a>(mut rows: Vec<TableRow<'a>>, block: &DatedBlock) -> Result<Table<'a
     if let Some(cell) = events.first().and_then(|row| event(row)) {
         let what = counted(events.len(), "line");
         remarks.push(format!(
-            "{what} of dividends or splits left out, the first of them line {}: {:?}.",
+            "Left out {what} of dividends or splits, the first in line {}: {:?}.",
             cell.line(),
             cell.shown()
         ));
@@ -259,7 +257,8 @@ impl DatedBlock {
         let goes_on = if self.first <= self.last { next > self.last } else { next < self.last };
         let Some(cell) = first.get(self.column).or(first.first()).filter(|_| goes_on) else { return Ok(()) };
         let rule = format!(
-            "must be a date in the form of the others, as rows go on in line {line}: remove the line if it is no row"
+            "must be a date in the same form as the others, because rows continue in line {line}; remove the line if it is \
+             not a row"
         );
         Err(cell.refused("", &rule))
     }

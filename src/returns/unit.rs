@@ -105,7 +105,7 @@ impl Numbers<'_> {
         let (all_mean, all_deviation) = moments(&self.values);
         let is_period = beside.noun();
         let doubt = |what: String| {
-            let of = if is_dated { String::new() } else { format!(", if each is of a {is_period}") };
+            let of = if is_dated { String::new() } else { format!(", if each covers a {is_period}") };
             Some(format!(" As fractions {what}{of}."))
         };
         if self.earns_too_much(bulk, periods) {

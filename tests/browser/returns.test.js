@@ -70,7 +70,7 @@ test("dates beside returns are dates and no prices, however they are written", a
 
 test("a file that is newest first is turned round, said and drawn", async () => {
   await chosen("prices.csv", "date,close\n2020-03-31,103\n2020-02-29,101\n2020-01-31,100\n");
-  await note().getByText("The rows came newest first and are turned round.").waitFor();
+  await note().getByText("The rows came newest first and are reversed.").waitFor();
   close(await history(), [Math.log(101 / 100), Math.log(103 / 101)]);
   await page.getByText("Returns read, 2020-02 to 2020-03").waitFor();
 });
@@ -150,7 +150,7 @@ test("a deviation above 30 % a period is not taken without a word", async () => 
   await pasted("500 -60 90 -30");
   await note().getByText("give a standard deviation of 258.26 % a period").waitFor();
   assert.deepEqual(await history(), []);
-  await page.getByRole("radio", { name: /^Yes, take them so/ }).check();
+  await page.getByRole("radio", { name: /^Yes, that is right/ }).check();
   await page.getByRole("button", { name: "Read it so" }).click();
   await note().getByText("4 simple returns in percent").waitFor();
   assert.equal((await history()).length, 4);

@@ -116,9 +116,9 @@ async fn a_text_beyond_all_bounds_is_refused_and_one_within_is_read_in_time() {
     let app = App::configured(|config| config.body_limit_bytes = 64 << 20).await;
     let many: String = (0..190_000).map(|row| format!("{}\n", 0.01 * f64::from(row % 7 - 3))).collect();
     let refusals = [
-        ("0.01\n".repeat(1_000_000), "The text has 1000000 lines: must have at most 200000."),
-        ("0.01,".repeat(1_500_000), "The text has 1500000 cells: must have at most 1000000."),
-        ("1".repeat(8_000_001), "The text has 8000001 bytes: must have at most 8000000."),
+        ("0.01\n".repeat(1_000_000), "The text has 1000000 lines: it must have at most 200000."),
+        ("0.01,".repeat(1_500_000), "The text has 1500000 cells: it must have at most 1000000."),
+        ("1".repeat(8_000_001), "The text has 8000001 bytes: it must have at most 8000000."),
     ];
     for (text, said) in refusals {
         let (status, answered) = app.post("/returns", &json!({ "text": text })).await;
@@ -324,7 +324,7 @@ fn a_cell_out_of_place_is_never_passed_over() {
         rows[at].push_str(word);
         let found = read(&rows.join("\n"), &Choices::default());
         let Reading::Read(record) = &found else { continue };
-        let is_told = record.remarks.iter().any(|remark| remark == "1 blank row before or after the numbers left out.");
+        let is_told = record.remarks.iter().any(|remark| remark == "Left out 1 blank row before or after the numbers.");
         let is_at_an_end = at == rows.len() - 1 || at == 1;
         // The row was one quoted cell: without a date it stands below the table.
         let is_below =

@@ -110,5 +110,5 @@ def test_every_exception_is_one_of_the_package() -> None:
 
 
 def test_the_history_of_a_session_is_checked(ballast: Ballast, session: Session) -> None:
-    with pytest.raises(ValueError, match=r"^history: One number is no record of returns"):
+    with pytest.raises(ValueError, match=r"^history: One number is not a record of returns"):
         ballast.policy(session.policy).session(history=RETURNS[:1], kind="log")

@@ -70,7 +70,7 @@ def test_an_index_of_dates_is_read_as_in_the_file(ballast: Ballast, form: str, t
 def test_whatever_holds_the_dates_they_are_read(ballast: Ballast, index: Any) -> None:
     dates, kind, *_, newest_first, remarks = told(ballast.read_returns(pd.Series(PRICES, index, name="Price")))
     assert (dates[0], dates[-1], kind, newest_first) == ("2020-01", "2022-06", "price", True)
-    assert remarks == ["The rows came newest first and are turned round."]
+    assert remarks == ["The rows came newest first and are reversed."]
 
 
 def test_an_index_is_read_or_refused_and_never_dropped(ballast: Ballast) -> None:

@@ -106,7 +106,7 @@ def test_what_a_vendor_writes_beside_a_price_is_no_asset(ballast: Ballast) -> No
     quotes = quotes.assign(Open=[99.0, 100.5, 101.0, 99.0], Volume=[120300, 133200, 120900, 140100])
     with pytest.raises(ValueError, match="returns holds one asset, in column Adj Close: assets must name several"):
         ballast.advise_assets(quotes, rate_per_step=0.001, **ONCE)
-    with pytest.raises(ValueError, match="Column Volume counts what was traded"):
+    with pytest.raises(ValueError, match="Column Volume holds the traded volume"):
         ballast.advise_assets(quotes, assets=["Adj Close", "Volume"], rate_per_step=0.001, **ONCE)
 
 

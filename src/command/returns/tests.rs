@@ -25,7 +25,7 @@ fn the_sentence_says_what_was_read() {
             "Date,Close,Adj Close\n2008-02-29,1,98.98\n2008-01-31,1,101\n2007-12-31,1,100\n",
             "2 monthly returns of prices, 2008-01 to 2008-02, as in column Adj Close.\nA year of 12 months has a mean of -5.8 % \
              and a deviation of 7.3 %. The bank pays 0.100 % a month, 1.2 % a year, by --rate. The rows came newest first and \
-             are turned round.",
+             are reversed.",
         ),
         (
             "quarter;r\n2008-03-31;1,5\n2008-06-30;-2\n2008-09-30;3,1\n",
@@ -209,5 +209,5 @@ fn volumes_and_other_prices_of_a_day_are_no_assets() {
     let columns = ["Open", "Last"].map(str::to_owned).to_vec();
     let said = Choices { columns, ..Choices::default() };
     let refused = AnyReturns::parse(text, &said, Some(0.001), None).unwrap_err().to_string();
-    assert!(refused.starts_with("Column Open is no return and not the last price of its period"), "{refused}");
+    assert!(refused.starts_with("Column Open holds neither returns nor the last price of each period"), "{refused}");
 }
