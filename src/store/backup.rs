@@ -74,7 +74,7 @@ fn begin(partial: &Path) -> Result<File, StoreError> {
         let file = OpenOptions::new().write(true).create(true).truncate(false).mode(0o600).open(partial)?;
         file.try_lock()?;
         if file.metadata()?.ino() != std::fs::metadata(partial)?.ino() {
-            return Err(Error::new(ErrorKind::ResourceBusy, "another backup of this name has just ended"));
+            return Err(Error::new(ErrorKind::ResourceBusy, "another backup with this name has just ended"));
         }
         file.set_permissions(Permissions::from_mode(0o600))?;
         file.set_len(0)?;
@@ -104,7 +104,7 @@ pub async fn restore(from: &Path, dir: &Path, damage: Damage, tell: &mut impl Fn
         std::fs::copy(from, &partial).map_err(|error| unusable(from, error))?;
         let mut connection = connect(&partial).await?;
         if version(&mut connection).await? == 0 {
-            return Err(unusable(from, Error::new(ErrorKind::InvalidData, "it is no backup of a store")));
+            return Err(unusable(from, Error::new(ErrorKind::InvalidData, "it is not a backup of a store")));
         }
         migrate(&mut connection).await?;
         connection.close().await.map_err(opening)?;

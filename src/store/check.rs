@@ -132,7 +132,7 @@ impl Inspection {
             StoreError::Fatal { source, .. } => StoreError::Corrupt { what: format!("the database ({source})") },
             other => other,
         });
-        tell(format!("schema {}: this binary's", version?));
+        tell(format!("schema {}: the one that this binary uses", version?));
         self.all(tell).await.map_err(|failure| failure.during(DOING))?;
         let others = self.damage.len().saturating_sub(1);
         match self.damage.into_iter().next() {
@@ -187,32 +187,34 @@ impl Inspection {
             CheckPart::File => {
                 self.file().await?;
                 match self.reader {
-                    CheckReader::Sqlite(_) => "the file: pages, indexes and references are whole".to_owned(),
-                    CheckReader::Postgres(_) => "the file: checked by PostgreSQL itself".to_owned(),
+                    CheckReader::Sqlite(_) => "the file: pages, indexes and references are intact".to_owned(),
+                    CheckReader::Postgres(_) => "the file: PostgreSQL checks it itself".to_owned(),
                 }
             }
             CheckPart::Policies => {
-                format!("policies: {}, each the bytes its name is the hash of", self.policies().await?)
+                format!("policies: {}, and each name is the hash of the content", self.policies().await?)
             }
             CheckPart::Jobs => {
                 let (jobs, checkpoints) = self.jobs().await?;
-                format!("jobs: {jobs}, with {checkpoints} checkpoints as sealed")
+                format!("jobs: {jobs}, with {checkpoints} checkpoints; every seal is valid")
             }
             CheckPart::Sessions => {
                 let (sessions, entries) = self.sessions().await?;
-                format!("sessions: {sessions}, with {entries} entries, as sealed and none missing between")
+                format!("sessions: {sessions}, with {entries} entries; every seal is valid and no entry is missing")
             }
-            CheckPart::Totals => format!("totals: of {} tenants, each the sum of what it keeps", self.totals().await?),
+            CheckPart::Totals => {
+                format!("totals: of {} tenants; each is the sum of the stored rows", self.totals().await?)
+            }
             CheckPart::Keys => {
                 let rows = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
                 for row in &rows {
                     self.note(KeyRow::from_row(row))?;
                 }
-                format!("keys: {}, each as sealed", rows.len())
+                format!("keys: {}, and every seal is valid", rows.len())
             }
             CheckPart::Audit => {
                 let (chains, entries) = self.audit().await?;
-                format!("audit: {entries} entries in {chains} chains, as sealed and none missing")
+                format!("audit: {entries} entries in {chains} chains; every seal is valid and no entry is missing")
             }
         })
     }

@@ -22,15 +22,16 @@ pub enum StoreError {
     #[error("the store is unavailable while {doing}")]
     Unavailable { doing: &'static str, source: Option<Arc<sqlx::Error>> },
     /// The file has a schema newer than this binary's.
-    #[error("the store has schema {found}, newer than {known}, the newest this binary knows")]
+    #[error("the store has schema {found}, newer than {known}, the newest that this binary knows; use a newer binary")]
     NewerSchema { found: i64, known: i64 },
     /// The file has a schema older than this binary's; it is not brought up to date in a mode that may change nothing.
     #[error(
-        "the store has schema {found}, older than {known}, this binary's; a start of the service brings it up to date"
+        "the store has schema {found}, older than {known}, which this binary needs; start the service once to \
+         bring it up to date"
     )]
     OlderSchema { found: i64, known: i64 },
     /// A file that the process holds is no longer the one with its name, so its writes are lost. The process must exit.
-    #[error("{} was moved, removed or replaced under the process that holds it; the process must restart", path.display())]
+    #[error("{} was moved, removed or replaced while the process used it; the process must restart", path.display())]
     Replaced { path: PathBuf },
     /// Another process holds the folder.
     #[error("{} is locked by another process", path.display())]
@@ -84,7 +85,7 @@ pub enum Quota {
 
 /// An exceeded quota of a tenant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("the tenant keeps {kept} {} and may keep {limit}; this takes {wanted} more", quota.counted())]
+#[error("the tenant has {kept} {} and may have {limit}; this needs {wanted} more", quota.counted())]
 pub struct OverQuota {
     pub quota: Quota,
     pub kept: u64,

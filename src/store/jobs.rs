@@ -228,7 +228,7 @@ pub(super) async fn cancel(
     } else {
         connection.execute(query("UPDATE jobs SET cancel_requested = TRUE WHERE job = $1").bind(job.as_str())).await?;
     }
-    let outcome = if next.is_terminal() { "cancelled" } else { "asked to stop" };
+    let outcome = if next.is_terminal() { "cancelled" } else { "stop requested" };
     audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, AuditAction::CancelJob, &job, outcome).await?;
     find(connection, &job).await
 }

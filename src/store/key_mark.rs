@@ -10,7 +10,7 @@ use super::error::unusable;
 use super::{Engine, Store, StoreError};
 
 const MARK: &str = "ballast.keys";
-const CONTENT: &[u8] = b"The database beside this file has keys. Without a key in it the service does not start while this file is here.\n";
+const CONTENT: &[u8] = b"The database next to this file has access keys. While this file exists, the service does not start on a database without keys.\n";
 
 impl Store {
     /// Returns the path of the marker file, if it exists.

@@ -327,7 +327,11 @@ impl KeyRoles {
     pub fn new(mut roles: Vec<KeyRole>) -> Result<Self, FieldError> {
         roles.sort();
         roles.dedup();
-        if roles.is_empty() { Err(FieldError::new("roles", "[]", "must hold a role")) } else { Ok(KeyRoles(roles)) }
+        if roles.is_empty() {
+            Err(FieldError::new("roles", "[]", "must have at least one role: read, operate, train or admin"))
+        } else {
+            Ok(KeyRoles(roles))
+        }
     }
 
     /// Returns whether the roles allow what needs `role`.

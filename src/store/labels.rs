@@ -81,7 +81,7 @@ impl Relabel {
             let field = format!("tags[{index}]");
             check_text(&field, tag, 1..=LONGEST_TAG, &[])?;
             if !seen.insert(tag) {
-                return Err(FieldError::new(field, tag, "must be another than those before it"));
+                return Err(FieldError::new(field, tag, "must differ from the tags before it"));
             }
         }
         Ok(())

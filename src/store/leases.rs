@@ -117,8 +117,8 @@ async fn claim(
         {
             end(connection, &row, next, now_ms).await?;
             let reason = format!(
-                "the process of its worker ended {deaths} times while it ran, with no step finished in between; \
-                 it may take more memory than its machine has"
+                "its worker process ended {deaths} times while the job ran, and no step was finished in between; \
+                 the job may need more memory than the machine has"
             );
             let fail = query("UPDATE jobs SET error = $1, deaths = $2 WHERE job = $3");
             connection.execute(fail.bind(reason).bind(deaths).bind(row.job)).await?;

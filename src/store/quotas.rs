@@ -93,7 +93,7 @@ impl Store {
     /// Returns the usage of a tenant.
     pub async fn usage(&self, tenant: &Tenant) -> Result<Usage, StoreError> {
         let totals = query("SELECT sessions, bytes FROM usage WHERE tenant = $1").bind(tenant.as_str());
-        self.list("reading what a tenant keeps", totals, |rows| {
+        self.list("reading the usage of a tenant", totals, |rows| {
             let Some(row) = rows.first() else { return Ok(Usage::default()) };
             Ok(Usage { sessions: row.get("sessions")?, bytes: row.get("bytes")? })
         })
@@ -152,7 +152,7 @@ pub(super) async fn change(connection: &mut StoreConnection<'_>, tenant: &Tenant
          RETURNING sessions, bytes",
     );
     let changed = connection.row(change.bind(tenant.as_str()).bind(by.sessions).bind(by.bytes)).await?;
-    let changed = changed.ok_or_else(|| Failure::Corrupt(format!("what the tenant {tenant} keeps")))?;
+    let changed = changed.ok_or_else(|| Failure::Corrupt(format!("the usage of the tenant {tenant}")))?;
     Ok(Usage { sessions: changed.get("sessions")?, bytes: changed.get("bytes")? })
 }
 

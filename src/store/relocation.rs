@@ -100,7 +100,7 @@ async fn refuse_unknown_tables(folder: &mut SqliteConnection) -> Result<(), Stor
         "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%' AND substr(name, 1, 1) <> '_'";
     let tables: Vec<String> = sqlx::query_scalar(tables).fetch_all(folder).await.map_err(opening)?;
     match tables.into_iter().find(|table| TABLES.iter().all(|(known, _)| known != table)) {
-        Some(unknown) => Err(StoreError::NotMoved { reason: format!("nobody knows how to move the table {unknown}") }),
+        Some(unknown) => Err(StoreError::NotMoved { reason: format!("this binary cannot move the table {unknown}") }),
         None => Ok(()),
     }
 }
@@ -120,7 +120,7 @@ async fn all(
         let table = CopiedTable { name, at_once, columns: columns(database, name).await? };
         let rows = table.copy(folder, database).await?;
         table.go_on(folder, database).await?;
-        tell(format!("{name}: {rows} rows moved, each compared"));
+        tell(format!("{name}: {rows} rows moved and compared"));
     }
     Ok(())
 }
@@ -163,7 +163,7 @@ impl CopiedTable {
             let stored = database.rows(self.insert(&chunk).query()).await?;
             let stored = stored.iter().map(|row| self.cells(row)).collect::<Result<Vec<_>, _>>()?;
             if stored != chunk {
-                return Err(Failure::Corrupt(format!("what the database stored of the table {}", self.name)));
+                return Err(Failure::Corrupt(format!("the copy of the table {}", self.name)));
             }
             copied += chunk.len();
         }

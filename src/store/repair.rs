@@ -168,7 +168,7 @@ impl Repairs<'_> {
             return Err(Refusal::Reason(format!("the backup has no session, policy or key '{name}'")));
         };
         if self.rows > 0 {
-            let (actor, outcome) = (Actor::operator(now_ms), format!("{} rows taken from a backup", self.rows));
+            let (actor, outcome) = (Actor::operator(now_ms), format!("{} rows restored from a backup", self.rows));
             let by = (Quotas::NONE, &actor);
             audit_chain::record(&mut self.connection, by, &tenant, AuditAction::Repair, name, &outcome).await?;
         }
@@ -226,7 +226,7 @@ impl Repairs<'_> {
         let is_same =
             changes.map_or(Ok(false), |row| Ok::<_, Failure>(row.get::<i64>("now")? == row.get::<i64>("before")?))?;
         if !is_same {
-            return Err(Refusal::Reason(format!("the key {key} was changed after the backup; make another")));
+            return Err(Refusal::Reason(format!("the key {key} was changed after the backup; create another key")));
         }
         self.put_back(&KEYS, key).await?;
         let row = self.rows_of("main", &KEYS, key).await?;

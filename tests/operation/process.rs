@@ -144,7 +144,7 @@ async fn a_job_that_three_processes_died_under_fails_and_the_service_lives() {
     }
     let failed = process.app.until(&job, |job| job["finished_ms"].is_i64()).await;
     assert_eq!(failed["state"], "failed", "{failed}");
-    assert!(failed["error"].as_str().unwrap().contains("ended 3 times while it ran"), "{failed}");
+    assert!(failed["error"].as_str().unwrap().contains("ended 3 times while the job ran"), "{failed}");
     process.app.train(&specification(2)).await;
 }
 

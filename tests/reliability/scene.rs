@@ -118,7 +118,7 @@ impl Tally {
                 // Three may die under it before it has solved one step.
                 Some("failed") if self.deaths >= 3 => job["error"]
                     .as_str()
-                    .is_some_and(|error| error.starts_with("the process of its worker ended 3 times")),
+                    .is_some_and(|error| error.starts_with("its worker process ended 3 times")),
                 _ => false,
             };
             if !sound {

@@ -183,7 +183,7 @@ async fn a_backup_replaces_nothing_and_leaves_nothing_where_it_fails() {
     let empty = folder.path().join("empty.sqlite");
     std::fs::write(&empty, "").unwrap();
     let complaint = fails(&["restore", "--from", text(&empty), "--data", text(&folder.path().join("second"))]);
-    assert!(complaint.contains("it is no backup of a store"), "{complaint}");
+    assert!(complaint.contains("it is not a backup of a store"), "{complaint}");
     let mut left: Vec<_> =
         std::fs::read_dir(folder.path().join("second")).unwrap().map(|file| file.unwrap().file_name()).collect();
     left.sort();

@@ -322,7 +322,7 @@ async fn a_job_under_which_three_workers_died_fails(place: &Place) {
     assert_eq!(store.claim_job("worker", 30, now).await.unwrap(), None);
     let row = store.job("poison").await.unwrap().unwrap();
     assert_eq!((row.state, row.attempt, row.finished_ms), (JobState::Failed, 6, Some(now)));
-    assert!(row.error.unwrap().contains("ended 3 times while it ran"));
+    assert!(row.error.unwrap().contains("ended 3 times while the job ran"));
     assert_eq!(store.checkpoints("poison").await.unwrap(), []);
     store.close().await;
 }

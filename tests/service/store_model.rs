@@ -102,8 +102,8 @@ struct Model {
 }
 
 /// Why a job fails under which three workers died.
-const DIED: &str = "the process of its worker ended 3 times while it ran, with no step finished in between; \
-                    it may take more memory than its machine has";
+const DIED: &str = "its worker process ended 3 times while the job ran, and no step was finished in between; \
+                    the job may need more memory than the machine has";
 
 impl Model {
     fn job(&mut self, job: u8) -> Option<&mut Job> {
