@@ -272,7 +272,7 @@ impl From<LiveSession> for Session {
             assets: live.standing.assets.as_ref().map(|assets| assets.composed()),
             sample_size: live.standing.state.law.sample_size(),
             corrections: live.corrections,
-            drift: live.standing.bet.told(),
+            drift: live.standing.bet.drift(),
             session: live.row.session.clone(),
             labels: Labels::default(),
             policy: live.current.policy.clone(),

@@ -166,8 +166,8 @@ impl Allowance {
     /// # Errors
     /// No permit of one of the two kinds is free.
     fn places(&self) -> Result<HeavyPermits, Refused> {
-        let taken = self.heavy.iter().zip([Refused::OwnWork, Refused::NoPlace]);
-        taken.map(|(places, refused)| places.clone().try_acquire_owned().map_err(|_| refused)).collect()
+        let acquired = self.heavy.iter().zip([Refused::OwnWork, Refused::NoPlace]);
+        acquired.map(|(places, refused)| places.clone().try_acquire_owned().map_err(|_| refused)).collect()
     }
 }
 
@@ -243,10 +243,10 @@ impl Bucket {
     fn take(&self, now: u64) -> Result<(), TooMany> {
         let Some(interval) = SECOND.checked_div(self.per_second.into()) else { return Ok(()) };
         let next = |full_at: u64| full_at.max(now) + interval;
-        let taken = self.full_at.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |full_at| {
+        let updated = self.full_at.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |full_at| {
             (next(full_at) <= now + SECOND).then(|| next(full_at))
         });
-        taken.map(drop).map_err(|full_at| TooMany {
+        updated.map(drop).map_err(|full_at| TooMany {
             per_second: self.per_second,
             wait: Duration::from_nanos(next(full_at).saturating_sub(now + SECOND)),
         })

@@ -86,9 +86,13 @@ impl Assets {
     ///
     /// # Errors
     /// The answer names other assets.
-    pub(super) fn told(names: &[String], rows: Vec<Vec<f64>>, told: &Composition) -> Result<Self, FieldError> {
-        let mut assets = Assets::at(names, rows, Some(&told.holdings))?;
-        assets.take(told)?;
+    pub(super) fn with_composition(
+        names: &[String],
+        rows: Vec<Vec<f64>>,
+        reported: &Composition,
+    ) -> Result<Self, FieldError> {
+        let mut assets = Assets::at(names, rows, Some(&reported.holdings))?;
+        assets.take(reported)?;
         Ok(assets)
     }
 
@@ -96,9 +100,9 @@ impl Assets {
     ///
     /// # Errors
     /// It names other assets.
-    pub(super) fn take(&mut self, told: &Composition) -> Result<(), FieldError> {
-        self.fund.take(by_name("composition", &told.composition, &self.names)?);
-        self.one_step = told.one_step.clone();
+    pub(super) fn take(&mut self, reported: &Composition) -> Result<(), FieldError> {
+        self.fund.take(by_name("composition", &reported.composition, &self.names)?);
+        self.one_step = reported.one_step.clone();
         Ok(())
     }
 

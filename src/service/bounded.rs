@@ -214,8 +214,8 @@ impl FairQueue {
     }
 
     async fn first_place(&self, tenant: &Tenant) -> Result<Permit, ServiceError> {
-        let asked = self.line(Stage::First).ask(tenant, 0);
-        let Some(granted) = asked else { return Ok(self.place(Stage::First, tenant.clone())) };
+        let turn = self.line(Stage::First).ask(tenant, 0);
+        let Some(granted) = turn else { return Ok(self.place(Stage::First, tenant.clone())) };
         let granted = tokio::time::timeout(self.wait, granted).await;
         let late = |_| {
             let line = self.line(Stage::First);
@@ -584,10 +584,10 @@ mod tests {
         until(|| all.iter().all(|(passed, _)| passed.load(Ordering::Relaxed) > 0)).await;
         until(|| bounded.line(Stage::First).running.is_empty()).await;
         for _ in 0..5 {
-            let asked = Instant::now();
+            let started = Instant::now();
             assert!(busy(&bounded, "south", 150).1.await.unwrap().is_ok());
             // 150 checkpoints of a millisecond and more, and one turn of another; in turn over all it would be some seconds.
-            assert!(asked.elapsed() < Duration::from_millis(1000), "{:?}", asked.elapsed());
+            assert!(started.elapsed() < Duration::from_millis(1000), "{:?}", started.elapsed());
         }
         all.iter().for_each(|(_, done)| done.abort());
         all_free(&bounded, [1, 1]).await;

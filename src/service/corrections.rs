@@ -58,26 +58,26 @@ impl Periods {
         entry: usize,
         today: Date,
     ) -> Result<AppliedCorrection, ServiceError> {
-        let (mut stood, mut passage) = (Vec::with_capacity(self.all.len() + 1), self.passage()?);
+        let (mut previous, mut passage) = (Vec::with_capacity(self.all.len() + 1), self.passage()?);
         while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
-            stood.push(Some((step.seen, passage.standing.days.last)));
+            previous.push(Some((step.seen, passage.standing.days.last)));
         }
         let before = passage.standing;
         self.correct(correction, entry)?;
         match correction.change {
             Change::Replace => {}
-            Change::Insert => stood.insert(correction.period - 1, None),
-            Change::Remove => drop(stood.remove(correction.period - 1)),
+            Change::Insert => previous.insert(correction.period - 1, None),
+            Change::Remove => drop(previous.remove(correction.period - 1)),
         }
         let (mut log_return, mut doubts, mut passage) = (None, Vec::new(), self.passage()?);
         let mut wealth_before = passage.standing.state.wealth;
-        for (period, stood) in (1..).zip(stood) {
+        for (period, previous) in (1..).zip(previous) {
             let periods_per_year = passage.stretch().terms.periods_per_year;
             let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
             let Some(ReplayedPeriod { before, seen, log_return: now, .. }) = passed else { break };
             wealth_before = before.state.wealth;
             let report = &self.all[period - 1].report;
-            let (seen_before, day_before) = stood.unzip();
+            let (seen_before, day_before) = previous.unzip();
             if period == correction.period && correction.change != Change::Remove {
                 log_return = now;
                 if day_before != Some(passage.standing.days.last) {

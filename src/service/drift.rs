@@ -66,7 +66,7 @@ impl DriftTest {
     }
 
     /// Returns the test as answers show it.
-    pub fn told(self) -> Drift {
+    pub fn drift(self) -> Drift {
         let [capital, highest] = [self.capital.log(), self.capital.log_highest()].map(|log| log.exp().min(LARGEST));
         Drift { p_value: self.p_value, capital, highest, level: self.level() }
     }

@@ -250,12 +250,12 @@ fn observations(
     let row = |(index, period): (usize, &SessionPeriod)| {
         let entry = &facts.entries[period.entry];
         let (now, inserted) = if index >= first { changed.next() } else { None }.unzip();
-        let (told, reported) = match inserted.flatten() {
+        let (acknowledged, reported) = match inserted.flatten() {
             Some(observed) => (observed, content::<Correct>(entry, periods.names())?.report()),
             None => (answer::<Observed>(entry, periods.names())?, content(entry, periods.names())?),
         };
-        let (told, corrections) = (Observed { period: index + 1, ..told }, period.corrections.clone());
-        Ok(Observation { told, reported, observed_ms: entry.created_ms, corrections, now })
+        let (answered, corrections) = (Observed { period: index + 1, ..acknowledged }, period.corrections.clone());
+        Ok(Observation { told: answered, reported, observed_ms: entry.created_ms, corrections, now })
     };
     periods.all.iter().enumerate().map(row).collect()
 }
@@ -305,7 +305,7 @@ fn inserted(
         wealth_change: after.state.wealth - passed.before.state.wealth,
         date: after.days.last,
         completed: false,
-        drift: after.bet.told(),
+        drift: after.bet.drift(),
         uncertainty,
     }
 }

@@ -245,7 +245,7 @@ impl LiveSession {
             wealth_change: standing.state.wealth - self.standing.state.wealth,
             date: standing.days.last,
             completed: !check_active,
-            drift: standing.bet.told(),
+            drift: standing.bet.drift(),
             uncertainty,
         };
         Ok((standing, answer))

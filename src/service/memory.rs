@@ -75,8 +75,8 @@ impl MemoryLimit {
         ];
         let known = found.into_iter().filter_map(|(origin, bytes)| Some((origin, bytes?)));
         let (origin, bytes) = known.min_by_key(|(_, bytes)| *bytes).unwrap_or((Origin::Unknown, UNKNOWN_BYTES));
-        let taken = bytes / 100 * PERCENT_TAKEN;
-        MemoryLimit { bytes: usize::try_from(taken).unwrap_or(usize::MAX), origin }
+        let share = bytes / 100 * PERCENT_TAKEN;
+        MemoryLimit { bytes: usize::try_from(share).unwrap_or(usize::MAX), origin }
     }
 }
 

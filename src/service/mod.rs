@@ -145,11 +145,11 @@ impl Service {
         let size = QueueSize { first: config.decode_limit, long: config.long_limit };
         let decoding = FairQueue::new("decode", size, config.turn_wait);
         let policies = Arc::new(Policies::new(store.clone(), memory.clone(), decoding.clone()));
-        let (due, told) = tokio::sync::mpsc::channel(renewer::TOLD);
+        let (due, due_names) = tokio::sync::mpsc::channel(renewer::TOLD);
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), &memory, due);
         let (renewing, queueing) = (sessions.clone(), jobs.clone());
         let renewer = Renewer { store: store.clone(), clock: clock.clone(), sessions: renewing, jobs: queueing };
-        tokio::spawn(renewer.run(told, shutdown.clone()));
+        tokio::spawn(renewer.run(due_names, shutdown.clone()));
         let audit = Audit::new(store.clone());
         tokio::spawn(audit::keep_bounded(store.clone(), time.clone(), config.retain_audit, shutdown.clone()));
         let start =

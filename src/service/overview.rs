@@ -46,20 +46,20 @@ impl Sessions {
     ///
     /// # Errors
     /// The store does not answer, or no permit came in time.
-    pub async fn list(&self, caller: &Caller, asked: SessionQuery) -> Result<Overview, ServiceError> {
+    pub async fn list(&self, caller: &Caller, query: SessionQuery) -> Result<Overview, ServiceError> {
         let (_turn, tenant) = (self.listing.of(&caller.allowance).await?, &caller.tenant);
         let now_ms = self.clock.now_milliseconds();
         let today = day_of(now_ms);
         let calendars = self.store.calendars(tenant).await?;
         let first_days = calendars.into_iter().filter_map(|periods| first_day(today?, periods)).collect();
-        let asked = SessionQuery { today: Today { first_days }, ..asked };
-        let sessions = self.store.sessions(tenant, &asked).await?;
-        let total = match asked.counted {
+        let query = SessionQuery { today: Today { first_days }, ..query };
+        let sessions = self.store.sessions(tenant, &query).await?;
+        let total = match query.counted {
             Counted::Nothing => None,
-            Counted::Total | Counted::Care => Some(self.store.total(tenant, &asked).await?),
+            Counted::Total | Counted::Care => Some(self.store.total(tenant, &query).await?),
         };
-        let care = match asked.counted {
-            Counted::Care => Some(self.store.care(tenant, &asked).await?),
+        let care = match query.counted {
+            Counted::Care => Some(self.store.care(tenant, &query).await?),
             Counted::Nothing | Counted::Total => None,
         };
         let SessionList { sessions, damaged, last } = sessions;
@@ -72,8 +72,9 @@ impl Sessions {
         let damaged = damaged.collect();
         let listed = |row: SessionSummary| {
             let stands: Option<StateSummary> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
-            let said = stands.and_then(|stands| stands.date);
-            let from = said.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
+            let last_date = stands.and_then(|stands| stands.date);
+            let from =
+                last_date.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
             let is_active = row.observations < row.horizon || row.is_due;
             let next = row.periods_per_year.filter(|_| is_active).and_then(|periods| next_day(from?, periods));
             let is_last = row.observations + 1 >= row.horizon && !row.is_renewed;

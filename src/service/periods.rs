@@ -98,7 +98,7 @@ impl Periods {
             row.initial_history.clone(),
         );
         let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed }| {
-            Assets::told(names, history.rows_of(history.all()), composed).map(Box::new)
+            Assets::with_composition(names, history.rows_of(history.all()), composed).map(Box::new)
         });
         let assets = assets.transpose()?;
         let (wealth, learning) = (row.initial_wealth, plan.terms.learning);
@@ -129,8 +129,8 @@ impl Periods {
                 }),
                 EntryKind::Correction => {
                     periods.correct(&content(entry, names)?, index)?;
-                    let told = answer::<Corrected>(entry, names)?.assets;
-                    periods.tell(told);
+                    let composition = answer::<Corrected>(entry, names)?.assets;
+                    periods.tell(composition);
                 }
                 EntryKind::Renewal => {
                     let renew: Renew = content(entry, names)?;
@@ -149,8 +149,8 @@ impl Periods {
     }
 
     /// Records the composition of several assets that a correction or a renewal reported.
-    fn tell(&mut self, told: Option<Composition>) {
-        self.composed.entry(self.all.len()).or_default().extend(told);
+    fn tell(&mut self, reported: Option<Composition>) {
+        self.composed.entry(self.all.len()).or_default().extend(reported);
     }
 
     /// Returns the policy that advises the coming period.
@@ -274,11 +274,10 @@ impl<'a> Replay<'a> {
         &self.periods.stretches[self.stretch]
     }
 
-    /// Switches to the policies that begin here, with the last reported composition of several assets. This is `told`
-    /// with
-    /// the period, unless a correction or a renewal came later.
-    fn renew(&mut self, told: Option<&Composition>) -> Result<(), FieldError> {
-        told.map_or(Ok(()), |told| self.standing.take(told))?;
+    /// Switches to the policies that begin here, with the last reported composition of several assets. This is
+    /// `reported`, which came with the period, unless a correction or a renewal came later.
+    fn renew(&mut self, reported: Option<&Composition>) -> Result<(), FieldError> {
+        reported.map_or(Ok(()), |reported| self.standing.take(reported))?;
         let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
         // The last one builds its law from the same returns, whatever its predecessors did.
         self.stretch += begin.count();
@@ -286,7 +285,7 @@ impl<'a> Replay<'a> {
         if self.stretch > 0 && *after == self.step {
             self.standing = self.standing.renewed(&self.record, *window, terms.learning)?;
         }
-        let told_later = self.periods.composed.get(&self.step);
-        told_later.into_iter().flatten().try_for_each(|told| self.standing.take(told))
+        let reported_later = self.periods.composed.get(&self.step);
+        reported_later.into_iter().flatten().try_for_each(|reported| self.standing.take(reported))
     }
 }

@@ -129,7 +129,7 @@ impl Sessions {
                 assets: standing.assets.as_ref().map(|assets| assets.composed()),
                 wealth_change,
                 date: standing.days.last,
-                drift: standing.bet.told(),
+                drift: standing.bet.drift(),
                 uncertainty,
             };
             let levels = (before.bet.level(), answer.drift.level);

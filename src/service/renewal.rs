@@ -150,9 +150,9 @@ fn accepts(advisor: &Advisor, record: &[f64], standing: &SessionState) -> Result
     let (own, fund) = (standing.assets.as_deref(), advisor.specification().fund.as_deref());
     let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));
     if own != of_policy {
-        let told = |names: &[String]| if names.is_empty() { "one asset".to_owned() } else { names.join(", ") };
-        let rule = format!("must be of the assets of the session, in their order: {}", told(own));
-        return Err(FieldError::new("policy", format!("a policy of {}", told(of_policy)), rule));
+        let listed = |names: &[String]| if names.is_empty() { "one asset".to_owned() } else { names.join(", ") };
+        let rule = format!("must be of the assets of the session, in their order: {}", listed(own));
+        return Err(FieldError::new("policy", format!("a policy of {}", listed(of_policy)), rule));
     }
     let returns = standing.assets.as_ref().map(|assets| assets.fund.returns());
     let state = advisor.initial_state(Some(returns.as_deref().unwrap_or(record)), Some(standing.state.wealth))?;

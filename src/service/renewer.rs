@@ -66,7 +66,7 @@ pub(super) struct Renewer {
 
 impl Renewer {
     /// Renews sessions until shutdown begins.
-    pub(super) async fn run(self, mut told: Receiver<Name>, shutdown: Shutdown) {
+    pub(super) async fn run(self, mut due_names: Receiver<Name>, shutdown: Shutdown) {
         let (mut under_way, mut steps) = (UnderWay::default(), FuturesUnordered::new());
         let (mut round, mut look) = (tokio::time::interval(ROUND), tokio::time::interval(PAUSE));
         look.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -76,7 +76,7 @@ impl Renewer {
             }
             tokio::select! {
                 () = shutdown.begun() => return,
-                Some(name) = told.recv() => self.hear(name, &mut under_way).await,
+                Some(name) = due_names.recv() => self.hear(name, &mut under_way).await,
                 Some((name, left)) = steps.next(), if !steps.is_empty() => {
                     under_way.stepped(name, left);
                     if under_way.left_after.is_some() && under_way.turns.is_empty() {

@@ -177,12 +177,12 @@ impl SessionState {
         if let Some(assets) = &mut self.assets {
             assets.fund.passed(executed, row, self.state.holding);
         }
-        let told = match seen {
+        let log_return = match seen {
             PeriodReturns::One(log_return) => *log_return,
             PeriodReturns::Several(_) => row.map(mean),
         };
-        self.seen.iter_mut().zip(told).for_each(|(seen, told)| seen.push(told));
-        self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), told, &self.session, period);
+        self.seen.iter_mut().zip(log_return).for_each(|(seen, log_return)| seen.push(log_return));
+        self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), log_return, &self.session, period);
     }
 
     /// Takes over the prices reported with the last period.
@@ -197,8 +197,8 @@ impl SessionState {
     ///
     /// # Errors
     /// It names other assets.
-    pub(super) fn take(&mut self, told: &Composition) -> Result<(), FieldError> {
-        self.assets.as_mut().map_or(Ok(()), |assets| assets.take(told))
+    pub(super) fn take(&mut self, reported: &Composition) -> Result<(), FieldError> {
+        self.assets.as_mut().map_or(Ok(()), |assets| assets.take(reported))
     }
 
     /// Returns the state with the law of the fund rebuilt, if there are several assets.

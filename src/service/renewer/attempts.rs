@@ -51,7 +51,7 @@ impl Attempts {
         Ok(Attempts { number, count, last })
     }
 
-    fn told(self) -> RenewalDue {
+    fn due(self) -> RenewalDue {
         let state = match self.last.as_ref().map(|job| job.state) {
             None => RenewalState::Due,
             Some(JobState::Queued | JobState::Running) => RenewalState::Training,
@@ -77,6 +77,6 @@ impl Sessions {
         if !live.is_due() {
             return Ok(None);
         }
-        Ok(Some(Attempts::of(&self.store, live).await?.told()))
+        Ok(Some(Attempts::of(&self.store, live).await?.due()))
     }
 }
