@@ -99,11 +99,11 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     right["date"] = json!("2020-02-28");
     report_all(&app, &[wrong[0].clone(), right, wrong[2].clone()]).await;
     assert_eq!(without_bet(standing(&app).await), without_bet(apply_correction), "as it was from the start");
-    let (_, told) = app.get(&format!("/sessions/{}/history", app.session)).await;
+    let (_, uncorrected) = app.get(&format!("/sessions/{}/history", app.session)).await;
     for period in [1, 2] {
         let now = &history["observations"][period]["now"];
         for field in ["log_return", "wealth", "holding", "radius", "advised_allocation"] {
-            assert_eq!(now[field], told["observations"][period][field], "{field} of period {}", period + 1);
+            assert_eq!(now[field], uncorrected["observations"][period][field], "{field} of period {}", period + 1);
         }
     }
 }
@@ -248,7 +248,7 @@ async fn dates_follow_each_other_and_are_shown() {
 async fn a_return_that_is_most_likely_a_slip_is_asked_about() {
     let app = opened().await;
     // The record deviates by 2.6 %: four times that is 10.4 %.
-    for (report, field, told) in [
+    for (report, field, percent) in [
         (json!({ "simple_return": -0.3 }), "simple_return", "-30.00 %"),
         (json!({ "log_return": 1.2 }), "log_return", "232.01 %"),
         (json!({ "price": 10.2, "previous_price": 100.0 }), "price", "-89.80 %"),
@@ -257,7 +257,7 @@ async fn a_return_that_is_most_likely_a_slip_is_asked_about() {
         let found = (status.as_u16(), &refused["type"], &refused["field"]);
         assert_eq!(found, (409, &json!("/problems/unconfirmed"), &json!(field)), "{refused}");
         // As it was reported, e^1.2 - 1, and 10.2 over 100 less 1.
-        assert!(refused["rule"].as_str().unwrap().contains(&format!("a return of {told} lies")), "{refused}");
+        assert!(refused["rule"].as_str().unwrap().contains(&format!("a return of {percent} lies")), "{refused}");
     }
     assert_eq!(app.report(1, json!({ "simple_return": 0.1 })).await.0, 200, "within four deviations");
     let slip = json!({ "period": 1, "simple_return": 1.2 });

@@ -39,9 +39,12 @@ async fn it_is_what_a_policy_for_one_period_advises_to_the_last_bit() {
         held += usize::from(advised["allocation"].as_f64().unwrap() > 0.0);
         assert_eq!(advised["source"], "resolved");
         // The horizon may be said, and nothing else.
-        let mut said = problem.clone();
-        said["horizon"] = json!(1);
-        assert_eq!(app.post("/advise", &json!({ "problem": said, "wealth": 80.0, "holding": 0.25 })).await.1, advised);
+        let mut with_horizon = problem.clone();
+        with_horizon["horizon"] = json!(1);
+        assert_eq!(
+            app.post("/advise", &json!({ "problem": with_horizon, "wealth": 80.0, "holding": 0.25 })).await.1,
+            advised
+        );
     }
     assert!(held >= 3, "{held} of the investors hold anything");
 }
@@ -213,8 +216,8 @@ async fn holdings_and_a_trading_cost_of_several_assets_are_known() {
     let rows: Vec<[f64; 2]> = (0..60).map(row).collect();
     let problem = json!({ "assets": ["a", "b"], "history": rows, "rate_per_step": 0.002, "trading_cost": 0.01, "risk_aversion": 5.0 });
     let advise = async |holdings: Value| {
-        let asked = json!({ "problem": problem, "wealth": 1000.0, "holdings": holdings });
-        let (status, advised) = app.post("/advise", &asked).await;
+        let request = json!({ "problem": problem, "wealth": 1000.0, "holdings": holdings });
+        let (status, advised) = app.post("/advise", &request).await;
         assert_eq!(status, 200, "{advised}");
         advised
     };
@@ -244,9 +247,9 @@ async fn holdings_and_a_trading_cost_of_several_assets_are_known() {
         ("holdings", json!({ "a": 0.5, "b": 0.1, "c": 0.1 }), "holdings.c"),
         ("holdings", json!({ "a": -0.1, "b": 0.1 }), "holdings.a"),
     ] {
-        let mut asked = json!({ "problem": problem });
-        asked[name] = value;
-        let (status, refused) = app.post("/advise", &asked).await;
+        let mut request = json!({ "problem": problem });
+        request[name] = value;
+        let (status, refused) = app.post("/advise", &request).await;
         assert_eq!((status.as_u16(), &refused["field"]), (422, &json!(field)), "{refused}");
     }
     for (name, value, field) in [
@@ -272,7 +275,7 @@ async fn the_crash_is_what_a_floor_at_the_lowest_return_takes_away() {
     let app = App::start().await;
     let rows: Vec<[f64; 2]> = HISTORY.iter().zip(HISTORY.iter().rev()).map(|(left, right)| [*left, *right]).collect();
     let lowest = HISTORY.iter().copied().fold(f64::INFINITY, f64::min);
-    let mut taken = 0.0_f64;
+    let mut loss = 0.0_f64;
     for norm in ["scaled_one", "sup"] {
         let mut problem = json!({ "assets": ["left", "right"], "ground_norm": norm, "history": rows, "rate_per_step": 0.0,
             "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "fixed", "radius": 0.004 },
@@ -286,9 +289,9 @@ async fn the_crash_is_what_a_floor_at_the_lowest_return_takes_away() {
         let without = number(&advised, "without_crash");
         // Both searches end within their bounds, which a flat optimum lets lie apart.
         assert!((without - number(&floored, "total")).abs() < 0.005, "{advised} {floored}");
-        taken = taken.max(without - number(&advised, "total"));
+        loss = loss.max(without - number(&advised, "total"));
     }
-    assert!(taken > 0.05, "{taken}");
+    assert!(loss > 0.05, "{loss}");
 }
 
 /// Columns that are one asset are advised as that asset, and the radius of all funds is that of the fund of inverse volatilities

@@ -111,8 +111,8 @@ async fn what_was_altered_or_removed_is_found(place: &Place) {
     place.tamper(&format!("UPDATE audit SET object = 'x' {}", numbered(5))).await;
     let (outcome, named) = damage(place).await;
     assert_eq!(named, [3, 5, 6].map(|number| format!("entry {number} of key_1 in the audit of north")));
-    let said = "entry 3 of key_1 in the audit of north is damaged, and 2 other things are";
-    assert_eq!(outcome.unwrap_err().to_string(), said);
+    let message = "entry 3 of key_1 in the audit of north is damaged, and 2 other things are";
+    assert_eq!(outcome.unwrap_err().to_string(), message);
 }
 
 /// Each of these computes no hash, and leaves no gap between numbers.
@@ -336,6 +336,6 @@ async fn a_correction_that_is_gone_is_missed() {
     let check = async || Inspection::of_folder(&folder).await.unwrap().run(&mut |_| {}).await;
     check().await.unwrap();
     app.restart_after("DELETE FROM entries WHERE kind = 'correction'").await;
-    let said = check().await.unwrap_err().to_string();
-    assert_eq!(said, format!("the end of session {} is damaged", app.session));
+    let message = check().await.unwrap_err().to_string();
+    assert_eq!(message, format!("the end of session {} is damaged", app.session));
 }

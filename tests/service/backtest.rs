@@ -219,12 +219,15 @@ async fn what_may_be_a_mistake_is_said() {
     let strange = json!({ "simple_returns": null, "log_returns": percent, "rate": 0.2, "trading_cost": 0.05 });
     let (status, job) = app.post("/backtest", &request(1, &strange)).await;
     assert_eq!(status, StatusCode::ACCEPTED, "{job}");
-    let told = |name: &str| -> Vec<String> {
+    let warnings = |name: &str| -> Vec<String> {
         job["warnings"].as_array().unwrap().iter().map(|warning| warning[name].as_str().unwrap().to_owned()).collect()
     };
-    assert_eq!(told("code"), ["rate_high", "trading_cost_high", "record_in_percent"]);
-    assert_eq!(told("field"), ["rate", "trading_cost", "log_returns"]);
-    assert!(told("message").iter().zip(told("field")).all(|(message, field)| message.starts_with(&field)), "{job}");
+    assert_eq!(warnings("code"), ["rate_high", "trading_cost_high", "record_in_percent"]);
+    assert_eq!(warnings("field"), ["rate", "trading_cost", "log_returns"]);
+    assert!(
+        warnings("message").iter().zip(warnings("field")).all(|(message, field)| message.starts_with(&field)),
+        "{job}"
+    );
     app.cancel(job["job"].as_str().unwrap()).await;
 }
 
@@ -358,14 +361,14 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
         page.contains("\"mean_allocations\":{\"energy\"") && page.contains("<noscript><h1>Backtest of 2 assets"),
         "{page}"
     );
-    let told = String::from_utf8(done.stdout).unwrap();
-    assert!(told.contains("Each of the 2 columns is an asset") && told.contains("place "), "{told}");
+    let output = String::from_utf8(done.stdout).unwrap();
+    assert!(output.contains("Each of the 2 columns is an asset") && output.contains("place "), "{output}");
     assert!(
-        told.contains("Trading costs 100 bp of what is traded in every account; no strategy knows of it."),
-        "{told}"
+        output.contains("Trading costs 100 bp of what is traded in every account; no strategy knows of it."),
+        "{output}"
     );
 
-    for (options, said) in [
+    for (options, complaint) in [
         ("--horizon 4", "--horizon is 4: must be left out of several assets, for which nothing is trained"),
         ("--alpha 0.1,0.2", "--alpha is 2 levels: must be one of several assets"),
         ("--window 40", "--window is 40: must be at most 24: the record has 28 periods"),
@@ -376,6 +379,6 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
     ] {
         let refused = command(options);
         let error = String::from_utf8_lossy(&refused.stderr).into_owned();
-        assert!(!refused.status.success() && error.contains(said), "{options}: {error}");
+        assert!(!refused.status.success() && error.contains(complaint), "{options}: {error}");
     }
 }

@@ -245,10 +245,10 @@ async fn a_check_finds_every_kind_of_damage() {
         std::fs::create_dir(&folder).unwrap();
         succeeds(&["backup", "--data", data, "--out", text(&file)]);
         Place::break_references(&file, statement).await;
-        let said = fails(&["check", "--data", text(&folder)]);
-        assert!(said.contains(complaint), "{statement}: {said}");
-        let said = fails(&["backup", "--data", text(&folder), "--out", text(&copies.path().join("out"))]);
-        assert!(said.contains(complaint), "{statement}: {said}");
+        let output = fails(&["check", "--data", text(&folder)]);
+        assert!(output.contains(complaint), "{statement}: {output}");
+        let output = fails(&["backup", "--data", text(&folder), "--out", text(&copies.path().join("out"))]);
+        assert!(output.contains(complaint), "{statement}: {output}");
     }
     assert!(!copies.path().join("out").exists());
 }
@@ -271,8 +271,8 @@ async fn a_check_finds_a_torn_file() {
     ];
     for torn in torn {
         std::fs::write(&file, torn).unwrap();
-        let said = fails(&["check", "--data", text(folder.path())]);
-        assert!(said.contains("the database") && said.contains("is damaged"), "{said}");
+        let output = fails(&["check", "--data", text(folder.path())]);
+        assert!(output.contains("the database") && output.contains("is damaged"), "{output}");
     }
 }
 
@@ -287,6 +287,6 @@ async fn a_database_is_checked_beside_its_replicas() {
     let printed = succeeds(&["check", "--store", url]);
     assert!(printed.contains("policies: 1,") && printed.contains("sound"), "{printed}");
     place.tamper("UPDATE policies SET json = decode('7b7d', 'hex')").await;
-    let said = fails(&["check", "--store", url]);
-    assert!(said.contains(&format!("policy {policy} is damaged")), "{said}");
+    let output = fails(&["check", "--store", url]);
+    assert!(output.contains(&format!("policy {policy} is damaged")), "{output}");
 }

@@ -139,30 +139,30 @@ async fn what_is_damaged_is_listed_copied_and_put_back() {
         app.restart_after(damage).await;
     }
 
-    let (is_sound, said) = ballast(&["check", "--data", data]);
-    let damaged: Vec<_> = said.lines().filter_map(|line| line.strip_prefix("damaged: ")).collect();
+    let (is_sound, printed) = ballast(&["check", "--data", data]);
+    let damaged: Vec<_> = printed.lines().filter_map(|line| line.strip_prefix("damaged: ")).collect();
     let starts = [format!("entry 1 of session {}", sessions[0]), format!("the start of session {}", sessions[1])];
-    assert!(!is_sound && damaged.len() == 4 && starts.iter().all(|what| damaged.contains(&what.as_str())), "{said}");
+    assert!(!is_sound && damaged.len() == 4 && starts.iter().all(|what| damaged.contains(&what.as_str())), "{printed}");
     let name = damaged.iter().find_map(|what| what.strip_prefix("key ")).unwrap();
     assert!(!ballast(&["backup", "--data", data, "--out", text(&copy)]).0 && !copy.exists());
-    let (is_made, said) = ballast(&["backup", "--skip-damaged", "--data", data, "--out", text(&copy)]);
-    assert!(is_made && said.contains("with 4 damaged things"), "{said}");
+    let (is_made, printed) = ballast(&["backup", "--skip-damaged", "--data", data, "--out", text(&copy)]);
+    assert!(is_made && printed.contains("with 4 damaged things"), "{printed}");
     let restore = ["restore", "--from", text(&copy), "--data", text(&restored)];
     assert!(!ballast(&restore).0);
     assert!(ballast(&[&restore[..], &["--skip-damaged"]].concat()).0);
 
     let repair = |thing: &str, data: &str| ballast(&["repair", thing, "--from", text(&sound), "--data", data]);
-    let (is_repaired, said) = repair(&sessions[0], data);
-    assert!(!is_repaired && said.contains("locked by another process"), "{said}");
+    let (is_repaired, printed) = repair(&sessions[0], data);
+    assert!(!is_repaired && printed.contains("locked by another process"), "{printed}");
     let folder = text(&restored);
     assert!(repair("nobody", folder).1.contains("the backup has no session, policy or key 'nobody'"));
     for thing in sessions.iter().map(String::as_str).chain([name]) {
-        let (is_repaired, said) = repair(thing, folder);
-        assert!(is_repaired && said.contains("is sound"), "{said}");
+        let (is_repaired, printed) = repair(thing, folder);
+        assert!(is_repaired && printed.contains("is sound"), "{printed}");
     }
     // The total was put right with the sessions.
-    let (is_sound, said) = ballast(&["check", "--data", folder]);
-    assert!(is_sound, "{said}");
+    let (is_sound, printed) = ballast(&["check", "--data", folder]);
+    assert!(is_sound, "{printed}");
     let (_, audit) = ballast(&["audit", "--data", folder]);
     assert_eq!(audit.lines().filter(|line| line.contains("store.repair")).count(), 3, "{audit}");
     app.move_to(folder).await;
@@ -175,11 +175,11 @@ async fn what_is_damaged_is_listed_copied_and_put_back() {
     assert!(ballast(&["keys", "revoke", name, "--data", folder]).0);
     app.move_to("elsewhere").await;
     for (thing, reason) in [(sessions[1].as_str(), "was deleted"), (name, "was changed after the backup")] {
-        let (is_repaired, said) = repair(thing, folder);
-        assert!(!is_repaired && said.contains("nothing is repaired") && said.contains(reason), "{said}");
+        let (is_repaired, printed) = repair(thing, folder);
+        assert!(!is_repaired && printed.contains("nothing is repaired") && printed.contains(reason), "{printed}");
     }
     // What the backup has not cannot be made sound, and then nothing is changed.
     crate::support::execute(&restored, "UPDATE entries SET content_json = '{}' WHERE entry = 2").await;
-    let (is_repaired, said) = repair(&sessions[0], folder);
-    assert!(!is_repaired && said.contains(&format!("entry 2 of session {} is damaged", sessions[0])), "{said}");
+    let (is_repaired, printed) = repair(&sessions[0], folder);
+    assert!(!is_repaired && printed.contains(&format!("entry 2 of session {} is damaged", sessions[0])), "{printed}");
 }

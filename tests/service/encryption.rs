@@ -71,16 +71,16 @@ async fn callers_are_answered_over_tls_1_2_and_1_3_and_in_the_clear_not_at_all()
     assert!(ask(&address, "/readyz", &Authority::new().pem, rustls::ALL_VERSIONS).await.is_err(), "a stranger vouches");
     let mut plain = TcpStream::connect(&address).await.unwrap();
     plain.write_all(b"GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
-    let mut said = Vec::new();
-    let _ = plain.read_to_end(&mut said).await;
-    assert!(!String::from_utf8_lossy(&said).contains("HTTP/1.1"), "answered in the clear");
+    let mut received = Vec::new();
+    let _ = plain.read_to_end(&mut received).await;
+    assert!(!String::from_utf8_lossy(&received).contains("HTTP/1.1"), "answered in the clear");
     // A hello of TLS 1.1, from its record to its one cipher: refused by an alert (21), and by nothing else.
     let hello = [&[22, 3, 1, 0, 47, 1, 0, 0, 43, 3, 2][..], &[7; 32], &[0, 0, 2, 0, 47, 1, 0, 0, 0]].concat();
     let mut old = TcpStream::connect(&address).await.unwrap();
     old.write_all(&hello).await.unwrap();
-    let mut said = Vec::new();
-    let _ = old.read_to_end(&mut said).await;
-    assert!(said.first().is_none_or(|kind| *kind == 21), "{said:?}");
+    let mut received = Vec::new();
+    let _ = old.read_to_end(&mut received).await;
+    assert!(received.first().is_none_or(|kind| *kind == 21), "{received:?}");
 
     let health = |more: &[&str]| {
         let check = Command::new(env!("CARGO_BIN_EXE_ballast")).arg("healthcheck").args(more).output().unwrap();
@@ -126,8 +126,8 @@ async fn a_new_certificate_counts_without_a_restart_and_a_bad_one_does_not() {
         after_a_refusal("a certificate without its key to be noticed", &|| put("cert.pem", &own.pem)).await;
     assert_eq!(without_key, first, "a certificate without its key is in force");
     put("key.pem", &own.key);
-    let taken = async || Some(shown().await.1).filter(|shown| *shown != first);
-    let second = until("the new certificate to be taken", taken).await;
+    let new_certificate = async || Some(shown().await.1).filter(|shown| *shown != first);
+    let second = until("the new certificate to be served", new_certificate).await;
     assert_eq!(second, CertificateDer::from_pem_slice(own.pem.as_bytes()).unwrap().to_vec());
     let key = folder.path().join("key.pem");
     let gone = after_a_refusal("a key to be missed", &|| std::fs::remove_file(&key).unwrap()).await;
@@ -145,7 +145,7 @@ fn a_certificate_that_cannot_serve_refuses_the_start() {
     let authority = Authority::new();
     let (one, other) = (authority.certificate("127.0.0.1"), authority.certificate("127.0.0.1"));
     let folder = tempfile::tempdir().unwrap();
-    let said = |prepare: &dyn Fn(&Path)| {
+    let complaint = |prepare: &dyn Fn(&Path)| {
         write(folder.path(), &one);
         prepare(folder.path());
         let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
@@ -167,8 +167,11 @@ fn a_certificate_that_cannot_serve_refuses_the_start() {
         ("a key that is none", &put("key.pem", "x".into()), "holds no private key"),
         ("another's key", &put("key.pem", other.key.clone()), "no pair to serve by"),
     ] {
-        let said = said(prepare);
-        assert!(said.contains("cannot encrypt connections") && said.contains(expected), "{what}: {said}");
+        let complaint = complaint(prepare);
+        assert!(
+            complaint.contains("cannot encrypt connections") && complaint.contains(expected),
+            "{what}: {complaint}"
+        );
     }
     let alone = Command::new(env!("CARGO_BIN_EXE_ballast")).args(["serve", "--tls-cert", "cert.pem"]).output().unwrap();
     assert!(!alone.status.success() && String::from_utf8_lossy(&alone.stderr).contains("--tls-key"), "{alone:?}");

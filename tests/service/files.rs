@@ -126,8 +126,8 @@ async fn two_services_never_have_one_folder() {
     let stopped = rustix::process::waitpid(Some(pid), rustix::process::WaitOptions::UNTRACED).unwrap();
     assert!(stopped.is_some_and(|(_, status)| status.stopped()));
     removed(&lock);
-    let (code, said) = refused(&data);
-    assert!(code == Some(1) && said.contains("ballast.sqlite is locked by another process"), "{code:?}: {said}");
+    let (code, stderr) = refused(&data);
+    assert!(code == Some(1) && stderr.contains("ballast.sqlite is locked by another process"), "{code:?}: {stderr}");
     rustix::process::kill_process(pid, rustix::process::Signal::CONT).unwrap();
     assert_eq!(served.ended().await, Some(STORE_FAILED));
 }
@@ -143,11 +143,11 @@ async fn a_folder_that_had_keys_is_not_served_without() {
     let folder = TempDir::new().unwrap();
     let data = folder.path().join("data");
     let serve = ["serve", "--listen", "127.0.0.1:0"];
-    let (code, said) = ballast(&[&serve[..], &["--require-keys"]].concat(), &data);
-    assert!(code == Some(1) && said.contains("--require-keys") && said.contains("ballast keys create"), "{said}");
+    let (code, stderr) = ballast(&[&serve[..], &["--require-keys"]].concat(), &data);
+    assert!(code == Some(1) && stderr.contains("--require-keys") && stderr.contains("ballast keys create"), "{stderr}");
     for wrong in [&["keys", "create", "--role", "admin"][..], &["keys", "list"], &["audit"]] {
-        let (code, said) = ballast(wrong, &data.join("wrong"));
-        assert!(code == Some(1) && said.contains("ballast.sqlite"), "{said}");
+        let (code, stderr) = ballast(wrong, &data.join("wrong"));
+        assert!(code == Some(1) && stderr.contains("ballast.sqlite"), "{stderr}");
         assert!(!data.join("wrong").exists(), "{wrong:?} makes nothing");
     }
     let new = ["keys", "create", "--role", "admin", "--new"];
@@ -156,8 +156,8 @@ async fn a_folder_that_had_keys_is_not_served_without() {
     for file in ["ballast.sqlite", "ballast.sqlite-wal", "ballast.sqlite-shm"] {
         let _ = std::fs::remove_file(data.join(file));
     }
-    let (code, said) = ballast(&serve, &data);
-    assert!(code == Some(1) && said.contains("ballast.keys says that the store had keys"), "{said}");
+    let (code, stderr) = ballast(&serve, &data);
+    assert!(code == Some(1) && stderr.contains("ballast.keys says that the store had keys"), "{stderr}");
     assert_eq!(ballast(&new, &data).0, Some(0));
     let (child, url) = process::serve(|command| {
         command.args(["--require-keys", "--data"]).arg(&data);
@@ -176,8 +176,8 @@ async fn a_service_that_is_open_says_so_in_its_log() {
         command.arg("--data").arg(data).stderr(file);
     });
     let _served = Served(Process(child), App::at(url, folder));
-    let said = std::fs::read_to_string(log).unwrap();
-    assert!(said.contains("WARN") && said.contains("holds no key: every caller is answered"), "{said}");
+    let logged = std::fs::read_to_string(log).unwrap();
+    assert!(logged.contains("WARN") && logged.contains("holds no key: every caller is answered"), "{logged}");
 }
 
 /// Whoever closes a folder leaves it to the next.

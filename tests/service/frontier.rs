@@ -104,9 +104,9 @@ fn intervals_beyond_the_own_mix_are_as_wide_as_seeds_differ() {
         let mean = values.iter().sum::<f64>() / 16.0;
         let deviation = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 15.0).sqrt();
         // The lower end, which nothing cuts off: 1.66 standard errors of 100 records.
-        let told = found.iter().map(|report| (beyond(report).value - beyond(report).low) / 1.66).sum::<f64>() / 16.0;
+        let implied = found.iter().map(|report| (beyond(report).value - beyond(report).low) / 1.66).sum::<f64>() / 16.0;
         // A deviation of sixteen errs by a fifth.
-        assert!((0.45..1.7).contains(&(deviation / told)), "{index}: {deviation} {told}");
+        assert!((0.45..1.7).contains(&(deviation / implied)), "{index}: {deviation} {implied}");
         assert!(found.iter().all(|report| beyond(report).high <= 0.0));
     }
 }
@@ -169,12 +169,12 @@ fn the_command_asks_of_the_columns_of_a_file_what_the_service_is_asked() {
     let expected = report(&json!({ "problem": problem, "scales": [0.0, 0.5] }));
     assert_eq!(serde_json::from_str::<Value>(&found).unwrap(), serde_json::to_value(&expected).unwrap());
     assert_eq!(expected.request.resamples, Some(60));
-    let told = frontier(&["--resamples", "20"]);
+    let output = frontier(&["--resamples", "20"]);
     assert!(
-        told.contains("Each of the 12 columns is an asset; --column takes one alone. The last 60 periods are used"),
-        "{told}"
+        output.contains("Each of the 12 columns is an asset; --column takes one alone. The last 60 periods are used"),
+        "{output}"
     );
-    assert!(told.ends_with(&format!("{}\n", expected.sentences.last().unwrap())), "{told}");
+    assert!(output.ends_with(&format!("{}\n", expected.sentences.last().unwrap())), "{output}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -130,13 +130,13 @@ async fn a_session_of_several_assets_is_lived_by_their_names(mut app: App) {
     assert_eq!(fourth["completed"], true);
     // What was told at the end is what a replay says.
     let detail = |value: Value| json!([value["wealth"], value["holding"], value["assets"]["composition"]]);
-    let (path, told) = (
+    let (path, expected) = (
         format!("/sessions/{}", app.session),
         json!([fourth["wealth"], fourth["holding"], fourth["assets"]["composition"]]),
     );
-    assert_eq!(detail(app.get(&path).await.1), told);
+    assert_eq!(detail(app.get(&path).await.1), expected);
     app.restart().await;
-    assert_eq!(detail(app.get(&path).await.1), told);
+    assert_eq!(detail(app.get(&path).await.1), expected);
     let history = app.get(&format!("/sessions/{}/history", app.session)).await.1;
     assert_eq!(history["history"], json!(ROWS));
     assert_eq!(history["assets"], json!(["stocks", "bonds", "gold"]));
@@ -225,10 +225,10 @@ async fn a_session_of_several_assets_is_renewed_by_itself(mut app: App) {
 /// What the periods of an account make of it: `x' = x (1 - c sum_i |a_i - h_i|) ((1 - sum_i a_i)(1 + r) + sum_i a_i e^(z_i)) + C`.
 async fn money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_formula(mut app: App) {
     const COST: f64 = 0.002;
-    let mut asked = request(4);
-    asked["problem"]["trading_cost"] = json!(COST);
-    asked["problem"]["contributions"] = json!([10.0, -5.0, 20.0, 0.0]);
-    app.train(&asked).await;
+    let mut training = request(4);
+    training["problem"]["trading_cost"] = json!(COST);
+    training["problem"]["contributions"] = json!([10.0, -5.0, 20.0, 0.0]);
+    app.train(&training).await;
     app.open_with(json!({ "wealth": 1000.0, "holdings": { "stocks": 0.2, "bonds": 0.1, "gold": 0.0 } })).await;
     let (mut wealth, mut held) = (1000.0, vec![0.2, 0.1, 0.0]);
     let executed = json!({ "stocks": 0.3, "bonds": 0.2, "gold": 0.1 });
@@ -260,8 +260,11 @@ async fn money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_for
         assert_eq!(status, 200, "{observed}");
         assert!((number(&observed["wealth"]) / expected - 1.0).abs() < 1e-12, "{report}: {observed} {expected}");
         held = grown.iter().map(|grown| left * grown / expected).collect();
-        let told = listed(&observed["assets"]["holdings"]);
-        assert!(told.iter().zip(&held).all(|(told, held)| (told - held).abs() < 1e-12), "{observed} {held:?}");
+        let holdings = listed(&observed["assets"]["holdings"]);
+        assert!(
+            holdings.iter().zip(&held).all(|(holding, held)| (holding - held).abs() < 1e-12),
+            "{observed} {held:?}"
+        );
         assert_eq!((&observed["sample_size"], &observed["date"]), (&json!(seen), &report["date"]), "{observed}");
         assert_eq!(observed["assets"]["log_returns"].is_null(), report["missing"] == true, "{observed}");
         wealth = number(&observed["wealth"]);
@@ -332,8 +335,8 @@ async fn what_is_wrong_of_several_assets_is_named() {
     // 0.9 is far from a record whose deviation is 0.03.
     let (status, slip) = app.report(1, json!({ "simple_returns": all(0.9) })).await;
     assert_eq!((status.as_u16(), &slip["field"]), (409, &json!("simple_returns.stocks")), "{slip}");
-    let (status, told) = app.get(&format!("/action?session={}&sensitivity=true", app.session)).await;
-    assert_eq!((status.as_u16(), &told["field"]), (422, &json!("sensitivity")), "{told}");
+    let (status, refused) = app.get(&format!("/action?session={}&sensitivity=true", app.session)).await;
+    assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("sensitivity")), "{refused}");
     let open = |start: Value| {
         let mut start = start;
         start["policy"] = json!(app.policy);
@@ -587,9 +590,9 @@ async fn a_fund_that_does_not_vary_is_not_taken(mut app: App) {
 /// The fields of an answer to `/action`, taken from an answer of `/what-if`.
 #[track_caller]
 fn assert_same_action(what_if: &Value, action: &Value) {
-    let told =
+    let fields =
         action.as_object().unwrap().iter().filter(|(field, _)| !["caution", "session"].contains(&field.as_str()));
-    for (field, value) in told {
+    for (field, value) in fields {
         assert_eq!(&what_if[field], value, "{field}: {what_if} {action}");
     }
 }
@@ -683,9 +686,9 @@ async fn what_is_supposed_of_several_assets_is_what_a_twin_is_told() {
     assert_eq!(status, 200, "{corrected}");
     let again = with(&returns[0], &json!({ "correction": 2, "period": 1, "reason": "none" }));
     assert_eq!(app.post(&format!("/sessions/{session}/corrections"), &again).await.0, 200);
-    let told = what_if(&app, &session, start.clone()).await;
+    let answer = what_if(&app, &session, start.clone()).await;
     app.restart().await;
-    assert_eq!(what_if(&app, &session, start).await, told);
+    assert_eq!(what_if(&app, &session, start).await, answer);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -718,8 +721,8 @@ async fn what_cannot_be_supposed_is_named() {
         let mut request = supposed.clone();
         request["session"] = json!(session);
         let (status, problem) = app.post("/what-if", &request).await;
-        let told = (status.as_u16(), problem["field"].as_str());
-        assert_eq!(told, (422, Some(field)), "{supposed}: {problem}");
+        let found = (status.as_u16(), problem["field"].as_str());
+        assert_eq!(found, (422, Some(field)), "{supposed}: {problem}");
     }
     app.session.clone_from(&several);
     let returns = json!({ "stocks": 0.01, "bonds": 0.002, "gold": 0.0 });

@@ -82,14 +82,14 @@ async fn a_skipped_period_is_asked_about_and_reported_as_missing(mut app: App) {
     for (period, date) in (2..).zip(missing) {
         recorded(&app, period, json!({ "missing": true, "date": date })).await;
     }
-    let told = recorded(&app, 7, november.clone()).await;
-    assert_eq!(recorded(&app, 7, november).await, told, "the same again");
+    let first = recorded(&app, 7, november.clone()).await;
+    assert_eq!(recorded(&app, 7, november).await, first, "the same again");
     // Half a month early or late is the same month.
     recorded(&app, 8, json!({ "simple_return": 0.0, "date": "2019-12-20" })).await;
     let (reasons, _) = doubted(&app, 9, json!({ "simple_return": 0.0, "date": "2019-12-31" })).await;
     assert_eq!(reasons, ["early_day"]);
-    let told = recorded(&app, 9, json!({ "simple_return": 0.0, "date": "2019-12-31", "confirm": true })).await;
-    assert_eq!(told["date"], "2019-12-31");
+    let confirmed = recorded(&app, 9, json!({ "simple_return": 0.0, "date": "2019-12-31", "confirm": true })).await;
+    assert_eq!(confirmed["date"], "2019-12-31");
 }
 
 async fn one_answer_names_every_doubt(mut app: App) {
@@ -248,7 +248,7 @@ async fn a_wrong_period_is_taken_out(mut app: App) {
     recorded(&app, 1, report("2019-01-31", 0.01)).await;
     let before = standing(&app).await;
     let wrong = report("2019-02-28", 0.05);
-    let told = recorded(&app, 2, wrong.clone()).await;
+    let observed = recorded(&app, 2, wrong.clone()).await;
     let (status, refused) = correct(&app, 1, json!({ "period": 2, "change": "remove", "missing": true })).await;
     assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("change")), "{refused}");
     let (status, answer) = correct(&app, 1, json!({ "period": 2, "change": "remove" })).await;
@@ -264,7 +264,7 @@ async fn a_wrong_period_is_taken_out(mut app: App) {
     assert_eq!((&list["sessions"][0]["period"], &list["sessions"][0]["wealth"]), (&json!(2), &before[0]["wealth"]));
     // The period is observed anew, once.
     let right = recorded(&app, 2, report("2019-02-28", 0.02)).await;
-    assert_ne!(right["wealth"], told["wealth"]);
+    assert_ne!(right["wealth"], observed["wealth"]);
     assert_eq!(recorded(&app, 2, report("2019-02-28", 0.02)).await, right);
     assert_eq!(app.report(2, wrong).await.0, 409);
     recorded(&app, 3, report("2019-03-31", 0.0)).await;

@@ -313,10 +313,10 @@ async fn keys_are_made_and_revoked_while_the_service_runs() {
     });
     let (_process, mut app) = (Process(child), App::at(url, folder));
     assert_eq!(app.get("/jobs").await.0, 200);
-    let (code, key, said) =
+    let (code, key, stderr) =
         ballast(&["keys", "create", "--tenant", "north", "--role", "read", "--role", "train", "--data", &data]);
-    assert_eq!(code, Some(0), "{said}");
-    assert!(key.starts_with("ballast_") && key.len() == 72 && !said.contains(&key), "{said}");
+    assert_eq!(code, Some(0), "{stderr}");
+    assert!(key.starts_with("ballast_") && key.len() == 72 && !stderr.contains(&key), "{stderr}");
     until("the door to close", async || app.get("/jobs").await.0 == 401).await;
     app.hold(&key);
     assert_eq!(app.get("/jobs").await.0, 200);
@@ -337,10 +337,10 @@ async fn keys_are_made_and_revoked_while_the_service_runs() {
     // Without any key in force the door stays closed.
     app.hold("");
     assert_eq!(app.get("/jobs").await.0, 401);
-    let (code, _, said) = ballast(&["keys", "revoke", "key_of_nobody", "--data", &data]);
-    assert!(code == Some(1) && said.contains("there is no key 'key_of_nobody'"), "{said}");
-    let (code, _, said) = ballast(&["keys", "create", "--role", "read", "--tenant", "no spaces", "--data", &data]);
-    assert!(code == Some(2) && said.contains("letters, digits"), "{said}");
+    let (code, _, stderr) = ballast(&["keys", "revoke", "key_of_nobody", "--data", &data]);
+    assert!(code == Some(1) && stderr.contains("there is no key 'key_of_nobody'"), "{stderr}");
+    let (code, _, stderr) = ballast(&["keys", "create", "--role", "read", "--tenant", "no spaces", "--data", &data]);
+    assert!(code == Some(2) && stderr.contains("letters, digits"), "{stderr}");
 }
 
 /// What a key is told when it is shown: the status and the problem.
@@ -358,9 +358,9 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
     });
     let (_process, mut app) = (Process(child), App::at(url, folder));
     let create = |more: &[&str]| {
-        let (code, key, said) = ballast(&[&["keys", "create", "--role", "admin", "--data", &data], more].concat());
-        assert_eq!(code, Some(0), "{said}");
-        (key, said.split(',').next().unwrap().to_owned())
+        let (code, key, stderr) = ballast(&[&["keys", "create", "--role", "admin", "--data", &data], more].concat());
+        assert_eq!(code, Some(0), "{stderr}");
+        (key, stderr.split(',').next().unwrap().to_owned())
     };
     let (revoked, revoked_name) = create(&[]);
     let (old, old_name) = create(&["--expires-in", "90d"]);
@@ -371,8 +371,8 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
     let job = app.queue(&slow).await;
     let following = app.client.get(format!("{}/jobs/{job}/events", app.url)).send().await.unwrap();
 
-    let (code, new, said) = ballast(&["keys", "rotate", &old_name, "--overlap", "6s", "--data", &data]);
-    assert!(code == Some(0) && said.matches("in force until").count() == 2, "{said}");
+    let (code, new, stderr) = ballast(&["keys", "rotate", &old_name, "--overlap", "6s", "--data", &data]);
+    assert!(code == Some(0) && stderr.matches("in force until").count() == 2, "{stderr}");
     app.hold(&new);
     // Never is there a moment in which neither of the two is answered.
     until("the successor to count", async || {
@@ -401,11 +401,11 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
     let (_, gone) = shown(&mut app, &revoked).await;
     assert_eq!(gone["value"], "another key");
     assert_eq!(gone, shown(&mut app, "ballast_0").await.1);
-    let (code, _, said) = ballast(&["keys", "rotate", &old_name, "--data", &data]);
-    assert!(code == Some(1) && said.contains("must be in force"), "{said}");
+    let (code, _, stderr) = ballast(&["keys", "rotate", &old_name, "--data", &data]);
+    assert!(code == Some(1) && stderr.contains("must be in force"), "{stderr}");
     for wrong in [["--expires-in", "0d"], ["--expires-on", "tomorrow"], ["--expires-on", "2001-01-01"]] {
-        let (code, _, said) = ballast(&[&["keys", "create", "--role", "read", "--data", &data], &wrong[..]].concat());
-        assert!(code != Some(0) && said.contains("must"), "{said}");
+        let (code, _, stderr) = ballast(&[&["keys", "create", "--role", "read", "--data", &data], &wrong[..]].concat());
+        assert!(code != Some(0) && stderr.contains("must"), "{stderr}");
     }
 }
 
@@ -413,10 +413,13 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
 async fn an_address_that_others_reach_asks_for_keys() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().to_str().unwrap().to_owned();
-    let (code, _, said) = ballast(&["serve", "--listen", "0.0.0.0:0", "--data", &data]);
-    assert!(code == Some(1) && said.contains("--tls-cert") && said.contains("--allow-plaintext"), "{said}");
-    let (code, _, said) = ballast(&["serve", "--listen", "0.0.0.0:0", "--allow-plaintext", "--data", &data]);
-    assert!(code == Some(1) && said.contains("ballast keys create") && said.contains("--allow-anonymous"), "{said}");
+    let (code, _, stderr) = ballast(&["serve", "--listen", "0.0.0.0:0", "--data", &data]);
+    assert!(code == Some(1) && stderr.contains("--tls-cert") && stderr.contains("--allow-plaintext"), "{stderr}");
+    let (code, _, stderr) = ballast(&["serve", "--listen", "0.0.0.0:0", "--allow-plaintext", "--data", &data]);
+    assert!(
+        code == Some(1) && stderr.contains("ballast keys create") && stderr.contains("--allow-anonymous"),
+        "{stderr}"
+    );
     let public = |allow: Option<(&str, &str)>| {
         let (child, url) = process::serve(|command| {
             command.args(["--listen", "0.0.0.0:0", "--allow-plaintext", "--data", &data]).envs(allow);

@@ -119,8 +119,8 @@ async fn names_with_control_characters_are_refused_with_their_place() {
     let mut several = several_assets(2);
     several["problem"]["assets"][1] = json!("bo\u{7}nds");
     let advise = json!({ "problem": { "assets": ["stocks", "bo\u{7}nds"], "rate_per_step": 0.001, "history": [[0.1, 0.0], [0.0, 0.1]] } });
-    for (path, asked) in [("/train", several), ("/advise", advise)] {
-        let (status, refused) = app.post(path, &asked).await;
+    for (path, body) in [("/train", several), ("/advise", advise)] {
+        let (status, refused) = app.post(path, &body).await;
         assert_eq!(
             (status, &refused["field"]),
             (StatusCode::UNPROCESSABLE_ENTITY, &json!("problem.assets[1]")),

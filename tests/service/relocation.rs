@@ -50,8 +50,8 @@ async fn a_folder_moves_into_a_database_and_goes_on() {
     app.halt().await;
     let moved = relocate(&app, &url);
     assert!(moved.status.success(), "{}", String::from_utf8_lossy(&moved.stderr));
-    let said = String::from_utf8(moved.stdout).unwrap();
-    assert!(said.contains("entries: 5 rows moved") && said.contains("sound"), "{said}");
+    let output = String::from_utf8(moved.stdout).unwrap();
+    assert!(output.contains("entries: 5 rows moved") && output.contains("sound"), "{output}");
     assert!(complaint(&relocate(&app, &url)).contains("has rows"), "the database is not empty");
 
     let store = url.parse().unwrap();

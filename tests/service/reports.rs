@@ -39,8 +39,8 @@ async fn elements_are_as_calls(mut app: App, north: String, south: String) {
     }
     let report = |session: &str, period: usize, log_return: f64| json!({ "session": session, "period": period, "log_return": log_return });
     let alone = report(&sessions[1], 1, 0.02);
-    let (status, told) = app.post("/observe", &alone).await;
-    assert_eq!(status, 200, "{told}");
+    let (status, answer) = app.post("/observe", &alone).await;
+    assert_eq!(status, 200, "{answer}");
     let list = json!([
         report(&sessions[0], 1, 0.01),
         alone,
@@ -52,7 +52,7 @@ async fn elements_are_as_calls(mut app: App, north: String, south: String) {
     ]);
     let answers = reported(&app, &list).await;
     assert_eq!(statuses(&answers), [200, 200, 404, 409, 404, 409, 422], "{answers:?}");
-    assert_eq!(answers[1]["answer"], told);
+    assert_eq!(answers[1]["answer"], answer);
     assert_eq!(reported(&app, &list).await, answers, "the same list again");
     for (answer, report) in answers.iter().zip(list.as_array().unwrap()) {
         assert_eq!([&answer["session"], &answer["period"]], [&report["session"], &report["period"]]);

@@ -64,8 +64,10 @@ fn check_questions(row: &Value, found: &Value) {
     // An answer settles its question.
     for question in questions {
         for option in question["options"].as_array().unwrap() {
-            let said: Choices = serde_json::from_value(option["choices"].clone()).unwrap();
-            let Reading::Asked { questions, .. } = read(&text(row["file"].as_str().unwrap()), &said) else { continue };
+            let choices: Choices = serde_json::from_value(option["choices"].clone()).unwrap();
+            let Reading::Asked { questions, .. } = read(&text(row["file"].as_str().unwrap()), &choices) else {
+                continue;
+            };
             assert!(questions.iter().all(|other| other.asks != question["asks"]), "{row} {option}");
         }
     }
@@ -81,8 +83,8 @@ async fn every_file_of_the_table_is_answered_as_it_must_be_by_library_and_servic
     assert!(files.len() >= 70 && files.iter().map(String::as_str).eq(named), "{files:?}");
     for row in rows {
         let text = text(row["file"].as_str().unwrap());
-        let said = if row["choices"].is_object() { row["choices"].clone() } else { json!({}) };
-        let found = serde_json::to_value(read(&text, &serde_json::from_value(said.clone()).unwrap())).unwrap();
+        let choices = if row["choices"].is_object() { row["choices"].clone() } else { json!({}) };
+        let found = serde_json::to_value(read(&text, &serde_json::from_value(choices.clone()).unwrap())).unwrap();
         assert_eq!(found["outcome"], row["outcome"], "{row}\n{found}");
         match row["outcome"].as_str().unwrap() {
             "read" => check_record(&row, &found),
@@ -97,7 +99,7 @@ async fn every_file_of_the_table_is_answered_as_it_must_be_by_library_and_servic
                 );
             }
         }
-        let (status, answered) = app.post("/returns", &json!({ "text": text, "choices": said })).await;
+        let (status, answered) = app.post("/returns", &json!({ "text": text, "choices": choices })).await;
         assert_eq!((status.as_u16(), answered), (200, found), "{row}");
     }
     for (body, field) in [
@@ -120,9 +122,9 @@ async fn a_text_beyond_all_bounds_is_refused_and_one_within_is_read_in_time() {
         ("0.01,".repeat(1_500_000), "The text has 1500000 cells: it must have at most 1000000."),
         ("1".repeat(8_000_001), "The text has 8000001 bytes: it must have at most 8000000."),
     ];
-    for (text, said) in refusals {
+    for (text, sentence) in refusals {
         let (status, answered) = app.post("/returns", &json!({ "text": text })).await;
-        assert_eq!((status.as_u16(), &answered["sentence"]), (200, &json!(said)));
+        assert_eq!((status.as_u16(), &answered["sentence"]), (200, &json!(sentence)));
     }
     let started = Instant::now();
     for text in [many, "a,".repeat(499_999), "\"".repeat(5_900_000), "1 ".repeat(499_999), "1/2/2020;".repeat(199_999)]
@@ -149,9 +151,9 @@ fn every_file_of_a_vendor_is_read_asked_about_or_refused_as_it_must_be() {
     let mut wrong = Vec::new();
     for row in rows {
         let bytes = std::fs::read(folder.join(row["file"].as_str().unwrap())).unwrap();
-        let said = if row["choices"].is_object() { row["choices"].clone() } else { json!({}) };
+        let choices = if row["choices"].is_object() { row["choices"].clone() } else { json!({}) };
         let reading = match decoded(&bytes) {
-            Ok(text) => read(&text, &serde_json::from_value(said).unwrap()),
+            Ok(text) => read(&text, &serde_json::from_value(choices).unwrap()),
             Err(sentence) => Reading::Refused { sentence, place: None },
         };
         let (outcome, says) = match &reading {
@@ -194,9 +196,9 @@ fn months(of: impl Fn(f64) -> f64, count: usize) -> Vec<String> {
 #[test]
 fn short_runs_are_asked_about_where_they_may_be_percent_and_seldom_elsewhere() {
     for (count, most_of_stocks, fewest_of_calm) in [(4, 0.09, 0.5), (6, 0.08, 0.7), (12, 0.03, 0.85), (24, 0.02, 0.9)] {
-        let asked = |texts: Vec<String>| {
-            let said = Choices::from(Kind::Simple);
-            let is_average = |text: &&String| match read(text, &said) {
+        let share_asked = |texts: Vec<String>| {
+            let choices = Choices::from(Kind::Simple);
+            let is_average = |text: &&String| match read(text, &choices) {
                 Reading::Asked { questions, .. } => {
                     questions[0].asks == "unit" && questions[0].question.contains("they average")
                 }
@@ -204,7 +206,8 @@ fn short_runs_are_asked_about_where_they_may_be_percent_and_seldom_elsewhere() {
             };
             texts.iter().filter(is_average).count() as f64 / texts.len() as f64
         };
-        let (stocks, calm) = (asked(months(|back| back, count)), asked(months(|back| 0.05 + 0.8 * back, count)));
+        let (stocks, calm) =
+            (share_asked(months(|back| back, count)), share_asked(months(|back| 0.05 + 0.8 * back, count)));
         assert!(stocks < most_of_stocks && calm > fewest_of_calm, "{count}: {stocks} {calm}");
     }
 }
@@ -293,7 +296,7 @@ fn written(seed: u32) -> (String, Vec<f64>) {
 
 #[test]
 fn records_are_read_as_they_were_written_or_asked_about() {
-    let (mut records, mut asked) = (0, 0);
+    let (mut records, mut questioned) = (0, 0);
     for seed in 1..=4000 {
         let (text, truth) = written(seed);
         match read(&text, &Choices::default()) {
@@ -303,11 +306,11 @@ fn records_are_read_as_they_were_written_or_asked_about() {
                 assert!(near, "seed {seed}: {sentence}\n{text}");
                 records += 1;
             }
-            Reading::Asked { .. } => asked += 1,
+            Reading::Asked { .. } => questioned += 1,
             Reading::Refused { sentence, .. } => panic!("seed {seed}: {sentence}\n{text}"),
         }
     }
-    assert!(records > 2000 && asked > 0, "{records} {asked}");
+    assert!(records > 2000 && questioned > 0, "{records} {questioned}");
 }
 
 /// A word that says there is no number leaves out the last row with a remark; everywhere else, and any other word, stops.
@@ -339,7 +342,7 @@ fn a_cell_out_of_place_is_never_passed_over() {
 /// nothing is read of them in another kind or unit.
 #[test]
 fn one_impossible_cell_never_changes_what_the_others_are() {
-    let (mut refused, mut asked) = (0, 0);
+    let (mut refused, mut questioned) = (0, 0);
     for seed in 1..=1000 {
         let mut random = Random(seed + 5_000_000);
         let count = 6 + random.below(60);
@@ -375,7 +378,7 @@ fn one_impossible_cell_never_changes_what_the_others_are() {
                     assert_eq!((place.line, place.value.as_str()), (at + 2, *odd), "seed {seed}");
                     refused += 1;
                 }
-                (Reading::Asked { .. }, _) => asked += 1,
+                (Reading::Asked { .. }, _) => questioned += 1,
                 (Reading::Refused { sentence, .. }, _) => panic!("seed {seed}: {sentence}"),
                 (Reading::Read(record), whole) => {
                     panic!("seed {seed}: {odd} in {kind}: {}\nwithout: {whole:?}", record.sentence)
@@ -383,7 +386,7 @@ fn one_impossible_cell_never_changes_what_the_others_are() {
             }
         });
     }
-    assert!(refused > 1500 && asked < refused / 2, "{refused} {asked}");
+    assert!(refused > 1500 && questioned < refused / 2, "{refused} {questioned}");
 }
 
 /// Texts of the most lines whose rows look like dates of many forms, or like none, are answered in time.
@@ -444,9 +447,9 @@ fn ordinary_records_are_not_asked_about() {
             texts.push((text, Choices::default()));
         }
     }
-    for (text, said) in texts {
-        let found = read(&text, &said);
-        let Reading::Read(record) = found else { panic!("{said:?}: {found:?}") };
+    for (text, choices) in texts {
+        let found = read(&text, &choices);
+        let Reading::Read(record) = found else { panic!("{choices:?}: {found:?}") };
         assert!(record.sentence.contains("as fractions"), "{}", record.sentence);
     }
 }

@@ -313,13 +313,13 @@ async fn a_session_tells_whether_its_returns_come_as_those_before_did() {
     for (period, log_return) in (1..).zip([0.17, 0.014, -0.16]) {
         assert_eq!(app.observe(period, log_return).await.0, 200);
         record.push(log_return);
-        let told = drift(&app).await;
-        let ([further, as_far], capital) = (as_far(&record, log_return), number(&told["capital"]));
-        let p_value = number(&told["p_value"]);
-        assert!(further < p_value && p_value <= as_far, "{further} {told} {as_far}");
+        let reported = drift(&app).await;
+        let ([further, as_far], capital) = (as_far(&record, log_return), number(&reported["capital"]));
+        let p_value = number(&reported["p_value"]);
+        assert!(further < p_value && p_value <= as_far, "{further} {reported} {as_far}");
         // A bet on returns that lie far out wins with these and loses with one from the middle.
-        assert_eq!(capital > before, log_return.abs() > 0.1, "{told}");
-        assert!(number(&told["highest"]) >= capital.max(before), "{told}");
+        assert_eq!(capital > before, log_return.abs() > 0.1, "{reported}");
+        assert!(number(&reported["highest"]) >= capital.max(before), "{reported}");
         before = capital;
     }
 }

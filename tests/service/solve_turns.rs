@@ -32,10 +32,10 @@ async fn open(app: &App, history: &[f64]) -> String {
 async fn solved_within(app: &App, session: &str) -> Duration {
     let mut times = Vec::new();
     for _ in 0..ROUNDS {
-        let asked = Instant::now();
+        let started = Instant::now();
         let (status, answer) = app.get(&format!("/action?session={session}&mode=resolve")).await;
         assert_eq!(status, 200, "{answer}");
-        times.push(asked.elapsed());
+        times.push(started.elapsed());
     }
     times.sort();
     times[ROUNDS / 2]

@@ -483,11 +483,11 @@ async fn every_entry_is_stored_once_and_in_order(place: &Place) {
     let second = store.entry("s", EntryKind::Observation, 2).await.unwrap().unwrap();
     assert_eq!((second.entry, second.number), (3, 2));
     assert_eq!(store.sessions(&Tenant::default(), &newest(10)).await.unwrap().sessions[0].observations, 2);
-    let told = |row: AuditRow| (row.deed, row.outcome);
+    let summary = |row: AuditRow| (row.deed, row.outcome);
     let filter = AuditFilter { object: Some("s".into()), ..AuditFilter::default() };
-    let audit = store.deeds(&filter, 10, None).await.unwrap().into_iter().map(told);
+    let audit = store.deeds(&filter, 10, None).await.unwrap().into_iter().map(summary);
     let corrected = ("session.correct".to_owned(), "correction 1 recorded".to_owned());
-    assert_eq!(audit.filter(|told| *told == corrected).count(), 1);
+    assert_eq!(audit.filter(|deed| *deed == corrected).count(), 1);
     assert!(store.delete_session(&Tenant::default(), "s").await.unwrap());
     assert_eq!(store.entries("s").await.unwrap(), None);
     assert_eq!(store.usage(&Tenant::default()).await.unwrap().sessions, 0);

@@ -428,9 +428,9 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 assets: 0,
                 created_ms: model.now,
             };
-            let taken = model.sessions.iter().any(|row| row.0 == session);
+            let exists = model.sessions.iter().any(|row| row.0 == session);
             let (kept, limit) = (model.sessions.len() as u64, QUOTAS.sessions.into());
-            let expected = match (model.policies.contains(&(0, policy)), taken) {
+            let expected = match (model.policies.contains(&(0, policy)), exists) {
                 (false, _) => CreateSession::NoPolicy,
                 (true, true) => CreateSession::Exists,
                 (true, false) if kept >= limit => {

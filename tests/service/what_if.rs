@@ -30,8 +30,8 @@ async fn what_if(app: &App, mut request: Value) -> Value {
 /// The fields of an answer to `/action`, taken from an answer of `/what-if`.
 #[track_caller]
 fn assert_same_action(what_if: &Value, action: &Value) {
-    let told = action.as_object().unwrap().iter().filter(|(field, _)| *field != "caution");
-    for (field, value) in told {
+    let fields = action.as_object().unwrap().iter().filter(|(field, _)| *field != "caution");
+    for (field, value) in fields {
         assert_eq!(&what_if[field], value, "{field}: {what_if} {action}");
     }
 }
