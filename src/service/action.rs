@@ -104,7 +104,7 @@ impl Sessions {
         advisor: &Advisor,
     ) -> Result<(State, Vec<f64>), ServiceError> {
         if live.standing.assets.is_some() {
-            let rule = "must be left out: it is not told of several assets";
+            let rule = "must be left out: the sensitivity is not computed for several assets";
             return Err(FieldError::new("sensitivity", true, rule).into());
         }
         let Large { value: mut facts, room: _room } = self.facts(tenant, &live.row.session).await?;

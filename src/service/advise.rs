@@ -88,7 +88,7 @@ impl Advise {
         let holding = self.holding.unwrap_or(0.0);
         rules::share("holding", holding)?;
         if self.problem.horizon != 1 {
-            let rule = "must be 1 or left out: one period is advised; train a policy for more";
+            let rule = "must be 1 or left out: this call advises one period. Train a policy for more";
             return Err(FieldError::new("problem.horizon", self.problem.horizon, rule));
         }
         if let Some(wealth) = self.wealth {

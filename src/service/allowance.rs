@@ -91,11 +91,11 @@ pub struct Allowance {
 pub enum Refused {
     #[error("more than {} {} calls in a second", .1.per_second, .0.name())]
     TooOften(Class, TooMany),
-    #[error("the tenant has {most} event streams open, as many as it may")]
+    #[error("the tenant has {most} event streams open, which is its limit")]
     TooManyStreams { most: usize },
-    #[error("as many calls that solve, train or import are under way as may be at a time")]
+    #[error("the service is running as many calls that solve, train or import as its limit allows")]
     NoPlace,
-    #[error("the tenant has as much work of this kind under way as it may")]
+    #[error("the tenant is running as much work of this kind as its limit allows")]
     OwnWork,
 }
 

@@ -200,7 +200,7 @@ pub(super) fn shares(field: &str, values: &BTreeMap<String, f64>, names: &[Strin
     }
     let whole: f64 = shares.iter().sum();
     if whole > WHOLE {
-        return Err(FieldError::new(field, format!("shares summing to {whole}"), "must sum to 1 at most"));
+        return Err(FieldError::new(field, format!("shares summing to {whole}"), "must sum to at most 1"));
     }
     Ok(shares)
 }

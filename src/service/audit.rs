@@ -50,12 +50,14 @@ pub(super) async fn keep_bounded(store: Store, time: Arc<Timekeeper>, age: Durat
         };
         match cut.await {
             Ok(0) => {}
-            Ok(dropped) => tracing::info!(dropped, "entries of the audit past their age"),
-            Err(error) => tracing::warn!(error = &error as &dyn std::error::Error, "the audit is not cut"),
+            Ok(dropped) => tracing::info!(dropped, "deleted audit entries past their age"),
+            Err(error) => tracing::warn!(error = &error as &dyn std::error::Error, "deleting old audit entries failed"),
         }
         match store.audit_ends().await {
             Ok(ends) => log_ends(ends, &mut logged),
-            Err(error) => tracing::warn!(error = &error as &dyn std::error::Error, "the ends of the audit"),
+            Err(error) => {
+                tracing::warn!(error = &error as &dyn std::error::Error, "the ends of the audit were not read");
+            }
         }
         tokio::select! {
             () = shutdown.begun() => return,

@@ -158,7 +158,7 @@ fn list(index: &Value, numbers: &[u8], names: &[String]) -> Result<Vec<f64>, Ser
     let index = index.as_u64().and_then(|index| usize::try_from(index).ok());
     let mut lists = numbers.chunks_exact(names.len() * NUMBER_BYTES);
     let list = index.and_then(|index| lists.nth(index));
-    let list = list.ok_or_else(|| ServiceError::internal("an entry lacks a list that it names"))?;
+    let list = list.ok_or_else(|| ServiceError::internal("an entry names a list that it does not contain"))?;
     Ok(list.as_chunks::<NUMBER_BYTES>().0.iter().map(|number| f64::from_le_bytes(*number)).collect())
 }
 

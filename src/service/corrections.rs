@@ -33,15 +33,19 @@ impl Correct {
     /// The number is above the limit, or the reason is empty or too long.
     pub(super) fn check(&self) -> Result<(), FieldError> {
         if self.correction > MOST_CORRECTIONS {
-            let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
+            let rule = format!("must be at most {MOST_CORRECTIONS}: open a new session with the present history");
             return Err(FieldError::new("correction", self.correction, rule));
         }
         check_text("reason", &self.reason, 1..=LONGEST_REASON, &[])?;
         if self.reason.trim().is_empty() {
-            return Err(FieldError::new("reason", format!("{:?}", self.reason), "must say why, and is blank"));
+            return Err(FieldError::new(
+                "reason",
+                format!("{:?}", self.reason),
+                "must not be blank: say why the period is corrected",
+            ));
         }
         if self.change == Change::Remove && self.report() != Report::default() {
-            return Err(FieldError::new("change", "remove", "must come without a report: the period is taken out"));
+            return Err(FieldError::new("change", "remove", "must come without a report: the period is removed"));
         }
         Ok(())
     }
@@ -112,14 +116,14 @@ impl PolicyTenure {
         }
         if period <= self.after {
             let rule = format!(
-                "must be later than {}, after which the session was renewed: a period by an earlier policy is reported as missing instead",
+                "must be later than {}, after which the session was renewed: replace a period of an earlier policy with a missing one instead",
                 self.after
             );
             return Err(FieldError::new("period", period, rule));
         }
         if change == Change::Insert && observed >= self.horizon() {
             let rule = format!(
-                "must leave at most {} periods, and {observed} are observed: renew the session first",
+                "must leave at most {} periods, but {observed} are already observed: renew the session first",
                 self.horizon()
             );
             return Err(FieldError::new("change", "insert", rule));
@@ -133,7 +137,7 @@ fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldErr
     if period == correction.period {
         return error;
     }
-    let rule = format!("in period {period}, with period {} put right: {}", correction.period, error.rule);
+    let rule = format!("in period {period}, after the correction of period {}: {}", correction.period, error.rule);
     FieldError { rule, ..error }
 }
 
@@ -142,6 +146,7 @@ fn later(period: usize, correction: &Correct, doubt: Doubt) -> Doubt {
     if period == correction.period {
         return doubt;
     }
-    let sentence = format!("in period {period}, with period {} put right: {}", correction.period, doubt.sentence);
+    let sentence =
+        format!("in period {period}, after the correction of period {}: {}", correction.period, doubt.sentence);
     Doubt { sentence, ..doubt }
 }

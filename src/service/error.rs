@@ -18,7 +18,7 @@ pub enum ServiceError {
     Unknown { what: &'static str, id: String },
     #[error("the idempotency key '{key}' was used with another body")]
     KeyConflict { key: String },
-    #[error("{sessions} sessions live by the policy '{policy}'; delete them first")]
+    #[error("{sessions} sessions use the policy '{policy}'; delete them first")]
     PolicyInUse { policy: String, sessions: u64 },
     #[error("the job '{job}' has not ended; cancel it first")]
     JobNotEnded { job: String },
@@ -37,20 +37,20 @@ pub enum ServiceError {
     #[error(transparent)]
     Store(#[from] StoreError),
     #[error(
-        "{address} can be reached by others and the store holds no key: make one with `ballast keys create`, listen on loopback, or say --allow-anonymous"
+        "other machines can reach {address}, but the store holds no key: make one with `ballast keys create`, listen on loopback, or pass --allow-anonymous"
     )]
     NobodyAsked { address: SocketAddr },
     #[error(
-        "{} says that the store had keys, and it holds none: restore its database, make a key with `ballast keys create`, or remove that file to answer without keys", mark.display()
+        "{} says that the store had keys, but it holds none now: restore its database, make a key with `ballast keys create`, or remove that file to answer without keys", mark.display()
     )]
     KeysLost { mark: PathBuf },
     #[error(
-        "--require-keys is given and the store holds no key: make one with `ballast keys create`, or give the store that has them"
+        "--require-keys is given, but the store holds no key: make one with `ballast keys create`, or give the store that has the keys"
     )]
     KeysRequired,
     #[error("the service is shutting down")]
     Draining,
-    #[error("too many requests of this kind wait already")]
+    #[error("too many requests of this kind are already waiting")]
     Busy,
     #[error(transparent)]
     Refused(#[from] Refused),

@@ -28,8 +28,8 @@ pub(super) fn atoms(explain: Option<Explain>, points: usize, returns: usize) -> 
         return Ok(shown);
     }
     let rule = format!(
-        "must be left out above {MOST_EXPLAINED} points times returns: here they are {points} times {returns}. Explain the points \
-         that matter one by one, or fewer of them"
+        "must be left out if points times returns exceed {MOST_EXPLAINED}: here they are {points} times {returns}. Explain \
+         fewer points, or the points that matter one by one"
     );
     Err(FieldError::new("explain", "worst_case", rule))
 }

@@ -17,7 +17,10 @@ pub(super) async fn keep_fresh(keys: Arc<KeysInForce>, shutdown: Shutdown) {
         }
         if let Err(error) = keys.refresh().await {
             metrics::count_failure(&error);
-            tracing::warn!(error = &error as &dyn std::error::Error, "the keys known last stay in force");
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "reading the keys failed; the last known keys stay in force"
+            );
         }
         for what in keys.damaged() {
             metrics::count_failure(&StoreError::Corrupt { what });

@@ -111,7 +111,7 @@ fn in_the_future(day: Date, is_next: bool, today: Date) -> Option<Doubt> {
         return None;
     }
     let whose = if is_next { "no day is given, and the next one due, " } else { "the day " };
-    let sentence = format!("{whose}{day}{} lies in the future: today is {today}", if is_next { "," } else { "" });
+    let sentence = format!("{whose}{day}{} is in the future: today is {today}", if is_next { "," } else { "" });
     Some(Doubt::new(DoubtReason::FutureDay, "date", day.to_string(), sentence))
 }
 
@@ -139,10 +139,10 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
     missing.pop();
     let sentence = match missing[..] {
         [] => format!("{day} comes {apart} days after {last}, the last day reported, and {next} was the next one due"),
-        [only] => format!("the period to {only} is missing between {last}, the last day reported, and {day}"),
+        [only] => format!("the period that ends {only} is missing between {last}, the last day reported, and {day}"),
         [first, .., end] => {
             format!(
-                "{} periods, to {first} up to {end}, are missing between {last}, the last day reported, and {day}",
+                "{} periods, which end {first} to {end}, are missing between {last}, the last day reported, and {day}",
                 missing.len()
             )
         }
@@ -163,7 +163,10 @@ pub(super) fn of_return(field: &str, value: f64, (mean, deviation): (f64, f64), 
     let sentence = match deviations.is_finite() {
         true => format!("a return of {percent:.2} % lies {deviations:.1} standard deviations from the record"),
         false => {
-            format!("a return of {percent:.2} % is none of the record, which has {:.2} % alone", 100.0 * mean.exp_m1())
+            format!(
+                "a return of {percent:.2} % differs from the record, in which every return is {:.2} %",
+                100.0 * mean.exp_m1()
+            )
         }
     };
     Some(Doubt::new(DoubtReason::UnusualReturn, field, value, sentence))

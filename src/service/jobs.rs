@@ -127,7 +127,7 @@ impl Jobs {
     pub(super) async fn cancel_unrequested(&self) -> Result<(), ServiceError> {
         let now_ms = self.clock.now_milliseconds();
         for job in self.store.by(Actor::service(now_ms)).cancel_unrequested(now_ms).await? {
-            tracing::info!(job, "a training that no session requests any more is cancelled");
+            tracing::info!(job, "cancelled a training that no session requests any more");
             self.board.stop(&job);
             self.board.ring();
         }

@@ -284,7 +284,7 @@ impl KeysInForce {
         let keys = self.store.keys().await?;
         let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
         if keys.damaged != known.damaged {
-            tracing::error!(damaged = ?keys.damaged, "keys that are damaged let nobody in");
+            tracing::error!(damaged = ?keys.damaged, "damaged keys are refused");
         }
         let was_open = known.anybody.is_some();
         known.become_those(keys, &self.limits, &self.clock);

@@ -88,7 +88,7 @@ impl fmt::Display for MemoryLimit {
             Origin::Container => share("the container's limit"),
             Origin::AddressSpace => share("the limit of the address space"),
             Origin::Machine => share("the machine's memory"),
-            Origin::Unknown => share("2 GB, since the system does not tell"),
+            Origin::Unknown => share("2 GB, because the system reports no limit"),
         };
         write!(formatter, "{}, {origin}", ByteSize(self.bytes))
     }

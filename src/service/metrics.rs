@@ -95,12 +95,12 @@ pub fn describe() {
     describe_counter!(HTTP_REQUESTS, "Requests answered, by method, route and status.");
     describe_gauge!(
         CONNECTIONS,
-        "Connections held, by phase: waiting and receiving ones give way where a place is needed."
+        "Open connections, by phase. Waiting and receiving ones are closed if a new connection needs room."
     );
-    describe_counter!(CONNECTIONS_REFUSED, "Connections that got no place, since every one was worked on.");
+    describe_counter!(CONNECTIONS_REFUSED, "Connections refused because all open ones were being answered.");
     describe_counter!(
         CERTIFICATE_LOADS,
-        "Certificates read anew, by outcome: taken, or refused and the one before kept."
+        "Certificate reloads, by outcome: taken, or refused, which keeps the previous certificate."
     );
     for outcome in ["taken", "refused"] {
         counter!(CERTIFICATE_LOADS, "outcome" => outcome).increment(0);
@@ -112,10 +112,13 @@ pub fn describe() {
     );
     describe_gauge!(JOBS, "Jobs in the store, by state.");
     describe_gauge!(SESSIONS, "Sessions in the store.");
-    describe_counter!(REFUSALS, "Calls answered 401, 403 or 429, by tenant and status; of a wrong key, whose it was.");
+    describe_counter!(
+        REFUSALS,
+        "Calls answered 401, 403 or 429, by tenant and status. A key that has ended counts for its tenant."
+    );
     describe_counter!(PROBLEMS, "Problem documents answered, by kind.");
     describe_counter!(STORE_FAILURES, "Failures of the store met by a request or a job, by cause.");
-    describe_gauge!(TURNS_WAITING, "Requests that wait for their turn to be advised, or to have a step solved.");
+    describe_gauge!(TURNS_WAITING, "Requests that wait to be advised or to have a step solved.");
     describe_gauge!(
         MEMORY,
         Unit::Bytes,
@@ -125,9 +128,9 @@ pub fn describe() {
     describe_gauge!(
         OLDEST_JOB_SECONDS,
         Unit::Seconds,
-        "Time since the oldest queued job was made, and since the oldest running one began, by state; 0 where there is none."
+        "Time since the oldest queued job was made and since the oldest running job began, by state; 0 if there is none."
     );
-    describe_counter!(DRIFT_ALARMS, "Sessions whose returns no longer come as they came, by level.");
+    describe_counter!(DRIFT_ALARMS, "Sessions whose drift test rose to a level, by level.");
     for level in ["warning", "alarm"] {
         counter!(DRIFT_ALARMS, "level" => level).increment(0);
     }
@@ -137,13 +140,13 @@ pub fn describe() {
     }
     describe_counter!(JOBS_EXPIRED, "Ended jobs deleted by age.");
     describe_gauge!(STORE_BYTES, Unit::Bytes, "Size of the database.");
-    describe_gauge!(STORE_FREE_BYTES, Unit::Bytes, "Of the database, pages that hold nothing; over a folder.");
-    describe_gauge!(STORE_LOG_BYTES, Unit::Bytes, "Size of the write-ahead log; over a folder.");
-    describe_gauge!(DISK_LEFT_BYTES, Unit::Bytes, "Room left on the disk of the database; over a folder.");
+    describe_gauge!(STORE_FREE_BYTES, Unit::Bytes, "Size of the empty pages in the database; only for a folder.");
+    describe_gauge!(STORE_LOG_BYTES, Unit::Bytes, "Size of the write-ahead log; only for a folder.");
+    describe_gauge!(DISK_LEFT_BYTES, Unit::Bytes, "Free space on the disk of the database; only for a folder.");
     describe_gauge!(
         CLOCK_SKEW_SECONDS,
         Unit::Seconds,
-        "How far this machine's clock is ahead of the database's, or over a folder of the newest moment stored; 0 within a minute, or a day."
+        "How far this machine's clock is ahead of the database's; 0 within a minute. For a folder, how far it is ahead of the newest time stored; 0 within a day."
     );
     gauge!(CLOCK_SKEW_SECONDS).set(0.0);
     metrics::counter!(JOBS_EXPIRED).absolute(0);

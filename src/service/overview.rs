@@ -66,7 +66,7 @@ impl Sessions {
         let damaged = damaged.into_iter().map(|(session, what)| {
             let error = StoreError::Corrupt { what };
             metrics::count_failure(&error);
-            tracing::error!(session, error = &error as &dyn std::error::Error, "a list leaves a session out");
+            tracing::error!(session, error = &error as &dyn std::error::Error, "a list leaves out a damaged session");
             session
         });
         let damaged = damaged.collect();

@@ -106,8 +106,9 @@ fn different(mut returns: Vec<ReportedReturn>) -> Vec<(usize, Doubt)> {
     let others = returns.into_iter().filter(|one| (one.log_return - theirs).abs() > ROUNDING);
     let doubt = |one: ReportedReturn| {
         let [own, theirs] = [one.log_return, theirs].map(|log_return| 100.0 * log_return.exp_m1());
-        let sentence =
-            format!("{count} of the {all} reports for this policy and day say {theirs:.2} %, and this one {own:.2} %");
+        let sentence = format!(
+            "{count} of the {all} reports for this policy and day give {theirs:.2} %, but this one gives {own:.2} %"
+        );
         (one.report, Doubt::new(DoubtReason::DiffersFromPeers, one.field, one.value, sentence))
     };
     others.map(doubt).collect()

@@ -173,8 +173,8 @@ impl Periods {
         let index = correction.period.wrapping_sub(1);
         let Some(period) = self.all.get_mut(index) else {
             let rule = match observed {
-                0 => "must name a period that was observed, and none was".to_owned(),
-                _ => format!("must lie in [1, {observed}], the periods observed"),
+                0 => "must name an observed period, but none is observed yet".to_owned(),
+                _ => format!("must lie in [1, {observed}], the observed periods"),
             };
             return Err(FieldError::new("period", correction.period, rule));
         };

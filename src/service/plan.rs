@@ -113,7 +113,7 @@ impl Renewing {
         }
         check_window("renew.window", window)?;
         if let Contributions::Listed(amounts) = &problem.contributions {
-            let rule = "must be absent for a policy whose contributions are a list, which ends with its horizon";
+            let rule = "must be absent if the policy's contributions are a list, which ends with the policy";
             return Err(FieldError::new("renew", format!("{} contributions", amounts.len()), rule));
         }
         Ok(())
@@ -140,7 +140,7 @@ impl SessionPlan {
         let problem = &advisor.specification().problem;
         renew.map_or(Ok(()), |renew| renew.check(problem))?;
         if rolling && renew.is_some() {
-            let rule = "must be false where renew is given: a session that rolls goes on without";
+            let rule = "must be false if renew is given: a rolling session continues without renewals";
             return Err(FieldError::new("rolling", rolling, rule));
         }
         let plan = SessionPlan { renew, rolling, ..SessionPlan::once(problem) };
@@ -159,7 +159,7 @@ impl SessionPlan {
         let horizon = if self.rolling { left } else { terms.horizon };
         if horizon > left || left == 0 {
             return Err(format!(
-                "must end after {MOST_PERIODS} periods of the session at most: open one on the record as it is now"
+                "must end within {MOST_PERIODS} periods of the session: open a new session with the present history"
             ));
         }
         if self.rolling {
@@ -212,7 +212,7 @@ impl PolicyTenure {
             return Ok(());
         }
         let rule = format!(
-            "must be later than {}: the set of the static policy is frozen at the returns up to there; renew onto another first",
+            "must be later than {}: the uncertainty set of the static policy is frozen at the returns up to that period. Renew with another policy first",
             self.after
         );
         Err(FieldError::new("period", period, rule))

@@ -21,11 +21,11 @@ const TICKS: u64 = 100;
 /// Describes the figures to the recorder. The process counts as started at the first call.
 pub fn describe() {
     describe_gauge!(START, Unit::Seconds, "When the process started, in seconds since 1970.");
-    describe_gauge!(RESIDENT, Unit::Bytes, "Memory of the process that is in the machine's.");
-    describe_counter!(PROCESSOR, Unit::Seconds, "Processor time taken.");
+    describe_gauge!(RESIDENT, Unit::Bytes, "Resident memory of the process.");
+    describe_counter!(PROCESSOR, Unit::Seconds, "Processor time used.");
     describe_gauge!(THREADS, "Threads of the process.");
     describe_gauge!(OPEN, "Files and sockets open.");
-    describe_gauge!(MOST, "Files and sockets that may be open.");
+    describe_gauge!(MOST, "Most files and sockets that can be open.");
     static STARTED: OnceLock<f64> = OnceLock::new();
     let now = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
     gauge!(START).set(*STARTED.get_or_init(now));

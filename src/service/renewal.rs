@@ -49,7 +49,7 @@ impl Sessions {
                 return self.repeat(session, (EntryKind::Renewal, number), renew, periods.names()).await;
             }
             if number > MOST_RENEWALS {
-                let rule = format!("must be at most {MOST_RENEWALS}: open a session on the record as it is now");
+                let rule = format!("must be at most {MOST_RENEWALS}: open a new session with the present history");
                 return Err(FieldError::new("renewal", number, rule).into());
             }
             let DecidedRenewal { new, sent, onto, next } =
@@ -151,7 +151,7 @@ fn accepts(advisor: &Advisor, record: &[f64], standing: &SessionState) -> Result
     let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));
     if own != of_policy {
         let listed = |names: &[String]| if names.is_empty() { "one asset".to_owned() } else { names.join(", ") };
-        let rule = format!("must be of the assets of the session, in their order: {}", listed(own));
+        let rule = format!("must have the assets of the session, in the same order: {}", listed(own));
         return Err(FieldError::new("policy", format!("a policy of {}", listed(of_policy)), rule));
     }
     let returns = standing.assets.as_ref().map(|assets| assets.fund.returns());

@@ -104,7 +104,10 @@ impl Renewer {
 
     async fn sweep(&self) {
         if let Err(error) = self.jobs.cancel_unrequested().await {
-            tracing::warn!(error = &error as &dyn std::error::Error, "trainings that no session requests go on");
+            tracing::warn!(
+                error = &error as &dyn std::error::Error,
+                "cancelling trainings that no session requests failed"
+            );
         }
     }
 
@@ -115,7 +118,10 @@ impl Renewer {
             let page = match self.store.due_sessions(PAGE, after).await {
                 Ok(page) => page,
                 Err(error) => {
-                    tracing::warn!(error = &error as &dyn std::error::Error, "sessions that are due were not found");
+                    tracing::warn!(
+                        error = &error as &dyn std::error::Error,
+                        "finding the sessions that are due failed"
+                    );
                     return;
                 }
             };
@@ -245,7 +251,7 @@ impl Renewer {
         Ok(match self.jobs.train_for_session(tenant, specification, labels, request).await? {
             SessionTraining::Job(row) => {
                 let (job, renewal) = (row.job, attempts.number);
-                tracing::info!(session, job, renewal, "the next policy of a session is trained");
+                tracing::info!(session, job, renewal, "training the next policy of a session");
                 Left::Job(job)
             }
             SessionTraining::Later => Left::Room,

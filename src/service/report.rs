@@ -20,8 +20,8 @@ pub const MOST_CORRECTIONS: usize = 1_000;
 pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
 const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
-pub(super) const OF_SEVERAL: &str = "must be absent: the session is of one asset, and the field of several";
-pub(super) const OF_ONE: &str = "must be absent: the session is of several assets, and the field of one";
+pub(super) const OF_SEVERAL: &str = "must be absent: the session has one asset, and the field is for several";
+pub(super) const OF_ONE: &str = "must be absent: the session has several assets, and the field is for one";
 
 /// Defines a struct with its own fields and those of a report.
 ///
@@ -242,7 +242,7 @@ impl Report {
                 let given = self.previous_prices.as_ref().map(|before| by_name("previous_prices", before, names));
                 let given = given.transpose()?;
                 let before = given.as_deref().or(known).ok_or_else(|| {
-                    let rule = "must be given with prices where the period before was not reported by its prices";
+                    let rule = "must be given with prices if the period before was not reported with prices";
                     FieldError::new("previous_prices", "null", rule)
                 })?;
                 read("prices", prices, &|field, asset, price| {
@@ -294,7 +294,7 @@ impl Report {
             FieldError::new(
                 "previous_price",
                 "null",
-                "must be given with price where the period before was not reported by its price",
+                "must be given with price if the period before was not reported with a price",
             )
         })?;
         between("price", price, ("previous_price", before))
@@ -318,7 +318,9 @@ pub(super) fn by_name(field: &str, values: &BTreeMap<String, f64>, names: &[Stri
     }
     let of = |name: &String| {
         let value = values.get(name).copied();
-        value.ok_or_else(|| FieldError::new(format!("{field}.{name}"), "null", "must be given: every asset has one"))
+        value.ok_or_else(|| {
+            FieldError::new(format!("{field}.{name}"), "null", "must be given: every asset needs a value")
+        })
     };
     names.iter().map(of).collect()
 }

@@ -90,7 +90,7 @@ fn check(reports: &[Observe]) -> Result<(), FieldError> {
     match reports.iter().position(|report| !named.insert(report.session.as_str())) {
         None => Ok(()),
         Some(index) => {
-            let rule = "must be another session: one list holds one period of each";
+            let rule = "must be another session: a list holds one period of each session";
             Err(FieldError::new(format!("[{index}].session"), &reports[index].session, rule))
         }
     }

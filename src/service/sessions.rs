@@ -88,11 +88,11 @@ impl SessionStart {
         let Specification { problem, fund, .. } = advisor.specification();
         let Some(fund) = fund else {
             if let Some(InitialHistory::Several(rows)) = &history {
-                let rule = "must be a list of numbers: the policy is of one asset";
+                let rule = "must be a list of numbers: the policy has one asset";
                 return Err(FieldError::new("history", format!("{} rows", rows.len()), rule));
             }
             if holdings.is_some() {
-                return Err(FieldError::new("holdings", "an object", "must be absent: the policy is of one asset"));
+                return Err(FieldError::new("holdings", "an object", "must be absent: the policy has one asset"));
             }
             let history = history.map(InitialHistory::values);
             let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
@@ -100,14 +100,14 @@ impl SessionStart {
             return Ok(Beginning { state, assets: None, history });
         };
         if let Some(holding) = holding {
-            let rule = "must be absent: the policy is of several assets, and holdings says it of each";
+            let rule = "must be absent: the policy has several assets. Give holdings, the share of each asset";
             return Err(FieldError::new("holding", holding, rule));
         }
         let rows = match history {
             None => fund.history.clone(),
             Some(InitialHistory::Several(rows)) => rows,
             Some(InitialHistory::One(values)) => {
-                let rule = format!("must be a list of rows, each a log-return of {}", fund.assets.join(", "));
+                let rule = format!("must be a list of rows, each with the log-returns of {}", fund.assets.join(", "));
                 return Err(FieldError::new("history", format!("{} values", values.len()), rule));
             }
         };

@@ -107,7 +107,11 @@ impl SessionState {
         if let (Some(date), Some(last)) = (report.date, self.days.last)
             && date <= last
         {
-            return Err(FieldError::new("date", date, format!("must be later than {last}, that of a period before")));
+            return Err(FieldError::new(
+                "date",
+                date,
+                format!("must be later than {last}, the date of an earlier period"),
+            ));
         }
         match &self.assets {
             Some(assets) => assets.log_returns(report).map(PeriodReturns::Several),
@@ -263,10 +267,10 @@ fn check_wealth_range(wealth: f64, report: &Report) -> Result<f64, FieldError> {
         return Ok(wealth);
     }
     let leaves = format!(
-        "what the return, the allocation and what is added give is {wealth}, and a wealth lies in [{low}, {high}]"
+        "the return, the allocation and the amount added give a wealth of {wealth}, and wealth must lie in [{low}, {high}]"
     );
     Err(match report.flow {
-        Some(flow) => FieldError::new("flow", flow, format!("must leave a wealth that is taken: {leaves}")),
+        Some(flow) => FieldError::new("flow", flow, format!("must leave an allowed wealth: {leaves}")),
         None => FieldError::new("wealth", "null", format!("must be reported: {leaves}")),
     })
 }

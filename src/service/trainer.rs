@@ -105,7 +105,7 @@ impl Trainer {
         let thread = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(thread) = thread else { return };
         if !matches!(tokio::task::spawn_blocking(move || thread.join()).await, Ok(Ok(()))) {
-            tracing::error!("the training thread ended by a panic");
+            tracing::error!("the training thread panicked");
         }
     }
 }

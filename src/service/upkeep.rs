@@ -30,14 +30,17 @@ pub(super) async fn keep_tidy(store: Store, time: Arc<Timekeeper>, retain_jobs: 
             Ok(true) => SHORT_PAUSE,
             Ok(false) => PAUSE,
             Err(error) => {
-                tracing::warn!(error = &error as &dyn std::error::Error, "the store was not tidied");
+                tracing::warn!(error = &error as &dyn std::error::Error, "tidying the store failed");
                 PAUSE
             }
         };
         let skew_seconds = time.skew_seconds();
         if (skew_seconds != 0) != is_skewed {
             is_skewed = !is_skewed;
-            tracing::warn!(skew_seconds, "the clock of this machine; nothing is deleted by age while it is wrong");
+            tracing::warn!(
+                skew_seconds,
+                "the skew of this machine's clock changed; nothing is deleted by age unless it is 0"
+            );
         }
         tokio::select! {
             () = shutdown.begun() => {}

@@ -153,14 +153,14 @@ impl WhatIf {
     fn hypothesis(&self) -> Result<Hypothesis, FieldError> {
         let log_return = match (self.log_return, self.simple_return) {
             (Some(_), Some(value)) => {
-                return Err(FieldError::new("simple_return", value, "must be absent where log_return is given"));
+                return Err(FieldError::new("simple_return", value, "must be absent if log_return is given"));
             }
             (None, Some(value)) => Some(log_return_of("simple_return", value)?),
             (log_return, None) => log_return,
         };
         let radius = match (self.radius_scale, self.radius) {
             (Some(_), Some(value)) => {
-                return Err(FieldError::new("radius", value, "must be absent where radius_scale is given"));
+                return Err(FieldError::new("radius", value, "must be absent if radius_scale is given"));
             }
             (Some(scale), None) => Some(HypotheticalRadius::Scaled(scale)),
             (None, radius) => radius.map(HypotheticalRadius::Fixed),
@@ -188,7 +188,7 @@ impl WhatIf {
         };
         let mut point = self.clone();
         if let Some(value) = *field(&mut point) {
-            return Err(FieldError::new(name, value, format!("must be absent where sweep.{name} is given")));
+            return Err(FieldError::new(name, value, format!("must be absent if sweep.{name} is given")));
         }
         let mut at = |value: f64| {
             *field(&mut point) = Some(value);

@@ -72,7 +72,7 @@ impl WhatIfScenario {
     ) -> Result<Self, FieldError> {
         let names = &live.standing.assets.as_ref().ok_or_else(of_one)?.names;
         if let (Some((field, _)), None) = (&report, live.following()) {
-            let rule = "must be absent: the coming period is the last, and none is left to advise after it";
+            let rule = "must be absent: the coming period is the last, so there is none after it to advise";
             return Err(FieldError::new(*field, "given", rule));
         }
         Ok(WhatIfScenario {

@@ -60,7 +60,7 @@ test("what the form says will be refused is refused in the same words", async ()
   await page.getByText("I held another share, or money came or went").click();
   await page.getByLabel("Return in period 1").fill("-2");
   for (const [label, text, words] of [
-    ["Money added at the end", "-1000", "Money added at the end is -1000; it must leave a wealth that is taken: what the return, the allocation and what is added give is -8"],
+    ["Money added at the end", "-1000", "Money added at the end is -1000; it must leave an allowed wealth: the return, the allocation and the amount added give a wealth of -8"],
     ["Share held, %", "150", "Share held is 150 %; it must be from 0 % to 100 %."],
     ["The bank paid, %", "-60", "The bank paid is -60 %; it must be from -50 % to 50 %."],
     ["Wealth reached", "0", "Wealth reached is 0; it must be from 0.000001 to"],

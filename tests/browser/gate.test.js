@@ -86,7 +86,7 @@ test("a batch proposes the day, asks about what differs, fills gaps and says wha
   await page.getByLabel("Sessions and their returns, %").fill("Alma 2.13\nBo 2.13\nCleo 5\nDina 2.13");
   await page.getByRole("button", { name: "Report for 4" }).click();
   const outcomes = page.getByRole("table", { name: "Outcomes" });
-  await outcomes.getByText(/3 of the 4 reports for this policy and day say 2\.13 %, and this one 5\.00 %/).waitFor();
+  await outcomes.getByText(/3 of the 4 reports for this policy and day give 2\.13 %, but this one gives 5\.00 %/).waitFor();
   await outcomes.getByText("The period to 31 May 2019 is missing before 30 Jun 2019.", { exact: false }).waitFor();
   await outcomes.getByText(/^(Buy|Sell) [\d.]+$|^Nothing$/).first().waitFor();
   await page.getByRole("button", { name: "Report the 1 missing period of 1 session as missing, and then what is left" }).click();

@@ -110,7 +110,7 @@ test("a return is reported for each asset, and other shares where they were held
   await page.getByText("This will be refused: 110.0\u202f% in all cannot be held.").waitFor();
   await page.getByLabel("Gold held, %").fill("20");
   await page.getByLabel("Money added at the end").fill("-1000000");
-  await page.getByText(/^This will be refused\. Money added at the end is \u22121,000,000; it must leave a wealth that is taken: .* is \u2212\d{3},\d{3}, and/).waitFor();
+  await page.getByText(/^This will be refused\. Money added at the end is \u22121,000,000; it must leave an allowed wealth: .* give a wealth of \u2212\d{3},\d{3}, and/).waitFor();
   await page.getByLabel("Money added at the end").fill("");
   await report();
   await page.getByRole("heading", { name: "December 2020, period 3 of 4" }).waitFor();

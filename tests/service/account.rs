@@ -203,7 +203,10 @@ async fn a_correction_is_made_once_and_in_its_turn() {
     }
     // What was put right in a later period is said to be of that period.
     let (_, refused) = correct(&app, 3, json!({ "period": 1, "log_return": 0.02, "date": "2008-02-29" })).await;
-    assert!(refused["rule"].as_str().unwrap().starts_with("in period 2, with period 1 put right"), "{refused}");
+    assert!(
+        refused["rule"].as_str().unwrap().starts_with("in period 2, after the correction of period 1"),
+        "{refused}"
+    );
     for reason in ["", "  ", "a\u{1}b", &"x".repeat(201)] {
         let body = json!({ "correction": 3, "period": 1, "log_return": 0.02, "reason": reason });
         let (status, refused) = app.post(&format!("/sessions/{}/corrections", app.session), &body).await;
@@ -277,7 +280,7 @@ async fn a_price_put_right_is_asked_about_where_the_next_return_becomes_unusual(
     let (status, refused) = correct(&app, 1, slip).await;
     assert_eq!((status.as_u16(), &refused["type"]), (409, &json!("/problems/unconfirmed")), "{refused}");
     let sentence = refused["doubts"][0]["sentence"].as_str().unwrap();
-    assert!(sentence.starts_with("in period 2, with period 1 put right"), "{refused}");
+    assert!(sentence.starts_with("in period 2, after the correction of period 1"), "{refused}");
     assert_eq!(standing(&app).await, before);
     let meant = json!({ "period": 1, "price": 1.02, "previous_price": 1.0, "confirm": true });
     assert_eq!(correct(&app, 1, meant).await.0, 200);

@@ -75,7 +75,7 @@ async fn a_skipped_period_is_asked_about_and_reported_as_missing(mut app: App) {
     let missing = ["2019-06-30", "2019-07-31", "2019-08-31", "2019-09-30", "2019-10-31"];
     assert_eq!(problem["doubts"][0]["missing"], json!(missing));
     let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.starts_with("5 periods, to 2019-06-30 up to 2019-10-31, are missing"), "{detail}");
+    assert!(detail.starts_with("5 periods, which end 2019-06-30 to 2019-10-31, are missing"), "{detail}");
     assert!(detail.contains("report them as missing") && detail.contains("\"confirm\": true"), "{detail}");
     assert_eq!((&problem["field"], &problem["value"]), (&json!("date"), &json!("2019-11-30")));
     assert_eq!(session(&app).await["period"], 2, "nothing is recorded");
@@ -97,7 +97,7 @@ async fn one_answer_names_every_doubt(mut app: App) {
     let (reasons, problem) = doubted(&app, 1, json!({ "simple_return": 0.21, "date": "2262-12-31" })).await;
     assert_eq!(reasons, ["future_day", "unusual_return"]);
     let detail = problem["detail"].as_str().unwrap();
-    assert!(detail.contains("2262-12-31 lies in the future") && detail.contains("standard deviations"), "{detail}");
+    assert!(detail.contains("2262-12-31 is in the future") && detail.contains("standard deviations"), "{detail}");
     let today = jiff::Timestamp::now().to_zoned(jiff::tz::TimeZone::UTC).date();
     let tomorrow = today.tomorrow().unwrap();
     recorded(&app, 1, json!({ "simple_return": 0.01, "date": tomorrow.to_string() })).await;
@@ -171,7 +171,7 @@ async fn a_report_that_differs_from_its_peers_is_asked_about(mut app: App) {
     let problem = &answers[2]["problem"];
     assert_eq!(problem["doubts"][0]["reason"], "differs_from_peers");
     let sentence = problem["doubts"][0]["sentence"].as_str().unwrap();
-    assert_eq!(sentence, "4 of the 5 reports for this policy and day say 1.67 %, and this one 5.00 %");
+    assert_eq!(sentence, "4 of the 5 reports for this policy and day give 1.67 %, but this one gives 5.00 %");
     let (_, again) = app.post("/observe", &first).await;
     assert_eq!(again, answers, "the same list again");
     let mut meant = first;

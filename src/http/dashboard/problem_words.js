@@ -18,7 +18,7 @@ const places = (ahead) => [
   [/problem\.horizon = (?=\d)/g, ""],
   [/problem\.contributions/g, "the money added"],
   [/(?:the )?(?:problem\.)?\bhorizon\b/g, ahead ? `\u201c${ahead}\u201d` : "the number of periods ahead"],
-  [/(?<=\bgive is )-?[\d.e+-]+/g, (amount) => wealth(Number(amount))],
+  [/(?<=\bgive a wealth of )-?[\d.e+-]+/g, (amount) => wealth(Number(amount))],
 ];
 /** What the parser of days says of what is none. */
 const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|date)\b/;

@@ -124,8 +124,8 @@ export function foretold(read, { wealth: now, before, cost }) {
   const grown = (1 - whole) * (1 + rate) + sum(({ held, growth }) => held * growth);
   const left = Number.isNaN(ended) ? now * traded * grown + added : ended;
   if (left < LIMITS.wealth[0] || left > LIMITS.wealth[1]) {
-    const leaves = `what the return, the allocation and what is added give is ${left}, and a wealth lies ${within(LIMITS.wealth)}`;
-    return flow.control.value.trim() === "" ? refused(reached, null, `must be reported: ${leaves}`) : refused(flow, added, `must leave a wealth that is taken: ${leaves}`);
+    const leaves = `the return, the allocation and the amount added give a wealth of ${left}, and wealth must lie ${within(LIMITS.wealth)}`;
+    return flow.control.value.trim() === "" ? refused(reached, null, `must be reported: ${leaves}`) : refused(flow, added, `must leave an allowed wealth: ${leaves}`);
   }
   return `${missing ? "No return; wealth" : "Wealth"} ${wealth(now)} \u2192 ${wealth(left)} at ${allocation(whole)} held. ${endWords(added)}`;
 }
