@@ -97,16 +97,16 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
 fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
     let count = returns.rows().len();
     let holding = arguments.one_holding()?;
-    let asked = |returns: &Returns| arguments.question(returns, holding).answer();
-    let advised = asked(returns).map_err(|error| by_option(error, count, &arguments.record))?;
-    let told = || {
+    let answer = |returns: &Returns| arguments.question(returns, holding).answer();
+    let advised = answer(returns).map_err(|error| by_option(error, count, &arguments.record))?;
+    let text = || {
         let coarser: Vec<(&str, Result<f64, FieldError>)> = (returns.coarser().iter())
-            .map(|returns| (returns.noun(), asked(returns).map(|advised| advised.advice.allocation)))
+            .map(|returns| (returns.noun(), answer(returns).map(|advised| advised.advice.allocation)))
             .collect();
-        let text = words::told(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
-        words::told_of_coarser(text, &coarser)
+        let text = words::describe(&advised, arguments.wealth, returns.noun(), returns.periods_per_year as f64);
+        words::append_coarser(text, &coarser)
     };
-    Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
+    Ok(show(&returns.sentence(), arguments.json, &advised, text)?)
 }
 
 fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<dyn Error>> {
@@ -118,9 +118,9 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
         let rule = format!("must be left out of several assets, of which {why}");
         return Err(FieldError::new(option, format!("given of {}", returns.record.assets.len()), rule).into());
     }
-    let asked = arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem));
+    let problem = arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem));
     let question = AdviseAssets {
-        problem: AssetsProblem { trading_cost: arguments.trading_cost, ..asked },
+        problem: AssetsProblem { trading_cost: arguments.trading_cost, ..problem },
         wealth: Some(arguments.wealth),
         holdings: Some(arguments.holdings_of(&returns.record.assets)?),
         seed: arguments.seed,
@@ -128,8 +128,8 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
     let count = returns.record.rows.len();
     let advised = question.answer().map_err(|error| by_option(error, count, &arguments.record))?;
     let (noun, periods) = (returns.record.frequency.noun(), returns.record.periods_per_year as f64);
-    let told = || words::told_of_several(&advised, arguments.wealth, noun, periods);
-    Ok(show(&returns.sentence, arguments.json, &advised, told)?)
+    let text = || words::describe_several(&advised, arguments.wealth, noun, periods);
+    Ok(show(&returns.sentence, arguments.json, &advised, text)?)
 }
 
 impl AdviseArgs {

@@ -356,18 +356,18 @@ mod tests {
     #[test]
     fn what_is_not_said_follows_from_the_frequency_and_from_what_is() {
         let returns = quarters(24 + 4);
-        let said = |more: &[&str]| {
+        let choices_of = |more: &[&str]| {
             let line = ["backtest", "returns.csv", "--out", "report"];
             let backtest = Line::try_parse_from(line.iter().chain(more)).unwrap().args.backtest(&returns);
             let choices = |Backtest { walk, .. }: Backtest| (walk.window, walk.every, walk.horizon);
             backtest.map(choices).map_err(|error| error.to_string())
         };
         // The file has fewer than twenty-one years, so half of the record is used.
-        assert_eq!(said(&[]), Ok((14, 4, 4)));
-        assert_eq!(said(&["--window", "20"]), Ok((20, 4, 4)));
-        assert_eq!(said(&["--window", "20", "--every", "6"]), Ok((20, 6, 6)));
-        assert_eq!(said(&["--window", "20", "--horizon", "3"]), Ok((20, 3, 3)));
-        assert_eq!(said(&["--window", "20", "--horizon", "9"]), Ok((20, 4, 9)));
+        assert_eq!(choices_of(&[]), Ok((14, 4, 4)));
+        assert_eq!(choices_of(&["--window", "20"]), Ok((20, 4, 4)));
+        assert_eq!(choices_of(&["--window", "20", "--every", "6"]), Ok((20, 6, 6)));
+        assert_eq!(choices_of(&["--window", "20", "--horizon", "3"]), Ok((20, 3, 3)));
+        assert_eq!(choices_of(&["--window", "20", "--horizon", "9"]), Ok((20, 4, 9)));
     }
 
     #[test]

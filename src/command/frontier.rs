@@ -49,7 +49,7 @@ pub fn run(arguments: &FrontierArgs) -> Result<(), Box<dyn Error>> {
     let question = arguments.request(&returns).question();
     let question = question.map_err(|error| by_option(error, arguments.record.source()))?;
     let report = Frontier::new(question, Cache::default()).run(&Watch::unwatched())?;
-    Ok(show(&read, arguments.json, &report, || told(&report))?)
+    Ok(show(&read, arguments.json, &report, || describe(&report))?)
 }
 
 impl FrontierArgs {
@@ -84,7 +84,7 @@ fn by_option(error: FieldError, source: &'static str) -> FieldError {
 }
 
 /// Returns a table for each law that records were drawn from, and the sentences about the figures.
-fn told(report: &FrontierReport) -> String {
+fn describe(report: &FrontierReport) -> String {
     let mut text = String::new();
     for resampled in &report.resampled {
         table(&mut text, report, resampled);

@@ -74,7 +74,7 @@ impl RecordArguments {
     /// Builds the problem from the returns that were read.
     pub fn problem(&self, returns: &Returns) -> ProblemSpecification {
         let history = returns.rows().iter().map(|row| row.period().log_return).collect();
-        self.asked(history, returns.rate(), returns.periods_per_year)
+        self.specification(history, returns.rate(), returns.periods_per_year)
     }
 
     /// Builds the problem of several assets; `completed` adds the other choices.
@@ -85,10 +85,10 @@ impl RecordArguments {
     ) -> AssetsProblem {
         let AssetsRecord { assets, rows, bank, periods_per_year, .. } = &returns.record;
         let rate = bank.last().copied().unwrap_or(0.0);
-        asked_of(assets.clone(), rows.clone(), &completed(self.asked(Vec::new(), rate, *periods_per_year)))
+        asked_of(assets.clone(), rows.clone(), &completed(self.specification(Vec::new(), rate, *periods_per_year)))
     }
 
-    fn asked(&self, history: Vec<f64>, rate: f64, periods_per_year: usize) -> ProblemSpecification {
+    fn specification(&self, history: Vec<f64>, rate: f64, periods_per_year: usize) -> ProblemSpecification {
         ProblemSpecification {
             horizon: 1,
             periods_per_year: Some(periods_per_year as f64),
@@ -113,7 +113,7 @@ fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralR
     Ok(returns)
 }
 
-/// Prints what was read, followed by `told`. As JSON, prints the answer alone, and what was read on the standard error.
+/// Prints what was read, followed by `text`. As JSON, prints the answer alone, and what was read on the standard error.
 ///
 /// # Errors
 /// The answer cannot be written as JSON.
@@ -121,13 +121,13 @@ pub fn show(
     read: &str,
     as_json: bool,
     answer: &impl Serialize,
-    told: impl FnOnce() -> String,
+    text: impl FnOnce() -> String,
 ) -> serde_json::Result<()> {
     if as_json {
         eprintln!("{read}");
         println!("{}", serde_json::to_string_pretty(answer)?);
     } else {
-        println!("{read}\n\n{}", told());
+        println!("{read}\n\n{}", text());
     }
     Ok(())
 }

@@ -114,7 +114,7 @@ impl ReturnsFile {
     fn text(&self) -> Result<String, ReturnsError> {
         let read = std::fs::read(&self.file);
         let bytes = read.map_err(|source| ReturnsError::Read { path: self.file.clone(), source })?;
-        decoded(&bytes).map_err(|said| ReturnsError::Refused { said })
+        decoded(&bytes).map_err(|sentence| ReturnsError::Refused { sentence })
     }
 }
 
@@ -298,9 +298,9 @@ fn record(
         Reading::Read(record) => Ok(record),
         Reading::Asked { questions, .. } => {
             let needs_year = periods_per_year.is_none() && leaves_frequency_open(text, choices, &questions);
-            Err(ReturnsError::asked(&questions, needs_year))
+            Err(ReturnsError::open_questions(&questions, needs_year))
         }
-        Reading::Refused { sentence, .. } => Err(ReturnsError::Refused { said: sentence }),
+        Reading::Refused { sentence, .. } => Err(ReturnsError::Refused { sentence }),
     }
 }
 

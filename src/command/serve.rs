@@ -193,13 +193,13 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let (delay, signalled) = (Duration::from_secs(arguments.drain_delay.into()), shutdown.clone());
     tokio::spawn(async move {
-        let mut asked = async || {
+        let mut stop_signal = async || {
             tokio::select! {
                 _ = terminate.recv() => {}
                 _ = interrupt.recv() => {}
             }
         };
-        asked().await;
+        stop_signal().await;
         signalled.announce();
         let drained = async {
             tokio::time::sleep(delay).await;
@@ -209,16 +209,16 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
         // A second signal ends the process at once.
         tokio::select! {
             () = drained => {}
-            () = asked() => std::process::exit(ASKED_TWICE),
+            () = stop_signal() => std::process::exit(ASKED_TWICE),
         }
     });
     let running = http::serve(config, shutdown).await?;
-    let mut told = format!("listening on {}://{}\n", running.scheme, running.address);
+    let mut addresses = format!("listening on {}://{}\n", running.scheme, running.address);
     if let Some(address) = running.operations {
-        told += &format!("for operators on {}://{address}\n", running.scheme);
+        addresses += &format!("for operators on {}://{address}\n", running.scheme);
     }
     // An error is ignored: nobody has to read this line, and the log has it also.
-    let _ = std::io::stdout().write_all(told.as_bytes());
+    let _ = std::io::stdout().write_all(addresses.as_bytes());
     if let Err(error) = running.ended().await {
         tracing::error!(error = &error as &dyn std::error::Error, "the store failed; exiting");
         std::process::exit(STORE_FAILED);

@@ -12,13 +12,13 @@ use ballast::control::policy::worst_case::WorstCase;
 use ballast::numerics::digits;
 use ballast::service::advise::Advised;
 
-pub use several::told_of_several;
+pub use several::describe_several;
 
 /// Smallest trade worth doing: the printed digits would not show a smaller one.
 const SMALLEST_TRADE: f64 = 5e-4;
 
 /// Describes the trade, the reason and the figures. The figures of the caution are per year of `periods` periods.
-pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String {
+pub fn describe(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String {
     let advice = &advised.advice;
     let mut text = format!("{} {}\n", hold(advice, noun), trade(advice, wealth));
     if advice.source == AdviceSource::Unsolved {
@@ -30,7 +30,7 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
         let _ = writeln!(text, "  {name:<22}{figure:>14}  {meaning}");
     }
     if let Some(levels) = &advised.levels {
-        text += &format!("\n{}", caution::told(levels, periods));
+        text += &format!("\n{}", caution::describe(levels, periods));
     }
     for sentence in near(advised, noun) {
         text += &format!("\n{sentence}");
@@ -39,7 +39,7 @@ pub fn told(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> String 
 }
 
 /// Appends the advice by longer periods if it was computed, or why there is none.
-pub fn told_of_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)]) -> String {
+pub fn append_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)]) -> String {
     if coarser.is_empty() {
         return text;
     }
@@ -53,37 +53,37 @@ pub fn told_of_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)]
 
 /// Lists the warnings and, if requested, how close the advice is to changing.
 fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: &str) -> Vec<String> {
-    let mut told: Vec<String> = warnings.iter().map(|warning| warning.message.clone()).collect();
-    told.extend(caution.iter().map(|caution| caution.sentence.clone()));
-    let Some(Sensitivity { without_one, next_return, premium, .. }) = sensitivity else { return told };
+    let mut sentences: Vec<String> = warnings.iter().map(|warning| warning.message.clone()).collect();
+    sentences.extend(caution.iter().map(|caution| caution.sentence.clone()));
+    let Some(Sensitivity { without_one, next_return, premium, .. }) = sensitivity else { return sentences };
     if let Some(range) = without_one {
         let ends = [range.lowest, range.highest].map(|end| end.allocation);
         let [low, high] = apart(ends, 1);
         let tried =
             if range.tried < advice.sample_size { format!(" ({} were tried)", range.tried) } else { String::new() };
-        told.push(format!("With any one return left out{tried} the advice would lie between {low} and {high}."));
+        sentences.push(format!("With any one return left out{tried} the advice would lie between {low} and {high}."));
     }
     let [low, high] = [next_return.low, next_return.high].map(|next: NextAdvice| percent(next.simple_return, 1));
     let [then_low, then_high] = apart([next_return.low, next_return.high].map(|next| next.allocation), 1);
-    told.push(format!("After a next return of {low} it would be {then_low}, after one of {high} {then_high}."));
+    sentences.push(format!("After a next return of {low} it would be {then_low}, after one of {high} {then_high}."));
     let crossing = |to: Option<ReturnAndLog>, what: &str| {
         to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
     };
     let leaves = |to: ReturnAndLog| {
         format!("The next {noun} must return more than {} before it leaves the bank.", percent(to.simple_return, 1))
     };
-    told.extend(match advice.allocation {
+    sentences.extend(match advice.allocation {
         0.0 => next_return.to_bank.map(leaves),
         _ => crossing(next_return.to_bank, "the bank"),
     });
-    told.extend(crossing(next_return.to_highest, "the most that may be held"));
+    sentences.extend(crossing(next_return.to_highest, "the most that may be held"));
     if let Some(needed) = premium.needed {
         let [present, needed] = apart([premium.present, needed], 2);
-        told.push(format!(
+        sentences.push(format!(
             "The record paid {present} a period beyond what the bank pays now; at {needed} the advice leaves the bank."
         ));
     }
-    told
+    sentences
 }
 
 fn hold(advice: &Advice, noun: &str) -> String {
@@ -233,16 +233,16 @@ mod tests {
 
     #[test]
     fn what_to_do_stands_first() {
-        let told = |history: &[f64], holding, cost| told(&advised(history, holding, cost), 2000.0, "week", 52.0);
-        let falling = told(&[-0.01, -0.03], 0.5, 0.0);
+        let text = |history: &[f64], holding, cost| describe(&advised(history, holding, cost), 2000.0, "week", 52.0);
+        let falling = text(&[-0.01, -0.03], 0.5, 0.0);
         let first = "Hold nothing in the risky asset through the coming week: keep all wealth in the bank. Sell for \
                      1000.00: 50.0 % is held now.\nAgainst the worst law in the ball around the 2 returns, nothing beats \
                      the bank.\nThe record paid 2.08 % a week less than the bank; the chance error of that is 0.98 %.\nHalf \
                      the caution would hold nothing either.\n\n";
         assert!(falling.starts_with(first), "{falling}");
-        assert!(told(&[-0.01, -0.03], 0.0, 0.0).contains("bank. Nothing is to be traded: nothing is held now.\n"));
+        assert!(text(&[-0.01, -0.03], 0.0, 0.0).contains("bank. Nothing is to be traded: nothing is held now.\n"));
         assert!(!falling.contains("band"), "{falling}");
-        assert!(told(&[-0.01, -0.03], 0.5, 0.05).contains("\n  band "));
+        assert!(text(&[-0.01, -0.03], 0.5, 0.05).contains("\n  band "));
         let Advised { advice, .. } = advised(&[0.100, 0.101], 0.25, 0.0);
         let all = Advice { allocation: 1.0, trade: 0.75, ..advice.clone() };
         assert_eq!(hold(&all, "day"), "Hold all wealth in the risky asset through the coming day.");

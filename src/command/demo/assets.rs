@@ -54,24 +54,24 @@ fn industries() -> Result<AssetsRecord, ReturnsError> {
 }
 
 fn by_name(shares: &BTreeMap<String, f64>) -> String {
-    let told = |(name, share): (&String, &f64)| format!("{name} {:.1} %", 100.0 * share);
-    shares.iter().map(told).collect::<Vec<String>>().join(", ")
+    let named = |(name, share): (&String, &f64)| format!("{name} {:.1} %", 100.0 * share);
+    shares.iter().map(named).collect::<Vec<String>>().join(", ")
 }
 
-fn tell_first(told: &DemoAssetsAdvice, rate: f64) {
-    println!("\nTold for {FIRST_MONTH}: hold {:.0} % in all, {}.", 100.0 * told.total, by_name(&told.allocation));
+fn tell_first(advised: &DemoAssetsAdvice, rate: f64) {
+    println!("\nTold for {FIRST_MONTH}: hold {:.0} % in all, {}.", 100.0 * advised.total, by_name(&advised.allocation));
     println!(
         "That counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}. The radius, {:.4}, holds for all funds",
-        told.certainty_equivalent, told.floor, told.radius
+        advised.certainty_equivalent, advised.floor, advised.radius
     );
     println!(
         "of the four at once. The average log-return of a month, as seen and under the worst law, with {:.2} % of the bank:",
         100.0 * rate
     );
-    for (name, DemoWorstMean { seen, worst }) in &told.one_step.worst_means {
+    for (name, DemoWorstMean { seen, worst }) in &advised.one_step.worst_means {
         println!("  {name:<10} {:>6.2} % {:>6.2} %", 100.0 * seen, 100.0 * worst);
     }
-    tell_worst_case("this", told.worst_case.as_ref());
+    tell_worst_case("this", advised.worst_case.as_ref());
 }
 
 /// Prints one line per month, next to all wealth in equal shares of the four; then the cost of trading.
@@ -88,14 +88,14 @@ async fn live_through(
     println!("{:<8}{names} {:>8} {:>9} {equal_shares:>13}", "month", "in all", "wealth");
     let (mut wealth, mut equal, mut traded) = (INITIAL_WEALTH, INITIAL_WEALTH, 0.0);
     for month in start..start + HORIZON {
-        let told: DemoAssetsAdvice = advice(api, session, false).await?;
+        let advised: DemoAssetsAdvice = advice(api, session, false).await?;
         let returns: BTreeMap<&String, f64> =
             record.assets.iter().zip(&record.rows[month]).map(|(name, z)| (name, z.exp_m1())).collect();
-        wealth = observe(api, session, told.period, ("simple_returns", json!(returns))).await?;
+        wealth = observe(api, session, advised.period, ("simple_returns", json!(returns))).await?;
         equal *= 1.0 + returns.values().sum::<f64>() / returns.len() as f64;
-        traded += told.trade.values().map(|share| share.abs()).sum::<f64>();
-        let held: String = told.allocation.values().map(|share| format!(" {share:>10.3}")).collect();
-        println!("{:<8}{held} {:>8.3} {wealth:>9.2} {equal:>13.2}", record.dates[month], told.total);
+        traded += advised.trade.values().map(|share| share.abs()).sum::<f64>();
+        let held: String = advised.allocation.values().map(|share| format!(" {share:>10.3}")).collect();
+        println!("{:<8}{held} {:>8.3} {wealth:>9.2} {equal:>13.2}", record.dates[month], advised.total);
     }
     println!(
         "\nWhat it cost: {INITIAL_WEALTH} became {wealth:.2}. Equal shares of all wealth became {equal:.2}, and the bank would have paid \

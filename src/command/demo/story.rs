@@ -110,18 +110,18 @@ async fn live_through(
     );
     let (mut all_bank, mut all_stock, mut last) = (INITIAL_WEALTH, INITIAL_WEALTH, None);
     for (index, month) in year.iter().enumerate() {
-        let told: DemoAdvice = advice(api, session, index + 1 == year.len()).await?;
-        let wealth = observe(api, session, told.period, ("simple_return", json!(month.risky_return))).await?;
+        let advised: DemoAdvice = advice(api, session, index + 1 == year.len()).await?;
+        let wealth = observe(api, session, advised.period, ("simple_return", json!(month.risky_return))).await?;
         all_bank *= 1.0 + past.rate;
         all_stock *= 1.0 + month.risky_return;
         println!(
             "{:<8} {:>8.4} {:>11.3} {:>8.2} % {wealth:>9.2} {all_bank:>16.2} {all_stock:>14.2}",
             month.date,
-            told.radius,
-            told.allocation,
+            advised.radius,
+            advised.allocation,
             100.0 * month.risky_return
         );
-        last = Some(told);
+        last = Some(advised);
     }
     Ok(last)
 }
@@ -173,8 +173,8 @@ mod tests {
         let one = |atom, moved_to, mass| DemoMove { atom, moved_to, mass };
         let transport =
             [one(0.1, 0.1, 0.5), one(0.1, 0.0, 0.1), one(0.2, -0.6, 0.1), one(0.0, -0.1, 0.2), one(0.1, 0.05, 0.1)];
-        let told: Vec<f64> = largest_moves(&transport).iter().map(|one| one.moved_to).collect();
-        assert_eq!(told, [-0.6, -0.1, 0.0]);
+        let ends: Vec<f64> = largest_moves(&transport).iter().map(|one| one.moved_to).collect();
+        assert_eq!(ends, [-0.6, -0.1, 0.0]);
     }
 
     #[test]

@@ -60,11 +60,12 @@ pub async fn inserts_per_second(folder: &Path, store: &str, time: Duration) -> R
     command.args(["--no-vacuum", "--protocol=prepared", "--client", &connections, "--time", &seconds, "--file"]);
     let output = command.arg(&script).arg(store).output()?;
     stored::execute(store, DROP).await?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let rate = said.lines().find_map(|line| line.strip_prefix("tps = ")?.split_whitespace().next()?.parse().ok());
+    let output_text = String::from_utf8_lossy(&output.stdout);
+    let rate =
+        output_text.lines().find_map(|line| line.strip_prefix("tps = ")?.split_whitespace().next()?.parse().ok());
     match rate {
         Some(rate) => Ok(Some(rate)),
-        None => Err(format!("pgbench: {said}{}", String::from_utf8_lossy(&output.stderr)).into()),
+        None => Err(format!("pgbench: {output_text}{}", String::from_utf8_lossy(&output.stderr)).into()),
     }
 }
 

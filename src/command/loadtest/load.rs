@@ -13,7 +13,7 @@ use super::server::Server;
 pub struct Load {
     milliseconds: Vec<f64>,
     /// Number of operations: one per request, unless a request contains several.
-    asked: usize,
+    operations: usize,
     seconds: f64,
     /// Processor time of the service, if it is known.
     processor_seconds: Option<f64>,
@@ -21,7 +21,7 @@ pub struct Load {
 
 impl Load {
     fn of(milliseconds: Vec<f64>, seconds: f64) -> Load {
-        Load { asked: milliseconds.len(), milliseconds, seconds, processor_seconds: None }
+        Load { operations: milliseconds.len(), milliseconds, seconds, processor_seconds: None }
     }
 
     /// Runs `driving`, and adds the processor time that the service takes for it.
@@ -36,22 +36,22 @@ impl Load {
     }
 
     /// Sets the number of operations, if requests contained several.
-    pub fn asking(self, asked: usize) -> Self {
-        Load { asked, ..self }
+    pub fn asking(self, operations: usize) -> Self {
+        Load { operations, ..self }
     }
 
     /// Returns the microseconds of the service's processors per operation.
     pub fn processor_us(&self) -> Option<f64> {
-        self.processor_seconds.map(|seconds| 1e6 * seconds / self.asked as f64)
+        self.processor_seconds.map(|seconds| 1e6 * seconds / self.operations as f64)
     }
 
-    pub fn asked(&self) -> usize {
-        self.asked
+    pub fn operations(&self) -> usize {
+        self.operations
     }
 
     /// Returns the operations answered per second.
     pub fn rate(&self) -> f64 {
-        self.asked as f64 / self.seconds
+        self.operations as f64 / self.seconds
     }
 
     /// Returns the latency quantiles at `shares` and the largest, in milliseconds.
@@ -64,7 +64,7 @@ impl Load {
 
     pub fn add(&mut self, other: Load) {
         self.milliseconds.extend(other.milliseconds);
-        self.asked += other.asked;
+        self.operations += other.operations;
         self.seconds += other.seconds;
         self.processor_seconds = match self.processor_seconds {
             Some(seconds) => other.processor_seconds.map(|other| seconds + other),

@@ -108,7 +108,7 @@ impl Test<'_> {
         let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: (batch == 1).then_some(OBSERVE_P99_MS) };
         let lists = if batch == 1 { String::new() } else { format!(", lists of {batch}") };
         report.load(format!("observe: {} clients, {count} sessions{lists}", self.clients), &load, must);
-        growth.tell(load.asked() / horizon, load.asked(), report);
+        growth.tell(load.operations() / horizon, load.operations(), report);
         Ok(())
     }
 
@@ -156,16 +156,16 @@ impl Test<'_> {
         let own = |client: usize| actions.iter().skip(client).step_by(self.clients).cloned();
         let first = Load::on(server, saturate(&server.addresses, self.clients, own)).await?;
         report.load("action: first asks, all clients", &first, Must::default());
-        let (mut livez, mut asked) = (Load::default(), Load::default());
+        let (mut livez, mut actions_load) = (Load::default(), Load::default());
         for _ in 0..TURNS {
             let alive = |_| self.for_a_turn(std::iter::repeat(get("/livez")));
             livez.add(Load::on(server, saturate(&server.addresses, self.clients, alive)).await?);
             let advised = |client| self.for_a_turn(actions.iter().cycle().skip(17 * client).cloned());
-            asked.add(Load::on(server, saturate(&server.addresses, self.clients, advised)).await?);
+            actions_load.add(Load::on(server, saturate(&server.addresses, self.clients, advised)).await?);
         }
         report.load(format!("limit: /livez, {} clients", self.clients), &livez, Must::default());
-        report.load(format!("action: {} clients, in turns with /livez", self.clients), &asked, Must::default());
-        let share = asked.rate() / livez.rate();
+        report.load(format!("action: {} clients, in turns with /livez", self.clients), &actions_load, Must::default());
+        let share = actions_load.rate() / livez.rate();
         report.bounded(
             format!("action-vs-livez: {share:.2} of its rate"),
             LoadBound::at_least(share, SHARE_OF_LIVEZ, "of /livez"),

@@ -24,8 +24,8 @@ pub enum ServerError {
     Folder(#[from] HostError),
     #[error("{doing}")]
     Process { doing: &'static str, source: io::Error },
-    #[error("the service said {said:?} and not where it listens; its log ends: {log}")]
-    NoAddress { said: String, log: String },
+    #[error("the service printed {first_line:?} instead of its address; its log ends: {log}")]
+    NoAddress { first_line: String, log: String },
     #[error("{url} names no service")]
     Url { url: String },
     #[error("{url} is encrypted: say by --ca whose certificates to trust")]
@@ -189,17 +189,17 @@ fn spawn(folder: &Path, store: Option<&str>) -> Result<(Child, SocketAddr), Serv
     command.env_remove("BALLAST_ROLE").stdin(Stdio::null()).stdout(Stdio::piped());
     command.stderr(File::create(&log).map_err(failed("making the log"))?);
     let mut child = command.spawn().map_err(failed("starting the service"))?;
-    let mut said = String::new();
+    let mut first_line = String::new();
     if let Some(output) = child.stdout.take() {
-        BufReader::new(output).read_line(&mut said).map_err(failed("listening to the service"))?;
+        BufReader::new(output).read_line(&mut first_line).map_err(failed("listening to the service"))?;
     }
-    match said.trim().strip_prefix("listening on http://").and_then(|address| address.parse().ok()) {
+    match first_line.trim().strip_prefix("listening on http://").and_then(|address| address.parse().ok()) {
         Some(address) => Ok((child, address)),
         None => {
             let _ = child.kill();
             let _ = child.wait();
             let log = std::fs::read_to_string(log).unwrap_or_default();
-            Err(ServerError::NoAddress { said, log: log.lines().last().unwrap_or_default().to_owned() })
+            Err(ServerError::NoAddress { first_line, log: log.lines().last().unwrap_or_default().to_owned() })
         }
     }
 }

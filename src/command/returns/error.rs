@@ -11,8 +11,8 @@ use thiserror::Error;
 pub enum ReturnsError {
     #[error("reading {}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{said}")]
-    Refused { said: String },
+    #[error("{sentence}")]
+    Refused { sentence: String },
     #[error("{questions}")]
     Asked { questions: String },
     #[error(
@@ -33,7 +33,7 @@ pub enum ReturnsError {
 impl ReturnsError {
     /// Returns each question with the options of the command that answer it; `needs_year` if they leave the length of a
     /// period open.
-    pub fn asked(questions: &[Question], needs_year: bool) -> Self {
+    pub fn open_questions(questions: &[Question], needs_year: bool) -> Self {
         let mut lines = Vec::new();
         for Question { question, options, .. } in questions {
             lines.push(question.clone());
@@ -56,7 +56,7 @@ fn flags(choices: &Choices) -> String {
         value => option(&name.replace('_', "-"), value),
     };
     match serde_json::to_value(choices) {
-        Ok(Value::Object(said)) => said.iter().map(flag).collect::<Vec<_>>().join(" "),
+        Ok(Value::Object(fields)) => fields.iter().map(flag).collect::<Vec<_>>().join(" "),
         _ => String::new(),
     }
 }

@@ -20,7 +20,7 @@ fn the_bundled_file_is_whole() {
 /// Checks that the sentence reports every column that is not read as fractions.
 #[test]
 fn the_sentence_says_what_was_read() {
-    for (text, said) in [
+    for (text, sentence) in [
         (
             "Date,Close,Adj Close\n2008-02-29,1,98.98\n2008-01-31,1,101\n2007-12-31,1,100\n",
             "2 monthly returns of prices, 2008-01 to 2008-02, as in column Adj Close.\nA year of 12 months has a mean of -5.8 % \
@@ -33,7 +33,7 @@ fn the_sentence_says_what_was_read() {
              and a deviation of 5.2 %. The bank pays 0.100 % a quarter, 0.4 % a year, by --rate.",
         ),
     ] {
-        assert_eq!(Returns::parse(text, &Choices::default(), Some(0.001), None).unwrap().sentence(), said);
+        assert_eq!(Returns::parse(text, &Choices::default(), Some(0.001), None).unwrap().sentence(), sentence);
     }
 }
 
@@ -41,15 +41,15 @@ fn the_sentence_says_what_was_read() {
 fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
     let rows = |gain: &str| format!("day,fund,index\n01/02/2008,{gain},7\n01/03/2008,-0.2,8\n01/04/2008,0.1,6\n");
     let parse = |choices: &Choices| Returns::parse(&rows("0.3"), choices, Some(0.0), None);
-    let asked = parse(&Choices::default()).unwrap_err().to_string();
+    let questions = parse(&Choices::default()).unwrap_err().to_string();
     assert!(
-        asked.starts_with("Which column holds the returns or prices?\n  --column fund: fund (0.3; -0.2; 0.1 "),
-        "{asked}"
+        questions.starts_with("Which column holds the returns or prices?\n  --column fund: fund (0.3; -0.2; 0.1 "),
+        "{questions}"
     );
     let column = Choices { columns: vec!["fund".into()], ..Choices::default() };
-    let asked = parse(&column).unwrap_err().to_string();
+    let questions = parse(&column).unwrap_err().to_string();
     assert_eq!(
-        asked,
+        questions,
         "Which day is 01/02/2008?\n  --day-first true: 1 February 2008. 3 monthly simple returns as fractions, February 2008 to \
          April 2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 116.94 % and 87.18 % a year.\n  --day-first \
          false: 2 January 2008. 3 daily simple returns in percent, 2 January 2008 to 4 January 2008, as in column fund. Mean \
@@ -59,9 +59,9 @@ fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
          Percent: 0.3 is 0.30 %. 3 monthly simple returns in percent, February 2008 to April 2008, as in column fund. Mean \
          0.07 % and deviation 0.25 % a month, 0.80 % and 0.87 % a year."
     );
-    let said = Choices { day_first: Some(true), unit: Some(Unit::Percent), ..column };
-    assert_eq!(parse(&said).unwrap().rows[0].risky_return, 0.003);
-    let several = Choices { columns: vec!["fund".into(), "index".into()], kind: Some(Kind::Simple), ..said };
+    let answered = Choices { day_first: Some(true), unit: Some(Unit::Percent), ..column };
+    assert_eq!(parse(&answered).unwrap().rows[0].risky_return, 0.003);
+    let several = Choices { columns: vec!["fund".into(), "index".into()], kind: Some(Kind::Simple), ..answered };
     assert_eq!(parse(&several).unwrap_err().to_string(), "--column is 2 columns: must be one");
 }
 
@@ -78,15 +78,15 @@ fn a_frequency_that_the_dates_do_not_say_is_an_option() {
     let sentence = "2 returns, row 1 to row 2, as in column return.\nA year of 4 periods has a mean of -2.0 % and";
     assert!(read.sentence().starts_with(sentence), "{}", read.sentence());
     let halves = "date,ret\n2000-06-30,0.04\n2000-12-31,-0.02\n2001-06-30,0.05\n2001-12-31,0.03\n";
-    let asked = parse(halves, &Choices::default(), None).unwrap_err().to_string();
-    assert!(asked.contains("\n  --gaps true: ") && asked.ends_with(YEAR), "{asked}");
+    let questions = parse(halves, &Choices::default(), None).unwrap_err().to_string();
+    assert!(questions.contains("\n  --gaps true: ") && questions.ends_with(YEAR), "{questions}");
     let gaps = Choices { gaps: Some(true), unit: Some(Unit::Fraction), ..Choices::default() };
     let read = parse(halves, &gaps, Some(2)).unwrap();
     assert!(read.sentence().starts_with("4 returns, 2000-06-30 to 2001-12-31, "), "{}", read.sentence());
     // Without --periods-per-year each answer would be refused.
     for dates in ["week A1,0.01\nweek A2,0.02\nweek A3,-0.02\n", halves] {
-        let asked = parse(dates, &Choices::default(), None).unwrap_err().to_string();
-        assert!(asked.ends_with(YEAR), "{asked}");
+        let questions = parse(dates, &Choices::default(), None).unwrap_err().to_string();
+        assert!(questions.ends_with(YEAR), "{questions}");
         assert!(!parse(dates, &Choices::default(), Some(12)).unwrap_err().to_string().ends_with(YEAR));
     }
 }
@@ -97,9 +97,9 @@ const YEAR: &str = "\n  with --periods-per-year, such as 12, as the dates do not
 #[test]
 fn an_option_is_printed_as_a_shell_takes_it() {
     let text = "date,S&P 500,Investor's own\n2020-01,0.01,0.02\n2020-02,-0.01,0.01\n2020-03,0.02,-0.03\n";
-    let asked = Returns::parse(text, &Choices::default(), Some(0.0), None).unwrap_err().to_string();
-    assert!(asked.contains("\n  --column 'S&P 500': "), "{asked}");
-    assert!(asked.contains("\n  --column 'Investor'\\''s own': "), "{asked}");
+    let questions = Returns::parse(text, &Choices::default(), Some(0.0), None).unwrap_err().to_string();
+    assert!(questions.contains("\n  --column 'S&P 500': "), "{questions}");
+    assert!(questions.contains("\n  --column 'Investor'\\''s own': "), "{questions}");
 }
 
 #[test]
@@ -109,13 +109,15 @@ fn the_bank_is_a_column_or_an_option_and_never_left_out() {
         let returns = read(&file(&format!(",{name}"))).unwrap();
         let paid: Vec<f64> = returns.rows.iter().map(|row| row.risk_free_return).collect();
         assert_eq!((&paid[..], returns.rate()), (&[0.002, 0.001][..], 0.001));
-        let said = format!("The bank pays 0.100 % a month, 1.2 % a year, by the last row of column {name}.");
-        assert!(returns.sentence().ends_with(&said), "{}", returns.sentence());
+        let bank = format!("The bank pays 0.100 % a month, 1.2 % a year, by the last row of column {name}.");
+        assert!(returns.sentence().ends_with(&bank), "{}", returns.sentence());
     }
     let message = read(&file(",other")).unwrap_err().to_string();
     assert!(message.contains("must have a column risk_free_return, rf or rate, or --rate must be given"), "{message}");
-    let said = Returns::parse(&file(",rf"), &Choices::default(), Some(-0.003), None).unwrap();
-    assert!(said.rows.iter().all(|row| row.risk_free_return == -0.003) && said.sentence().ends_with("by --rate."));
+    let returns = Returns::parse(&file(",rf"), &Choices::default(), Some(-0.003), None).unwrap();
+    assert!(
+        returns.rows.iter().all(|row| row.risk_free_return == -0.003) && returns.sentence().ends_with("by --rate.")
+    );
     let percent = read("date,return,rf\n2008-01,0.01,0.2\n2008-02,0.03,2.1\n").unwrap_err().to_string();
     let reason =
         "\nColumn rf is not used: line 3: rf is \"2.1\": must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %.";
@@ -136,7 +138,7 @@ fn figures_of_a_year_count_the_periods_of_the_frequency() {
     };
     let trading = ["2008-01-17", "2008-01-18", "2008-01-21", "2008-01-22"];
     let calendar = ["2008-01-18", "2008-01-19", "2008-01-20", "2008-01-21"];
-    for (dates, said, periods) in [
+    for (dates, periods_per_year, periods) in [
         (trading, None, 252),
         (calendar, None, 365),
         (trading, Some(260), 260),
@@ -145,7 +147,7 @@ fn figures_of_a_year_count_the_periods_of_the_frequency() {
         (["2008-01", "2008-04", "2008-07", "2008-10"], None, 4),
         (["2005", "2006", "2007", "2008"], None, 1),
     ] {
-        let returns = Returns::parse(&file(dates), &Choices::default(), Some(0.001), said).unwrap();
+        let returns = Returns::parse(&file(dates), &Choices::default(), Some(0.001), periods_per_year).unwrap();
         assert_eq!(returns.periods_per_year, periods, "{dates:?}");
         let deviation = (4.0 / 3.0 * periods as f64).sqrt();
         let expected = format!(" has a mean of 0.0 % and a deviation of {deviation:.1} %. ");
@@ -207,7 +209,7 @@ fn volumes_and_other_prices_of_a_day_are_no_assets() {
     let found = AnyReturns::parse(text, &Choices::default(), Some(0.001), None).unwrap();
     assert!(matches!(&found, AnyReturns::One(returns) if returns.column == "Last"), "{found:?}");
     let columns = ["Open", "Last"].map(str::to_owned).to_vec();
-    let said = Choices { columns, ..Choices::default() };
-    let refused = AnyReturns::parse(text, &said, Some(0.001), None).unwrap_err().to_string();
-    assert!(refused.starts_with("Column Open holds neither returns nor the last price of each period"), "{refused}");
+    let choices = Choices { columns, ..Choices::default() };
+    let refused = AnyReturns::parse(text, &choices, Some(0.001), None).unwrap_err().to_string();
+    assert!(refused.starts_with("Column Open is no return and not the last price of its period"), "{refused}");
 }

@@ -26,7 +26,7 @@ pub fn why_nothing(record: &str, why: &WhyNothing, noun: &str) -> String {
 }
 
 /// Describes the yearly cost and gain of the level followed and of the others, with `periods` periods in a year.
-pub fn told(levels: &LevelsAdvised, periods: f64) -> String {
+pub fn describe(levels: &LevelsAdvised, periods: f64) -> String {
     let a_year = |loss: f64| format!("{:.2} %", 100.0 * periods * loss.max(0.0));
     let mut text = String::new();
     if let Some(LevelAdvised { level, scale, regrets, spared, .. }) =
@@ -88,10 +88,10 @@ mod tests {
                 level(CautionLevel::Paper, 1.0, 0.0),
             ],
         };
-        let told = told(&levels, 12.0);
+        let text = describe(&levels, 12.0);
         // A regret of 0.0003 per month is 0.36 % per year, and 0.0004 is 0.48 %.
-        assert!(told.contains("20 % of the radius") && told.contains("0.36 %") && told.contains("0.48 %"), "{told}");
-        let line = told.lines().find(|line| line.contains("balanced  ")).unwrap();
-        assert!(line.ends_with('<') && line.contains("60.0 %") && line.contains("0.12 %"), "{told}");
+        assert!(text.contains("20 % of the radius") && text.contains("0.36 %") && text.contains("0.48 %"), "{text}");
+        let line = text.lines().find(|line| line.contains("balanced  ")).unwrap();
+        assert!(line.ends_with('<') && line.contains("60.0 %") && line.contains("0.12 %"), "{text}");
     }
 }

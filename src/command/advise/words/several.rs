@@ -7,7 +7,7 @@ use ballast::service::advise_assets::AssetsAdvised;
 use super::{caution, money, percent};
 
 /// Describes what to hold of each asset, and the basis of the advice.
-pub fn told_of_several(advised: &AssetsAdvised, wealth: f64, noun: &str, periods: f64) -> String {
+pub fn describe_several(advised: &AssetsAdvised, wealth: f64, noun: &str, periods: f64) -> String {
     let advice = &advised.advice;
     let total = percent(advice.total, 1);
     let mut text = match advice.total > 0.0 {
@@ -43,7 +43,7 @@ pub fn told_of_several(advised: &AssetsAdvised, wealth: f64, noun: &str, periods
         let _ = writeln!(text, "  {asset:<width$}{held:>9}{trade:>9}{:>12}   {means}", money(share * wealth));
     }
     if let Some(levels) = &advice.levels {
-        text += &format!("\n{}", caution::told(levels, periods));
+        text += &format!("\n{}", caution::describe(levels, periods));
     }
     let warnings = advised.warnings.iter().map(|warning| &warning.message);
     for sentence in warnings.chain(advice.caution.iter().map(|caution| &caution.sentence)) {
