@@ -195,7 +195,7 @@ impl Jobs {
                 (BacktestQuestion::Asset(backtest.request), estimate, steps, warnings)
             }
             BacktestQuestion::Assets(request) => {
-                let backtest = AssetsBacktest::asked(&request)?;
+                let backtest = AssetsBacktest::from_request(&request)?;
                 let estimate = estimate::backtest_of_assets(&backtest, request.returns().0, self.threads);
                 let (steps, warnings) = (backtest.strategies().len(), backtest.warnings(&request));
                 (BacktestQuestion::Assets(request), estimate, steps, warnings)

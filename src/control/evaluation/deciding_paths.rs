@@ -50,7 +50,7 @@ mod tests {
 
     /// Counts over 200 reports of 300 paths of twelve months in stocks. The first count is how often the 90 % interval
     /// of the certainty equivalent holds the truth. The second is how often the sentence appears.
-    fn held_and_said(eta: f64, crash: f64) -> [usize; 2] {
+    fn held_and_noted(eta: f64, crash: f64) -> [usize; 2] {
         let utility = RelativeUtility::Power { eta };
         let mut generator = stream(6, "test", eta as usize, 0);
         // E[e^((1 - eta) Z)] of one month, in closed form.
@@ -75,9 +75,9 @@ mod tests {
     #[test]
     fn what_few_paths_decide_is_said_where_intervals_do_not_hold() {
         // Three months in a hundred lose a quarter of wealth.
-        let [held, said] = held_and_said(10.0, 0.03);
-        assert!(held < 165 && said > 190, "{held} held and {said} said of 200");
-        let [held, said] = held_and_said(3.0, 0.0);
-        assert!(held > 168 && said < 5, "{held} held and {said} said of 200");
+        let [held, noted] = held_and_noted(10.0, 0.03);
+        assert!(held < 165 && noted > 190, "{held} held and {noted} noted of 200");
+        let [held, noted] = held_and_noted(3.0, 0.0);
+        assert!(held > 168 && noted < 5, "{held} held and {noted} noted of 200");
     }
 }

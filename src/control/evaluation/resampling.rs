@@ -82,8 +82,8 @@ impl<'a> StrategySeries<'a> {
         let lost: f64 = self.years.iter().take_while(|year| year.0 < 0.0).map(|year| counts[year.1]).sum();
         let (mut left, mut sum) = (WORST * all, 0.0);
         for &(growth, start) in &self.years {
-            let taken = counts[start].min(left);
-            (left, sum) = (left - taken, sum + taken * growth);
+            let counted = counts[start].min(left);
+            (left, sum) = (left - counted, sum + counted * growth);
             if left <= 0.0 {
                 break;
             }

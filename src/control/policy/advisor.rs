@@ -134,8 +134,8 @@ impl Advisor {
         let radius = self.radius(state);
         match mode {
             AdviceMode::Resolve => {
-                let asked = AdviceInputs { step, state, radius, source: AdviceSource::Resolved };
-                self.resolved(&asked, &self.predict(step, state, radius)).0
+                let inputs = AdviceInputs { step, state, radius, source: AdviceSource::Resolved };
+                self.resolved(&inputs, &self.predict(step, state, radius)).0
             }
             AdviceMode::Surrogate => self
                 .advise_from_surrogate(step, state, radius)
@@ -160,8 +160,8 @@ impl Advisor {
     /// outside the design.
     pub fn advise_outside(&self, step: usize, state: &State, outside: &OutsideDesign) -> Advice {
         let OutsideDesign { radius, predicted } = outside;
-        let asked = AdviceInputs { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
-        self.resolved(&asked, predicted).0
+        let inputs = AdviceInputs { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
+        self.resolved(&inputs, predicted).0
     }
 
     /// Returns true if [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what
@@ -197,8 +197,8 @@ impl Advisor {
     }
 
     fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
-        let asked = AdviceInputs { step, state, radius, source: AdviceSource::PolicySurrogate };
-        self.advice(&asked, predicted.band, predicted.floor_gain, predicted)
+        let inputs = AdviceInputs { step, state, radius, source: AdviceSource::PolicySurrogate };
+        self.advice(&inputs, predicted.band, predicted.floor_gain, predicted)
     }
 
     /// Returns the re-solved advice and the worst-case law behind it.
@@ -235,18 +235,18 @@ impl Advisor {
         (band.nearest(state.holding), floor_gain)
     }
 
-    fn resolved(&self, asked: &AdviceInputs, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
-        if self.pays(asked.step, asked.state) {
-            let after = self.policy.steps().get(asked.step + 1).map(|after| &after.solution);
-            let next = NextValue::new(self.specification(), asked.step + 1, after);
-            let step = BellmanStep { problem: &self.problem, step: asked.step, next: &next };
-            let solution = step.solve_within(asked.state, asked.radius);
+    fn resolved(&self, inputs: &AdviceInputs, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
+        if self.pays(inputs.step, inputs.state) {
+            let after = self.policy.steps().get(inputs.step + 1).map(|after| &after.solution);
+            let next = NextValue::new(self.specification(), inputs.step + 1, after);
+            let step = BellmanStep { problem: &self.problem, step: inputs.step, next: &next };
+            let solution = step.solve_within(inputs.state, inputs.radius);
             if solution.action.is_finite() && solution.floor_gain.is_finite() {
-                return (self.advice(asked, solution.band, solution.floor_gain, predicted), Some(solution));
+                return (self.advice(inputs, solution.band, solution.floor_gain, predicted), Some(solution));
             }
         }
         // Keeping all wealth in the bank is feasible, and no law can hurt it.
-        let unsolved = AdviceInputs { source: AdviceSource::Unsolved, ..*asked };
+        let unsolved = AdviceInputs { source: AdviceSource::Unsolved, ..*inputs };
         (self.advice(&unsolved, Band::of(&[0.0]), 0.0, predicted), None)
     }
 
@@ -255,24 +255,24 @@ impl Advisor {
         self.problem.floor(step, state) > 0.0
     }
 
-    fn advice(&self, asked: &AdviceInputs, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
-        let floor = self.problem.floor(asked.step, asked.state);
-        let holding = asked.state.holding;
+    fn advice(&self, inputs: &AdviceInputs, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
+        let floor = self.problem.floor(inputs.step, inputs.state);
+        let holding = inputs.state.holding;
         let allocation = band.nearest(holding);
         Advice {
             allocation,
             holding,
             band,
             trade: allocation - holding,
-            contribution: self.problem.dynamics(asked.step).contribution,
+            contribution: self.problem.dynamics(inputs.step).contribution,
             certainty_equivalent: floor * floor_gain.exp(),
             floor,
-            radius: asked.radius,
-            sample_size: asked.state.law.sample_size(),
-            effective_size: asked.state.law.effective_size(),
+            radius: inputs.radius,
+            sample_size: inputs.state.law.sample_size(),
+            effective_size: inputs.state.law.effective_size(),
             surrogate_sd: predicted.deviation,
             in_design: predicted.in_design,
-            source: asked.source,
+            source: inputs.source,
         }
     }
 

@@ -41,7 +41,7 @@ impl Worker {
         request: &AssetsBacktestRequest,
         stop: &AtomicBool,
     ) -> Result<JobOutcome, JobEnd> {
-        let backtest = AssetsBacktest::asked(request).map_err(|error| failed(error.to_string()))?;
+        let backtest = AssetsBacktest::from_request(request).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::backtest_of_assets(&backtest, request.returns().0, self.threads))?;
         let checkpoints = self.checkpoints(claimed)?;
         let watch = Watch { stop, progress: &|_| {} };

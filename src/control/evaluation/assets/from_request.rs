@@ -16,7 +16,7 @@ impl AssetsBacktest {
     ///
     /// # Errors
     /// A field that breaks its rule.
-    pub fn asked(request: &AssetsBacktestRequest) -> Result<Self, FieldError> {
+    pub fn from_request(request: &AssetsBacktestRequest) -> Result<Self, FieldError> {
         let (frequency, periods_per_year) = request.check()?;
         let (field, returns) = request.returns();
         let record = AssetsRecord {

@@ -30,8 +30,8 @@ use crate::control::request::rules::{RELATIVE_RISK_AVERSION, TRADING_COST, whole
 use crate::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
 use crate::control::request::support::Support;
 
-mod asked;
 mod figures;
+mod from_request;
 pub mod report;
 pub mod rules;
 mod words;
@@ -244,14 +244,14 @@ impl AssetsBacktest {
     /// Returns the problem that `POST /advise` would solve before a period with a window of returns. The bank is
     /// assumed to keep paying its last rate.
     fn problem(&self, period: usize, window: Option<usize>) -> AssetsProblem {
-        let asked = ProblemSpecification {
+        let specification = ProblemSpecification {
             utility: self.utility(),
             radius: Some(RadiusRule::bridge(self.choices.alpha)),
             caution: Some(CautionLevel::Balanced),
             support: Some(self.choices.support),
             ..ProblemSpecification::of(Vec::new(), self.record.bank[period - 1])
         };
-        asked_of(self.record.assets.clone(), self.record.known(period, window).to_vec(), &asked)
+        asked_of(self.record.assets.clone(), self.record.known(period, window).to_vec(), &specification)
     }
 
     /// Returns the shares that a strategy holds in every period, given the balls.

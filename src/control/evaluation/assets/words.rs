@@ -98,11 +98,11 @@ fn ranges(
             None => families.push((family, [value; 2])),
         }
     }
-    let told = |(family, ends): &(StrategyKind, [f64; 2])| {
+    let family_range = |(family, ends): &(StrategyKind, [f64; 2])| {
         let ([low, high], family) = (ends.map(|end| format!("{end:.decimals$}")), quoted(family.name()));
         if low == high { format!("{family} {low}{unit}") } else { format!("{family} {low} to {high}{unit}") }
     };
-    families.iter().map(told).collect::<Vec<String>>().join("; ")
+    families.iter().map(family_range).collect::<Vec<String>>().join("; ")
 }
 
 #[cfg(test)]
@@ -111,9 +111,9 @@ mod tests {
 
     #[test]
     fn windows_are_told_in_years_where_they_are_whole() {
-        let told = |periods| window(periods, 12, "month");
+        let window_name = |periods| window(periods, 12, "month");
         assert_eq!(
-            [None, Some(12), Some(120), Some(125), Some(1)].map(told),
+            [None, Some(12), Some(120), Some(125), Some(1)].map(window_name),
             ["all", "1 year", "10 years", "125 months", "1 month"]
         );
     }

@@ -11,9 +11,9 @@ pub(super) fn sentences(resampled: &[ResampledFrontier], evidence: f64, per_year
     sentences.extend(resampled.first().map(|first| of_own_mix(first, per_year)));
     let behind = if evidence < 0.0 { "below" } else { "above" };
     let errors = evidence.abs();
-    let told = if errors < TOLD { "that may be chance" } else { "that is hardly chance" };
+    let chance = if errors < TOLD { "that may be chance" } else { "that is hardly chance" };
     sentences.push(format!(
-        "The average return of the record lies {behind} the bank's by {errors:.1} standard errors: {told}. The first two figures are of markets with that average, the third of one with the bank's; which is true the record says no better than that."
+        "The average return of the record lies {behind} the bank's by {errors:.1} standard errors: {chance}. The first two figures are of markets with that average, the third of one with the bank's; which is true the record says no better than that."
     ));
     sentences.push(
         "What did best on such records says next to nothing about the future, and the variation from record to record need not fall as \

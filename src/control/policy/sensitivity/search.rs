@@ -196,14 +196,14 @@ impl AdviceVariants<'_> {
     /// Warns of the end of the range that is further from the advice, if it is far, or if exactly one of the two is the
     /// bank alone.
     fn hangs_on_one(&self, WithoutOne { lowest, highest, .. }: WithoutOne) -> Option<Caution> {
-        let told = self.advice.allocation;
-        let change = |left_out: &LeftOut| (left_out.allocation - told).abs();
+        let present = self.advice.allocation;
+        let change = |left_out: &LeftOut| (left_out.allocation - present).abs();
         let is_another = |left_out: &LeftOut| {
-            is_invested(left_out.allocation) != is_invested(told) || change(left_out) > FAR * self.highest
+            is_invested(left_out.allocation) != is_invested(present) || change(left_out) > FAR * self.highest
         };
         let ends = [lowest, highest].into_iter().filter(is_another);
         let worst = ends.max_by(|one, other| change(one).total_cmp(&change(other)))?;
-        Some(Caution::one_return(worst.simple_return, worst.allocation, told))
+        Some(Caution::one_return(worst.simple_return, worst.allocation, present))
     }
 
     fn next_return(&self) -> NextReturn {
@@ -215,10 +215,12 @@ impl AdviceVariants<'_> {
         let part = (range[1] - range[0]) / PARTS as f64;
         let grid: Vec<f64> = (0..=PARTS).map(|index| (range[0] + part * index as f64).min(range[1])).collect();
         let tried = grid.iter().copied().chain(QUANTILES.map(quantile)).collect();
-        let told = pool::map(tried, |log_return| self.after(log_return));
+        let allocations = pool::map(tried, |log_return| self.after(log_return));
         let crossing = |is_above: &(dyn Fn(f64) -> bool + Sync)| {
-            let pairs = grid.windows(2).zip(told.windows(2));
-            let crossed = pairs.filter(|(_, told)| !is_above(told[0]) && is_above(told[1])).map(|(ends, _)| ends);
+            let pairs = grid.windows(2).zip(allocations.windows(2));
+            let crossed = pairs
+                .filter(|(_, allocations)| !is_above(allocations[0]) && is_above(allocations[1]))
+                .map(|(ends, _)| ends);
             let median = quantile(0.5);
             let away = |ends: &&[f64]| (ends[0] - median).max(median - ends[1]).max(0.0);
             let nearest = crossed.min_by(|one, other| away(one).total_cmp(&away(other)))?;
@@ -228,7 +230,7 @@ impl AdviceVariants<'_> {
             pool::join(|| crossing(&is_invested), || crossing(&|allocation| allocation >= self.highest - AT_AN_END));
         let next = |index: usize| {
             let ReturnAndLog { log_return, simple_return } = ReturnAndLog::of(quantile(QUANTILES[index]));
-            let allocation = told[grid.len() + index];
+            let allocation = allocations[grid.len() + index];
             NextAdvice { quantile: QUANTILES[index], log_return, simple_return, allocation }
         };
         NextReturn {
