@@ -25,26 +25,26 @@ async fn large_bodies_are_decoded_in_nobodys_way() {
     let address = format!("{}/observe", app.url);
     let attack = join_all((0..8).map(|_| async {
         loop {
-            let asked = app.client.post(&address).header("content-type", "application/json").body(body.clone());
-            assert!(asked.send().await.unwrap().status().as_u16() >= 400);
+            let request = app.client.post(&address).header("content-type", "application/json").body(body.clone());
+            assert!(request.send().await.unwrap().status().as_u16() >= 400);
         }
     }));
     let victim = async {
-        let mut taken = Vec::new();
+        let mut durations = Vec::new();
         for _ in 0..100 {
-            let asked = Instant::now();
+            let started = Instant::now();
             assert_eq!(app.get("/livez").await.0, 200);
-            taken.push(asked.elapsed());
+            durations.push(started.elapsed());
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
-        taken.sort_unstable();
-        taken
+        durations.sort_unstable();
+        durations
     };
-    let taken = tokio::select! {
+    let durations = tokio::select! {
         _ = attack => unreachable!("it goes on until the victim is done"),
-        taken = victim => taken,
+        durations = victim => durations,
     };
-    assert!(taken[89] < within(Duration::from_millis(100)), "{taken:?}");
+    assert!(durations[89] < within(Duration::from_millis(100)), "{durations:?}");
 }
 
 const SLOW_SOCKETS: usize = 1000;
@@ -62,9 +62,9 @@ fn open_socket(address: &str, bytes: &str) -> TcpStream {
 
 /// Drains the socket and returns whether the other side has closed it.
 fn is_closed(socket: &mut TcpStream) -> bool {
-    let mut taken = [0; 1024];
+    let mut buffer = [0; 1024];
     loop {
-        match socket.read(&mut taken) {
+        match socket.read(&mut buffer) {
             Ok(0) => return true,
             Ok(_) => {}
             Err(error) => return error.kind() != ErrorKind::WouldBlock,
@@ -76,14 +76,14 @@ fn is_closed(socket: &mut TcpStream) -> bool {
 async fn slowest(app: &App, first: usize) -> Duration {
     let mut slowest = Duration::ZERO;
     for round in 0..30 {
-        let asked = Instant::now();
+        let started = Instant::now();
         let (status, answer) = match round % 3 {
             0 => app.action().await,
             1 => app.observe(first + round / 3, 0.001).await,
             _ => app.post("/what-if", &json!({ "session": app.session, "wealth": 50.0 })).await,
         };
         assert_eq!(status, 200, "round {round}: {answer}");
-        slowest = slowest.max(asked.elapsed());
+        slowest = slowest.max(started.elapsed());
     }
     slowest
 }
@@ -178,9 +178,9 @@ async fn a_tenant_that_calls_too_often_is_put_off_and_another_is_not() {
     assert_eq!(app.get("/jobs").await.0, 200);
     app.hold(&north);
     // A rejected call uses up no allowance, so that repeated calls do not postpone the next one.
-    let asked = Instant::now();
+    let started = Instant::now();
     until("the allowance to come back", async || (app.get("/jobs").await.0 == 200).then_some(())).await;
-    assert_within(Duration::from_secs(pause), asked, "the allowance");
+    assert_within(Duration::from_secs(pause), started, "the allowance");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -194,10 +194,10 @@ async fn heavy_calls_past_the_bound_come_back_later_and_starve_nobody() {
     let live = async {
         let mut slowest = Duration::ZERO;
         for period in 1..=20 {
-            let asked = Instant::now();
+            let started = Instant::now();
             assert_eq!(app.action().await.0, 200);
             assert_eq!(app.observe(period, 0.001).await.0, 200);
-            slowest = slowest.max(asked.elapsed());
+            slowest = slowest.max(started.elapsed());
         }
         slowest
     };
@@ -221,11 +221,11 @@ async fn the_class_of_a_call_is_that_of_what_it_asks() {
     let spellings =
         ["mode=resolve", "mode=%72esolve", "explain=worst_case", "explain=%77orst_case", "sensitivity=%74rue"];
     for question in spellings {
-        let asked = join_all((0..20).map(|_| {
+        let answers = join_all((0..20).map(|_| {
             let url = format!("{}/action?session={}&{question}", app.url, app.session);
             app.client.get(url).send()
         }));
-        let statuses: Vec<u16> = asked.await.into_iter().map(|answer| answer.unwrap().status().as_u16()).collect();
+        let statuses: Vec<u16> = answers.await.into_iter().map(|answer| answer.unwrap().status().as_u16()).collect();
         assert!(statuses.iter().all(|status| [200, 429, 503].contains(status)), "{question}: {statuses:?}");
         assert!(statuses.iter().filter(|status| **status == 429).count() >= 10, "{question}: {statuses:?}");
         assert_eq!(app.action().await.0, 200, "{question}");

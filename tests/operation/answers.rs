@@ -97,10 +97,10 @@ impl Store {
             json!({ "rate_per_step": 0.001, "history": returns(5000), "radius": { "rule": "fixed", "radius": 0.001 } });
         let of_text = |lines: usize| returns(lines).iter().map(|back| format!("{back:.4}\n")).collect::<String>();
         let body = |path: &str, body: Value| (path.to_owned(), Some(body), false);
-        let asked = |path: &str| (path.to_owned(), None, false);
+        let get = |path: &str| (path.to_owned(), None, false);
         let large = |path: &str| (path.to_owned(), None, true);
         match operation {
-            "get /" => asked("/"),
+            "get /" => get("/"),
             "get /action" => large(&format!("/action?session={session}&explain=worst_case")),
             "post /advise" => ("/advise".into(), Some(json!({ "problem": problem })), false),
             "get /audit" => large("/audit?limit=1000"),
@@ -108,9 +108,9 @@ impl Store {
                 "/backtest",
                 json!({ "log_returns": returns(60), "rate": 0.002, "periods_per_year": 12, "window": 24, "count": 20 }),
             ),
-            "get /dashboard/{file}" => asked("/dashboard/inter.woff2"),
-            "get /docs" => asked("/docs"),
-            "get /docs/{file}" => asked("/docs/start.js"),
+            "get /dashboard/{file}" => get("/dashboard/inter.woff2"),
+            "get /docs" => get("/docs"),
+            "get /docs/{file}" => get("/docs/start.js"),
             "post /evaluate" => body(
                 "/evaluate",
                 json!({ "problem": crate::support::specification(2)["problem"], "frameworks": ["plug_in"] }),
@@ -119,15 +119,15 @@ impl Store {
                 "/frontier",
                 json!({ "problem": { "rate_per_step": 0.001, "history": returns(40) }, "resamples": 20, "scales": [0, 1], "block": 3 }),
             ),
-            "get /guide" => asked("/guide"),
-            "get /guide/{file}" => asked("/guide/requests"),
-            "get /jobs" => asked("/jobs?limit=1000"),
-            "get /jobs/{id}" => asked(&of_job),
-            "delete /jobs/{id}" => asked(&of_job),
+            "get /guide" => get("/guide"),
+            "get /guide/{file}" => get("/guide/requests"),
+            "get /jobs" => get("/jobs?limit=1000"),
+            "get /jobs/{id}" => get(&of_job),
+            "delete /jobs/{id}" => get(&of_job),
             "post /jobs/{id}/cancel" => (format!("{of_job}/cancel"), None, false),
-            "get /jobs/{id}/events" => asked(&format!("{of_job}/events")),
-            "get /jobs/{id}/report" => asked(&format!("/jobs/{evaluation}/report")),
-            "get /health" | "get /key" | "get /livez" | "get /metrics" | "get /readyz" => asked(&operation[4..]),
+            "get /jobs/{id}/events" => get(&format!("{of_job}/events")),
+            "get /jobs/{id}/report" => get(&format!("/jobs/{evaluation}/report")),
+            "get /health" | "get /key" | "get /livez" | "get /metrics" | "get /readyz" => get(&operation[4..]),
             "post /observe" => {
                 let one = |period: usize| json!({ "session": session, "period": period, "log_return": 0.001, "confirm": true });
                 let unknown =
@@ -152,9 +152,9 @@ impl Store {
             ),
             "get /sessions" => large("/sessions?limit=1000&count=care"),
             "post /sessions" => body("/sessions", labelled(json!({ "policy": policy, "rolling": true }))),
-            "get /sessions/{id}" | "delete /sessions/{id}" => asked(&of_session),
+            "get /sessions/{id}" | "delete /sessions/{id}" => get(&of_session),
             "patch /sessions/{id}" => body(&of_session, labels()),
-            "delete /policies/{id}" => asked(&of_policy),
+            "delete /policies/{id}" => get(&of_policy),
             "patch /policies/{id}" => body(&of_policy, labels()),
             "post /sessions/{id}/corrections" => body(
                 &format!("{of_session}/corrections"),
@@ -167,8 +167,8 @@ impl Store {
             "post /train" => body("/train", labelled(json!({ "problem": problem, "design": { "count": 20 } }))),
             "post /what-if" => {
                 let range = json!({ "from": 0.01, "to": 2, "points": 30 });
-                let asked = json!({ "session": session, "sweep": { "radius_scale": range }, "explain": "worst_case" });
-                ("/what-if".into(), Some(asked), true)
+                let body = json!({ "session": session, "sweep": { "radius_scale": range }, "explain": "worst_case" });
+                ("/what-if".into(), Some(body), true)
             }
             _ => panic!(
                 "{operation} of the description has no largest answer here: what part of the budget does it take?"
@@ -200,8 +200,8 @@ async fn every_operation_has_its_part_of_the_budget_before_its_largest_answer_is
         let bytes = answer.bytes().await.unwrap();
         // A policy that sessions use is not deleted.
         let is_answered = status.is_success() || status.is_redirection() || status == StatusCode::CONFLICT;
-        let told = String::from_utf8_lossy(&bytes[..bytes.len().min(400)]).into_owned();
-        assert!(is_answered, "{operation}: {status} {told}");
+        let text = String::from_utf8_lossy(&bytes[..bytes.len().min(400)]).into_owned();
+        assert!(is_answered, "{operation}: {status} {text}");
         assert!(!is_large || bytes.len() > COUNTED_FROM, "{operation}: {} bytes", bytes.len());
         println!("{operation}: {} bytes", bytes.len());
     }

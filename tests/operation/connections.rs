@@ -21,8 +21,8 @@ const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 
 /// Returns how long the connections are held; in full 15 s by `BALLAST_TEST_CROWD_SECONDS=15`.
 fn held_for() -> Duration {
-    let asked = std::env::var("BALLAST_TEST_CROWD_SECONDS").ok().and_then(|seconds| seconds.parse().ok());
-    Duration::from_secs(asked.unwrap_or(4))
+    let seconds_given = std::env::var("BALLAST_TEST_CROWD_SECONDS").ok().and_then(|seconds| seconds.parse().ok());
+    Duration::from_secs(seconds_given.unwrap_or(4))
 }
 
 /// Returns whether this process may open that many connections. If not, the test runs again in a process that may, or
@@ -80,12 +80,12 @@ async fn answered_throughout(
     let (mut rounds, mut slowest) = (0, Duration::ZERO);
     let address = url.strip_prefix("http://").unwrap().to_owned();
     while Instant::now() < until || rounds == 0 {
-        for asked in [format!("{url}/readyz"), format!("http://{operations}/readyz"), format!("{url}{action}")] {
+        for target in [format!("{url}/readyz"), format!("http://{operations}/readyz"), format!("{url}{action}")] {
             let fresh = reqwest::Client::builder().timeout(4 * within(ANSWERED_WITHIN)).build().unwrap();
             let begun = Instant::now();
-            let request = fresh.get(&asked).header(AUTHORIZATION, format!("Bearer {key}"));
-            let answer = request.send().await.unwrap_or_else(|error| panic!("{asked} in round {rounds}: {error:?}"));
-            assert_eq!(answer.status(), 200, "{asked} in round {rounds}");
+            let request = fresh.get(&target).header(AUTHORIZATION, format!("Bearer {key}"));
+            let answer = request.send().await.unwrap_or_else(|error| panic!("{target} in round {rounds}: {error:?}"));
+            assert_eq!(answer.status(), 200, "{target} in round {rounds}");
             slowest = slowest.max(begun.elapsed());
         }
         for address in [&address, operations] {
@@ -120,10 +120,10 @@ struct Polite {
 impl Polite {
     fn ask(&mut self, index: usize) {
         const REQUEST: &[u8] = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n";
-        let mut taken = [0; 4096];
+        let mut buffer = [0; 4096];
         let gone = self.sockets[index].as_mut().is_none_or(|socket| {
             let answered = loop {
-                match socket.read(&mut taken) {
+                match socket.read(&mut buffer) {
                     Ok(0) => break true,
                     Ok(_) => {}
                     Err(error) => break error.kind() != ErrorKind::WouldBlock,
@@ -317,12 +317,12 @@ async fn who_is_refused_early_reads_why() {
 async fn status(url: &str, lines: &str) -> String {
     let address = url.strip_prefix("http://").unwrap().to_owned();
     let request = format!("GET /jobs HTTP/1.1\r\n{lines}Connection: close\r\n\r\n");
-    let asked = tokio::task::spawn_blocking(move || {
+    let answer = tokio::task::spawn_blocking(move || {
         let mut socket = TcpStream::connect(address).unwrap();
         socket.write_all(request.as_bytes()).unwrap();
         whole_answer(socket).unwrap()
     });
-    asked.await.unwrap().split(' ').nth(1).unwrap_or_default().to_owned()
+    answer.await.unwrap().split(' ').nth(1).unwrap_or_default().to_owned()
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -48,7 +48,7 @@ fn terminate(process: &Process) {
 type Call = tokio::task::JoinHandle<reqwest::Result<reqwest::Response>>;
 
 /// Sends `count` of the largest requests, and returns once all are being solved.
-async fn asked(app: &App, process: &Process, count: usize) -> Vec<Call> {
+async fn start_calls(app: &App, process: &Process, count: usize) -> Vec<Call> {
     let (question, before) = (largest(), processor_seconds(process));
     let calls: Vec<_> = (0..count)
         .map(|_| tokio::spawn(app.client.post(format!("{}/advise", app.url)).json(&question).send()))
@@ -63,7 +63,7 @@ async fn asked(app: &App, process: &Process, count: usize) -> Vec<Call> {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_nobody_waits_for_stops() {
     let (mut process, app) = service();
-    let calls = asked(&app, &process, 1).await;
+    let calls = start_calls(&app, &process, 1).await;
     calls.iter().for_each(Call::abort);
     let mut used = processor_seconds(&process);
     until("the work to stop", async || {
@@ -83,14 +83,14 @@ async fn long_questions_keep_no_short_one_waiting() {
     let history: Vec<f64> = (0..120).map(|k| 0.006 + 0.03 * f64::sin(7.0 * f64::from(k))).collect();
     let short = json!({ "problem": { "history": history, "rate_per_step": 0.002 } });
     let time = async || {
-        let asked = Instant::now();
+        let started = Instant::now();
         let (status, advised) = app.post("/advise", &short).await;
         assert_eq!(status, 200, "{advised}");
-        asked.elapsed()
+        started.elapsed()
     };
     time().await;
     let idle = time().await.max(time().await);
-    let calls = asked(&app, &process, 6).await;
+    let calls = start_calls(&app, &process, 6).await;
     let mut busy: Vec<Duration> = Vec::new();
     for _ in 0..9 {
         busy.push(time().await);
@@ -105,13 +105,13 @@ async fn long_questions_keep_no_short_one_waiting() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_second_signal_ends_the_process_at_once() {
     let (mut process, app) = service();
-    let _calls = asked(&app, &process, 1).await;
+    let _calls = start_calls(&app, &process, 1).await;
     terminate(&process);
     tokio::time::sleep(Duration::from_millis(300)).await;
     assert!(process.0.try_wait().unwrap().is_none(), "the caller is given the time of the drain");
     terminate(&process);
-    let asked = Instant::now();
+    let started = Instant::now();
     let status = process.0.wait().unwrap();
-    assert!(asked.elapsed() < within(Duration::from_secs(1)), "{:?}", asked.elapsed());
+    assert!(started.elapsed() < within(Duration::from_secs(1)), "{:?}", started.elapsed());
     assert_eq!((status.code(), status.signal()), (Some(143), None));
 }

@@ -99,16 +99,16 @@ async fn open_many(store: &Store, first: SessionFacts, count: usize) {
 
 /// Returns the median and the slowest of `times` answers, and how many sessions the last one lists.
 async fn timed(app: &App, path: &str, times: usize) -> (Duration, Duration, usize) {
-    let (mut taken, mut listed) = (Vec::new(), 0);
+    let (mut durations, mut listed) = (Vec::new(), 0);
     for _ in 0..times {
         let started = Instant::now();
         let (status, page) = app.get(path).await;
-        taken.push(started.elapsed());
+        durations.push(started.elapsed());
         assert_eq!((status.as_u16(), &page["damaged"]), (200, &json!([])), "{path}");
         listed = page["sessions"].as_array().unwrap().len();
     }
-    taken.sort();
-    (taken[times / 2], taken[times - 1], listed)
+    durations.sort();
+    (durations[times / 2], durations[times - 1], listed)
 }
 
 #[tokio::test(flavor = "multi_thread")]

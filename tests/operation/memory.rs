@@ -199,8 +199,8 @@ async fn sweeps_that_explain_are_bounded_and_take_no_more_than_their_part() {
     );
     let held = slow_readers(&app, 30, &(head + &body)).await;
     tokio::time::sleep(Duration::from_secs(4)).await;
-    let taken = resident(&child).saturating_sub(before);
-    assert!(taken < 60 << 20, "{taken} bytes for thirty slow readers");
+    let added = resident(&child).saturating_sub(before);
+    assert!(added < 60 << 20, "{added} bytes for thirty slow readers");
     drop(held);
     child.kill().unwrap();
     child.wait().unwrap();
@@ -219,8 +219,8 @@ async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     let held = slow_readers(&app, 40, &format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n")).await;
     tokio::time::sleep(Duration::from_secs(2)).await;
     // One document at a time, twice while it is read, and the memory of forty connections.
-    let taken = resident(&child).saturating_sub(before);
-    assert!(taken < 60 << 20, "{taken} bytes for forty slow readers");
+    let added = resident(&child).saturating_sub(before);
+    assert!(added < 60 << 20, "{added} bytes for forty slow readers");
     assert!(part(&app, "large_answers").await > 0);
     app.open().await;
     assert_eq!(app.observe(1, 0.01).await.0, StatusCode::OK);

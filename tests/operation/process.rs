@@ -42,12 +42,12 @@ impl Process {
     fn terminate(&mut self) -> ExitStatus {
         let pid = self.child.id().to_string();
         assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
-        let asked = Instant::now();
+        let started = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
             }
-            assert!(asked.elapsed() < within(DRAIN), "still running");
+            assert!(started.elapsed() < within(DRAIN), "still running");
             std::thread::sleep(Duration::from_millis(10));
         }
     }
@@ -173,9 +173,9 @@ async fn a_process_asked_to_stop_in_a_long_fit_does_not_wait_for_it() {
     large["design"] = json!({ "count": 1500, "initial_laws": "resampled" });
     let job = process.app.queue(&large).await;
     process.app.until(&job, |job| job["progress"]["phase"] == "fitting").await;
-    let asked = Instant::now();
+    let terminated = Instant::now();
     assert_eq!(process.terminate().code(), Some(0));
-    assert_within(Duration::from_secs(3), asked, "the end of a process in a long fit");
+    assert_within(Duration::from_secs(3), terminated, "the end of a process in a long fit");
     assert_eq!(process.left(&job).await.state, JobState::Queued);
 }
 
@@ -186,8 +186,8 @@ async fn a_process_tells_the_seconds_that_it_computed() {
     let mut process = Process::start();
     process.app.train(&specification(2)).await;
     let metrics = process.app.get("/metrics").await.1;
-    let told = metrics.as_str().unwrap().lines().find_map(|line| line.strip_prefix("process_cpu_seconds_total "));
-    let seconds: f64 = told.unwrap().parse().unwrap();
+    let line = metrics.as_str().unwrap().lines().find_map(|line| line.strip_prefix("process_cpu_seconds_total "));
+    let seconds: f64 = line.unwrap().parse().unwrap();
     let processors = std::thread::available_parallelism().unwrap().get();
     let most = started.elapsed().as_secs_f64() * processors as f64;
     assert!(seconds <= most + 1.0, "{seconds} seconds computed, {most} at most");
@@ -200,12 +200,12 @@ async fn a_worker_that_cannot_claim_says_so_once_a_second_until_it_can() {
     let (mut child, url) = crate::support::process::serve(|command| {
         command.arg("--data").arg(folder.path()).env("RUST_LOG", "error").stderr(Stdio::piped());
     });
-    let (said, heard) = std::sync::mpsc::channel();
+    let (sender, heard) = std::sync::mpsc::channel();
     let lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     std::thread::spawn(move || {
         lines
             .filter(|line| line.contains("claiming a job"))
-            .for_each(|_| said.send(Instant::now()).unwrap_or_default());
+            .for_each(|_| sender.send(Instant::now()).unwrap_or_default());
     });
     crate::support::execute(folder.path(), "ALTER TABLE jobs RENAME TO hidden").await;
     let moments: Vec<Instant> = (0..3).map(|_| heard.recv_timeout(patience()).expect("a word of it")).collect();
@@ -249,16 +249,16 @@ async fn a_service_that_starts_is_alive_and_not_ready() {
     };
     let client = Client::new();
     let status = async |path: &str| {
-        let asked = client.get(format!("http://{address}{path}")).send().await;
-        asked.map_or(0, |answer| answer.status().as_u16())
+        let answer = client.get(format!("http://{address}{path}")).send().await;
+        answer.map_or(0, |answer| answer.status().as_u16())
     };
     let mut stopped = start();
     until("life", async || (status("/livez").await == 200).then_some(())).await;
     assert_eq!((status("/readyz").await, status("/sessions").await), (503, 503));
     assert!(Command::new("kill").args(["-TERM", &stopped.id().to_string()]).status().unwrap().success());
-    let asked = Instant::now();
+    let terminated = Instant::now();
     assert!(!stopped.wait().unwrap().success());
-    assert_within(Duration::from_secs(5), asked, "a start that is asked to stop");
+    assert_within(Duration::from_secs(5), terminated, "a start that is asked to stop");
     let mut started = start();
     until("life", async || (status("/livez").await == 200).then_some(())).await;
     sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();

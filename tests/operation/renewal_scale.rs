@@ -231,7 +231,7 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
         let (status, action) = app.action().await;
         assert_eq!(status, 200, "{action}");
         let cautions: Vec<&Value> =
-            action["caution"].as_array().unwrap().iter().filter(|told| told["code"] == "waiting").collect();
+            action["caution"].as_array().unwrap().iter().filter(|caution| caution["code"] == "waiting").collect();
         assert_eq!(cautions.len(), 1, "{action}");
         let sentence = cautions[0]["sentence"].as_str().unwrap();
         assert!(sentence.contains("ended with period 3") && sentence.contains("last step"), "{sentence}");
@@ -251,8 +251,8 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
         }
         let same = app.get(&format!("/action?session={twin}")).await.1;
         for field in ["allocation", "radius", "sample_size"] {
-            let [told, same] = [&action, &same].map(|answer| answer[field].as_f64().unwrap());
-            assert!((told - same).abs() < 1e-9, "period {period}, {field}: {told} and {same}");
+            let [advised, same] = [&action, &same].map(|answer| answer[field].as_f64().unwrap());
+            assert!((advised - same).abs() < 1e-9, "period {period}, {field}: {advised} and {same}");
         }
         let before = action;
         app.restart().await;
@@ -270,7 +270,7 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
     };
     let now = until("the session to be renewed", renewed).await;
     assert_eq!(json!([now["state"], now["period"], now["horizon"]]), json!(["active", 7, 9]));
-    assert!(app.action().await.1["caution"].as_array().unwrap().iter().all(|told| told["code"] != "waiting"));
+    assert!(app.action().await.1["caution"].as_array().unwrap().iter().all(|caution| caution["code"] != "waiting"));
     let replayed = app.action().await.1;
     app.restart().await;
     assert_eq!(app.action().await.1, replayed);

@@ -117,10 +117,10 @@ async fn a_job_is_followed_and_cancelled_through_a_replica_that_does_not_run_it(
     let job = api.app.queue(&specification(400)).await;
     let following = api.app.client.get(format!("{}/jobs/{job}/events", api.app.url)).send().await.unwrap();
     api.app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(1)).await;
-    let asked = Instant::now();
+    let started = Instant::now();
     assert_eq!(api.app.cancel(&job).await, 202);
     api.app.until(&job, |job| job["state"] == "cancelled").await;
-    assert_within(Duration::from_secs(2), asked, "a cancel through another replica");
+    assert_within(Duration::from_secs(2), started, "a cancel through another replica");
     let text = following.text().await.unwrap();
     assert!(text.contains("event: state") && text.contains(r#""state":"cancelled""#), "{text}");
     // The worker is free again.
@@ -215,10 +215,10 @@ async fn a_fund_lives_on_two_replicas_at_once() {
     }
     second.app.policy = first.app.policy.clone();
     second.app.open().await;
-    for (period, (told, observed, report)) in (1..).zip(winners) {
+    for (period, (advised, observed, report)) in (1..).zip(winners) {
         let (_, action) = second.app.action().await;
         for field in ["allocation", "composition", "certainty_equivalent", "one_step", "trade"] {
-            assert_eq!(action[field], told[field], "{field} of period {period}");
+            assert_eq!(action[field], advised[field], "{field} of period {period}");
         }
         let (status, alone) = second.app.report(period, report).await;
         assert_eq!((status, &alone["wealth"]), (StatusCode::OK, &observed["wealth"]));
@@ -357,8 +357,8 @@ async fn a_worker_answers_operators_only_and_a_folder_has_no_roles() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
         command.args(["serve", "--listen", "127.0.0.1:0", "--role", role, "--data"]).arg(folder.path());
         let refused = command.env_remove("BALLAST_STORE").output().unwrap();
-        let said = String::from_utf8_lossy(&refused.stderr);
-        assert!(refused.status.code() == Some(1) && said.contains(&format!("role is {role}")), "{said}");
+        let output = String::from_utf8_lossy(&refused.stderr);
+        assert!(refused.status.code() == Some(1) && output.contains(&format!("role is {role}")), "{output}");
     }
     let Some(store) = database().await else { return };
     let worker = Replica::start(&store, "worker");

@@ -38,8 +38,8 @@ pub async fn flipped(trials: usize) -> Outcome {
         tally.audit.acknowledged += specimen.answers.len();
         tally.listen(&site);
     }
-    let asked = (trials - refused) * specimen.answers.len();
-    tally.note = format!("{refused} refused to start; of {asked} answers {same} as before, the others refused");
+    let answers = (trials - refused) * specimen.answers.len();
+    tally.note = format!("{refused} refused to start; of {answers} answers {same} as before, the others refused");
     Ok(Some(tally))
 }
 

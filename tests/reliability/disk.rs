@@ -74,12 +74,12 @@ fn fill(folder: &Path) -> std::path::PathBuf {
 
 /// What the write-ahead log still has room for is taken; then 507, while reads are answered.
 async fn refuses(caller: &Caller, session: &str) -> Result<(), String> {
-    let asked = Instant::now();
+    let started = Instant::now();
     for period in 1.. {
         let report = json!({ "session": session, "period": period, "log_return": 0.001 });
         match caller.post("/observe", &report).await {
             Some((507, _)) => break,
-            Some((200, _)) if period < crate::scene::HORIZON - 1 && asked.elapsed() < within(PATIENCE) => {}
+            Some((200, _)) if period < crate::scene::HORIZON - 1 && started.elapsed() < within(PATIENCE) => {}
             other => return Err(format!("on a full disk: {other:?}")),
         }
     }
@@ -94,13 +94,13 @@ async fn refuses(caller: &Caller, session: &str) -> Result<(), String> {
 
 /// There is room again: the next report is taken.
 async fn writes(caller: &Caller, session: &str) -> Result<(), String> {
-    let asked = Instant::now();
+    let started = Instant::now();
     loop {
         let next = caller.get(&format!("/sessions/{session}")).await.ok_or("no session")?.1["period"].clone();
         let answer = caller.post("/observe", &json!({ "session": session, "period": next, "log_return": 0.002 })).await;
         match answer {
             Some((200, _)) => return Ok(()),
-            Some((503 | 507, _)) if asked.elapsed() < within(PATIENCE) => {
+            Some((503 | 507, _)) if started.elapsed() < within(PATIENCE) => {
                 tokio::time::sleep(Duration::from_millis(10)).await
             }
             other => return Err(format!("with room again: {other:?}")),

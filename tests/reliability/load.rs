@@ -53,8 +53,10 @@ impl Load {
 
     /// Waits until so many more reports are acknowledged, for 20 s at most: under a fault there may be none.
     pub async fn acknowledges(&self, reports: usize) {
-        let (asked, start) = (Instant::now(), self.answered.load(Ordering::Relaxed));
-        while self.answered.load(Ordering::Relaxed) < start + reports && asked.elapsed() < Duration::from_secs(20) {
+        let (waiting_since, start) = (Instant::now(), self.answered.load(Ordering::Relaxed));
+        while self.answered.load(Ordering::Relaxed) < start + reports
+            && waiting_since.elapsed() < Duration::from_secs(20)
+        {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }

@@ -26,8 +26,8 @@ const AT_ONCE: usize = 16;
 pub const ANSWERED: Duration = Duration::from_millis(500);
 
 pub fn attack_time() -> Duration {
-    let asked = std::env::var("BALLAST_ATTACK_SECONDS").ok();
-    asked.map_or(ATTACK, |seconds| Duration::from_secs(seconds.parse().expect("a number of seconds")))
+    let seconds = std::env::var("BALLAST_ATTACK_SECONDS").ok();
+    seconds.map_or(ATTACK, |seconds| Duration::from_secs(seconds.parse().expect("a number of seconds")))
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -193,7 +193,7 @@ async fn hold(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     for number in 0..HELD {
         let question = if number % 2 == 0 { &polite } else { &follow };
         // One that is refused is an attack that failed.
-        held.extend(asked(&address, question).await);
+        held.extend(open_connection(&address, question).await);
     }
     let end = Instant::now() + attack_time();
     while Instant::now() < end {
@@ -203,11 +203,11 @@ async fn hold(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
         }
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
-    pulse.stop().await.told(within(ANSWERED), tally);
+    pulse.stop().await.report(within(ANSWERED), tally);
     Ok(held.len())
 }
 
-async fn asked(address: &str, question: &str) -> Option<TcpStream> {
+async fn open_connection(address: &str, question: &str) -> Option<TcpStream> {
     let asking = async {
         let mut stream = TcpStream::connect(address).await.ok()?;
         stream.write_all(question.as_bytes()).await.ok()?;
@@ -241,7 +241,7 @@ async fn list(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     }
     let pulse = tenants.pulse("").await?;
     let calls = until(Instant::now() + attack_time(), &tenants.neighbour, "/jobs?limit=1000").await;
-    pulse.stop().await.told(within(ANSWERED), tally);
+    pulse.stop().await.report(within(ANSWERED), tally);
     tally.note += &format!(", {queued} large jobs listed {calls} times");
     Ok(calls)
 }
@@ -280,7 +280,7 @@ async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String
     let pulse = tenants.pulse("&mode=resolve").await?;
     let path = format!("/action?session={session}&explain=worst_case");
     let calls = until(Instant::now() + attack_time(), neighbour, &path).await;
-    pulse.stop().await.told(2 * within(ANSWERED), tally);
+    pulse.stop().await.report(2 * within(ANSWERED), tally);
     until_ended(&tenants.owner, &own, tally).await;
     let ahead = neighbour.jobs().await.ok_or("no jobs of the neighbour's")?.iter().filter(has_succeeded).count();
     let turns = tenants.owner.jobs().await.ok_or("no jobs of the owner's")?.iter().filter(has_succeeded).count();
@@ -301,9 +301,9 @@ fn has_succeeded(job: &&Value) -> bool {
 
 /// Waits for a job: a training gets what the load leaves of the processors, and may take long.
 async fn until_ended(caller: &Caller, job: &str, tally: &mut Tally) {
-    let asked = Instant::now();
+    let started = Instant::now();
     while !matches!(caller.get(&format!("/jobs/{job}")).await, Some((200, job)) if job["finished_ms"].is_i64()) {
-        if asked.elapsed() > patience() {
+        if started.elapsed() > patience() {
             return tally.complain(format!("job {job} has not ended"));
         }
         tokio::time::sleep(Duration::from_millis(50)).await;

@@ -71,13 +71,13 @@ async fn crash_all(cluster: &Cluster, seed: u64, tally: &mut Tally) -> Result<()
 
 /// Waits until every job has ended.
 async fn until_idle(caller: &Caller) -> Result<(), String> {
-    let asked = Instant::now();
+    let started = Instant::now();
     loop {
         let jobs = caller.jobs().await.ok_or("no jobs")?;
         if jobs.iter().all(|job: &Value| job["finished_ms"].is_i64()) {
             return Ok(());
         }
-        if asked.elapsed() > within(PATIENCE) {
+        if started.elapsed() > within(PATIENCE) {
             return Err(format!("still not ended: {jobs:?}"));
         }
         tokio::time::sleep(Duration::from_millis(50)).await;

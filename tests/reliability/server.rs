@@ -82,18 +82,18 @@ impl Site {
         self.folder.path().join("log")
     }
 
-    fn said(&self) -> String {
+    fn log_text(&self) -> String {
         std::fs::read_to_string(self.log()).unwrap_or_default()
     }
 
     fn last_words(&self) -> String {
-        self.said().lines().last().unwrap_or("said nothing").to_owned()
+        self.log_text().lines().last().unwrap_or("said nothing").to_owned()
     }
 
     /// What the servers started here said of panics.
     pub fn panics(&self) -> Vec<String> {
-        let said = self.said();
-        let lines: Vec<&str> = said.lines().collect();
+        let text = self.log_text();
+        let lines: Vec<&str> = text.lines().collect();
         let panics = (0..lines.len()).filter(|&at| lines[at].contains("panicked at"));
         panics.map(|at| lines[at..lines.len().min(at + 2)].join(" ")).collect()
     }
@@ -172,8 +172,8 @@ impl Server {
 
     /// Waits for its end; `None` where it does not come.
     pub async fn ended(&mut self) -> Option<ExitStatus> {
-        let asked = Instant::now();
-        while asked.elapsed() < within(PATIENCE) {
+        let started = Instant::now();
+        while started.elapsed() < within(PATIENCE) {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return Some(status);
             }

@@ -146,7 +146,7 @@ impl Pace {
     }
 
     /// Notes the pace, and complains of what was missed or took longer than `limit` in one of a hundred.
-    pub fn told(&self, limit: Duration, tally: &mut Tally) {
+    pub fn report(&self, limit: Duration, tally: &mut Tally) {
         tally.note = format!("{} asked, p99 {} ms", self.milliseconds.len(), self.p99());
         tally.complaints.extend(self.missed.iter().take(3).cloned());
         if self.p99() > limit.as_millis() {
@@ -158,16 +158,16 @@ impl Pace {
 async fn beat(caller: Caller, path: String, over: Arc<AtomicBool>) -> Pace {
     let mut pace = Pace::default();
     while !over.load(Ordering::Relaxed) {
-        let asked = Instant::now();
+        let started = Instant::now();
         let answer = caller.get(&path).await;
-        pace.milliseconds.push(asked.elapsed().as_millis());
+        pace.milliseconds.push(started.elapsed().as_millis());
         if !matches!(answer, Some((200, _))) {
             pace.missed.push(format!(
                 "{path}: {}",
                 answer.map_or("no answer".into(), |(status, body)| format!("{status} {body}"))
             ));
         }
-        tokio::time::sleep(BEAT.saturating_sub(asked.elapsed())).await;
+        tokio::time::sleep(BEAT.saturating_sub(started.elapsed())).await;
     }
     pace
 }

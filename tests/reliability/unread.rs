@@ -49,7 +49,7 @@ pub async fn leave(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
         calls += call(&tenants.server.url, &request).await;
         let [alive, advice] = [alive.stop().await, advice.stop().await];
         for pace in [&alive, &advice] {
-            pace.told(within(ANSWERED), tally);
+            pace.report(within(ANSWERED), tally);
         }
         let peak = tenants.server.peak_mb();
         if peak > MOST_MB {
@@ -155,10 +155,10 @@ async fn call(url: &str, request: &str) -> usize {
     let calling = (0..CALLERS).map(async |number| {
         let mut calls = 0;
         while Instant::now() < end {
-            let asked = ask(address, request, number % 2 == 0);
+            let call = ask(address, request, number % 2 == 0);
             let left = end.saturating_duration_since(Instant::now());
             // One that was refused or cut off asks again soon.
-            if !matches!(tokio::time::timeout(left, asked).await, Ok(Ok(()))) {
+            if !matches!(tokio::time::timeout(left, call).await, Ok(Ok(()))) {
                 tokio::time::sleep(Duration::from_millis(20)).await;
             }
             calls += 1;

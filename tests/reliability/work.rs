@@ -56,7 +56,7 @@ pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
         }
     };
     let (calls, ()) = tokio::join!(reporting, watching);
-    pulse.stop().await.told(within(ANSWERED), tally);
+    pulse.stop().await.report(within(ANSWERED), tally);
     let peak = tenants.server.peak_mb();
     let calls = calls.into_iter().sum();
     tally.note += &format!(", {calls} batches, {threads} threads, {peak} MB resident at most");
@@ -82,7 +82,7 @@ pub async fn search(tenants: &Tenants, tally: &mut Tally) -> Result<usize, Strin
     let paths = ["/sessions?search=zz", "/sessions?sort=-wealth&count=care"];
     let asking = paths.map(|path| until(end, &tenants.neighbour, path));
     let calls = join_all(asking).await.into_iter().sum();
-    pulse.stop().await.told(within(ANSWERED), tally);
+    pulse.stop().await.report(within(ANSWERED), tally);
     tally.note += &format!(", {calls} searches and lists of another");
     Ok(calls)
 }
@@ -138,14 +138,14 @@ pub async fn ask(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> 
 
 /// The median time of an answer, asked for again and again.
 async fn median(caller: &Caller, question: &Value, lasts: Duration) -> Result<Duration, String> {
-    let (end, mut taken) = (Instant::now() + lasts, Vec::new());
-    while taken.is_empty() || Instant::now() < end {
-        let asked = Instant::now();
+    let (end, mut durations) = (Instant::now() + lasts, Vec::new());
+    while durations.is_empty() || Instant::now() < end {
+        let started = Instant::now();
         match caller.post("/advise", question).await {
-            Some((200, _)) => taken.push(asked.elapsed()),
+            Some((200, _)) => durations.push(started.elapsed()),
             other => return Err(format!("the owner's question: {other:?}")),
         }
     }
-    taken.sort_unstable();
-    Ok(taken[taken.len() / 2])
+    durations.sort_unstable();
+    Ok(durations[durations.len() / 2])
 }
