@@ -195,7 +195,7 @@ impl BacktestArgs {
             [Window::Last(periods)] => Some(periods),
             _ => {
                 let given: Vec<String> = self.window.iter().map(Window::to_string).collect();
-                let rule = "must be one number of periods, as the file has one asset";
+                let rule = "must be one number of periods, because the file has one asset";
                 return Err(refused("--window", given.join(","), rule));
             }
         };
@@ -335,7 +335,7 @@ mod tests {
         assert_eq!(one.report.whole_years, 1);
         let page = one.page().unwrap();
         assert!(page.contains("Cautious, learns, 10 %") && page.contains("Trading costs 10 bp"), "{page}");
-        assert!(page.contains("The whole years are 1, fewer than 30"), "{page}");
+        assert!(page.contains("Whole years: 1. Comparing the strategies takes at least 30."), "{page}");
     }
 
     /// Checks that two trainings cover the year after the window, and that yearly figures count its four quarters.

@@ -117,7 +117,7 @@ test("a refusal names the field, the value and the rule in the unit of the field
     [{ value: "x", rule: "unknown variant `x`, expected one of `log`, `power`" }, "Kind", null, "Kind is \u201cx\u201d; it must be one of log, power."],
     [{ value: -1000, rule: "must leave a wealth that lies in [0.000001, 1000000]" }, "Money added", null, "Money added is -1000; it must leave a wealth that lies from 0.000001 to 1,000,000."],
     [{ value: "31.01.2020", rule: "failed to parse four digit integer as year: invalid digit, expected 0-9 but got ." }, "Last day", null, "Last day is \u201c31.01.2020\u201d; it must be a day such as 2008-09-30."],
-    [{ value: true, rule: "a session rolls only by a policy that learns" }, "How it goes on", null, "How it goes on: a session rolls only by a policy that learns."],
+    [{ value: true, rule: "a rolling session needs a policy that learns" }, "How it goes on", null, "How it goes on: a rolling session needs a policy that learns."],
     [{ value: [1], rule: "must hold problem.horizon = 12 numbers" }, "Money added", null, "Money added is not as it must be; it must hold 12 numbers."],
     [{ value: 40, rule: "must be at most horizon" }, "Window", null, "Window is 40; it must be at most the number of periods ahead."],
     [{ value: -1, rule: "must be a number in [-0.9932620530009145, 147.4131591025766]" }, "Return in period 2, %", "percent", "Return in period 2 is -100 %; it must be from -99.32 % to 14,741.31 %."],

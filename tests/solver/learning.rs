@@ -315,7 +315,7 @@ async fn a_session_that_cannot_roll_is_refused() {
     app.train(&request(2, bridge(), decay())).await;
     refused(&mut app, json!({}), "design.initial_laws is resampled").await;
     app.train(&settled(2, 12)).await;
-    refused(&mut app, json!({ "history": HISTORY }), "from 20 returns on by this half-life, and there are 10").await;
+    refused(&mut app, json!({ "history": HISTORY }), "at least 20 returns with this half-life, but there are 10").await;
     refused(&mut app, json!({ "renew": { "every": 1 } }), "renew").await;
     let long = settled(2, 12)["problem"]["history"].clone();
     let mut short = settled(2, 12);

@@ -289,7 +289,7 @@ async fn a_record_of_ten_years_may_hang_on_one_month() {
     assert_eq!(codes(&advised), ["one_return"]);
     let sentence = advised["caution"][0]["sentence"].as_str().unwrap();
     // Without either of the best two all is in the bank.
-    assert!(sentence.contains("Without its return of 8.6 % the advice would be 0.0 %"), "{sentence}");
+    assert!(sentence.contains("Without the return of 8.6 % the advice would be 0.0 %"), "{sentence}");
     // Not asked, it is not known.
     assert_eq!(codes(&advise(&app, &json!({ "problem": problem })).await), [""; 0]);
 }

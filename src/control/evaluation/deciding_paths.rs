@@ -32,8 +32,8 @@ pub fn few_decide<'a>(
     }
     (!named.is_empty()).then(|| {
         format!(
-            "Few of the {count} paths decide what these are worth for certain, so that their intervals hold less often than they \
-             say: {}.",
+            "Few of the {count} paths decide what these strategies are worth for certain, so their intervals hold \
+             less often than stated: {}.",
             named.join("; ")
         )
     })

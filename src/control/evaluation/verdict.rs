@@ -38,7 +38,7 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
     sentences.push(guard(&lines[main], backtest.noun()));
     let blind = backtest.request.cost_blind;
     let known =
-        if blind { "no policy knows of it" } else { "policies are trained with it, but for the one blind to costs" };
+        if blind { "no policy knows of it" } else { "policies are trained with it, except the one blind to costs" };
     sentences.push(cost(backtest.request.trading_cost, known));
     sentences
 }
@@ -47,8 +47,8 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
 pub fn few_years(years: usize) -> Option<String> {
     let sentence = || {
         format!(
-            "The whole years are {years}, fewer than {FEWEST_YEARS}: they do not tell the strategies apart. A crash that comes once in \
-             ten years is missing from one record of 20 years in eight, and intervals count only what was seen."
+            "Whole years: {years}. Comparing the strategies takes at least {FEWEST_YEARS}. A crash that comes once in \
+             ten years is missing from one in eight records of 20 years, and intervals count only what was seen."
         )
     };
     (years < FEWEST_YEARS).then(sentence)
@@ -72,7 +72,7 @@ fn ranking(figures: &[BacktestFigures], main: usize) -> String {
     let best =
         best.map_or(String::new(), |best| format!(" The first is {} with {:.2}.", quoted(&best.strategy), value(best)));
     format!(
-        "With {} a year from 100 counts as {:.2} for certain, place {} of {placed}.{best}",
+        "With {} a year that starts at 100 is worth {:.2} for certain, place {} of {placed}.{best}",
         quoted(&main.strategy),
         value(main),
         main.place.unwrap_or(placed)
@@ -85,7 +85,7 @@ fn against<'a>(others: impl Iterator<Item = &'a BacktestFigures>) -> String {
     let compared = all_at_once(groups.iter().map(Vec::len).sum());
     let [better, worse, unclear] = groups.map(|names| listed(&names));
     format!(
-        "By the intervals of the differences, {compared}, it is better than: {better}. Worse than: {worse}. Not to be told apart from: {unclear}."
+        "By the intervals of the differences, {compared}, it is better than: {better}. Worse than: {worse}. No clear difference from: {unclear}."
     )
 }
 
@@ -151,7 +151,7 @@ fn timing_of_others(figures: &[BacktestFigures], main: usize) -> String {
         grouped(others.filter_map(|(_, other)| Some((other.strategy.as_str(), other.performance.beyond_own_mix?))))
             .map(|names| listed(&names));
     format!(
-        "Against such mixes of their own, by intervals that hold at once too, changing the allocation paid for: {paid}. It cost: {cost}. The record shows neither for: {unclear}."
+        "Compared with such mixes of their own, by intervals that also hold at once, changing the allocation paid for: {paid}. It cost: {cost}. The record shows neither for: {unclear}."
     )
 }
 
@@ -293,13 +293,14 @@ mod tests {
         ];
         assert_eq!(
             ranking(&all, 0),
-            "With “Cautious, learns” a year from 100 counts as 103.00 for certain, place 3 of 4. The first is “All in the \
+            "With “Cautious, learns” a year that starts at 100 is worth 103.00 for certain, place 3 of 4. The first \
+             is “All in the \
              bank” with 104.00."
         );
         assert_eq!(
             against(all[1..4].iter()),
             "By the intervals of the differences, of which all 3 hold at once with 90 % confidence, it is better than: “Trusts \
-             the record”. Worse than: “All in the bank”. Not to be told apart from: “60/40”."
+             the record”. Worse than: “All in the bank”. No clear difference from: “60/40”."
         );
         assert_eq!(timing(&all, 0), None);
         let timed = |low: f64, high: f64| {
@@ -319,7 +320,8 @@ mod tests {
             [named("a", 1.0, 2.0), named("b", -2.0, -1.0), named("c", -1.0, 1.0), named("d", 0.5, 1.0), all[1].clone()];
         assert_eq!(
             timing_of_others(&some, 0),
-            "Against such mixes of their own, by intervals that hold at once too, changing the allocation paid for: “d”. It \
+            "Compared with such mixes of their own, by intervals that also hold at once, changing the allocation paid \
+             for: “d”. It \
              cost: “b”. The record shows neither for: “c”."
         );
     }

@@ -115,7 +115,11 @@ impl Advisor {
         let history = history.unwrap_or(&problem.history);
         if (problem.framework.is_frozen() || problem.centre.takes_order()) && history != problem.history {
             let value = format!("{} values", history.len());
-            return Err(FieldError::new("history", value, "must be the policy's own, at which its ball stands"));
+            return Err(FieldError::new(
+                "history",
+                value,
+                "must be the policy's own history, because its ball is fixed on it; leave history out",
+            ));
         }
         State::new(history, wealth.unwrap_or(problem.initial_wealth), problem.learning)
     }

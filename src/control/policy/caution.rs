@@ -43,11 +43,11 @@ impl Caution {
             return None;
         }
         let worth = match effective_size < sample_size as f64 {
-            true => format!(", which weigh like {effective_size:.1} equal ones"),
+            true => format!(", which count as much as {effective_size:.1} equally weighted ones"),
             false => String::new(),
         };
         let sentence = format!(
-            "The advice rests on {sample_size} returns{worth}: with fewer than {SHORT_RECORD}, each of them weighs much, and most of what the asset can do is yet unseen."
+            "The advice rests on {sample_size} returns{worth}. With fewer than {SHORT_RECORD}, each return weighs heavily, and most of what the asset can do has not been seen yet."
         );
         Some(Caution { code: CautionCode::ShortRecord, sentence })
     }
@@ -61,7 +61,7 @@ impl Caution {
             some if some < BEYOND_USE => format!(
                 "The search for the best allocation ended early: another allocation could be worth up to {some:.2} basis points more."
             ),
-            _ => "The search for the best allocation failed: how much better another allocation is, nobody knows. Do not follow this advice."
+            _ => "The search for the best allocation failed, so another allocation may be much better. Do not follow this advice."
                 .to_owned(),
         };
         Some(Caution { code: CautionCode::NotCertified, sentence })
@@ -72,10 +72,10 @@ impl Caution {
     pub fn waiting(period: usize, horizon: usize) -> Self {
         let sentence = match period > horizon {
             true => format!(
-                "The next policy is not trained yet, and the last one ended with period {horizon}: its last step, which looks one period ahead, gives this advice, from all returns reported so far."
+                "The next policy is not trained yet, and the last one ended with period {horizon}. Its last step, which looks one period ahead, gives this advice from all returns reported so far."
             ),
             false => format!(
-                "The next policy is not trained yet: the one before it, which lasts to period {horizon}, gives this advice, from all returns reported so far."
+                "The next policy is not trained yet. The one before it, which lasts to period {horizon}, gives this advice from all returns reported so far."
             ),
         };
         Caution { code: CautionCode::Waiting, sentence }
@@ -85,7 +85,7 @@ impl Caution {
     pub(super) fn one_return(simple_return: f64, without: f64, with: f64) -> Self {
         let [lacking, without, with] = [simple_return, without, with].map(|share| 100.0 * share);
         let sentence = format!(
-            "Without its return of {lacking:.1} % the advice would be {without:.1} %, and with it is {with:.1} %."
+            "Without the return of {lacking:.1} % the advice would be {without:.1} %; with it the advice is {with:.1} %."
         );
         Caution { code: CautionCode::OneReturn, sentence }
     }

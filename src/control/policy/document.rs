@@ -103,11 +103,11 @@ impl Policy {
             return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
         }
         if self.specification.clone().completed()? != self.specification {
-            return Err(FieldError::new("specification", "an object with holes", "must be completed"));
+            return Err(FieldError::new("specification", "an incomplete object", "must have every field filled in"));
         }
         let problem = &self.specification.problem;
         if problem.caution.is_some_and(CautionLevel::is_found) != problem.levels.is_some() {
-            let rule = "must be what the level of caution was found from, or absent where it is none";
+            let rule = "must be present if the level of caution is found from the record, and absent otherwise";
             return Err(FieldError::new("specification.problem.levels", "null or an object", rule));
         }
         let horizon = self.specification.problem.horizon;
@@ -148,7 +148,7 @@ fn check_single(
         return Err(FieldError::new(
             field_of("band"),
             format!("[{low}, {high}]"),
-            "must be one action where trading is free",
+            "must be a single allocation, repeated, if trading is free",
         ));
     }
     check_holdings(&field_of("floor_gains"), single.floor_gains.len(), specification, &HOLDINGS_OF_ONE_LAW)?;
@@ -196,7 +196,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
     let inputs = scaling.active.len();
     let ascending = scaling.active.windows(2).all(|pair| pair[0] < pair[1]);
     if inputs == 0 || !ascending || scaling.active.iter().any(|&feature| feature >= feature_count) {
-        let rule = format!("must name distinct features below {feature_count}, ascending");
+        let rule = format!("must list distinct features below {feature_count} in ascending order");
         return Err(FieldError::new(format!("{field}.scaling.active"), format!("{:?}", scaling.active), rule));
     }
     let points = stored.count();

@@ -45,20 +45,20 @@ impl Advisor {
     /// The rule that is broken.
     pub fn check_rolling(&self, returns: usize) -> Result<(), String> {
         let Specification { problem, design, .. } = self.specification();
-        let refused = |rule: &str| Err(format!("a session rolls only by a policy {rule}"));
+        let refused = |rule: &str| Err(format!("a rolling session needs a policy {rule}"));
         let Some(settled) = self.settled_from().filter(|_| problem.framework.learns()) else {
-            return refused("that learns, with decay");
+            return refused("that learns with decay");
         };
         if design.initial_laws != InitialLaws::Resampled {
             return refused("whose design.initial_laws is resampled");
         }
         if problem.depends_on_wealth() {
-            return refused("whose advice does not depend on wealth: without contributions, of power or log utility");
+            return refused("whose advice does not depend on wealth; use power or log utility and no contributions");
         }
         for (count, whose) in [(problem.history.len(), "the policy's own history has"), (returns, "there are")] {
             if count < settled {
                 return Err(format!(
-                    "a session rolls from {settled} returns on by this half-life, and {whose} {count}"
+                    "a rolling session needs at least {settled} returns with this half-life, but {whose} {count}"
                 ));
             }
         }

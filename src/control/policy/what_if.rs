@@ -122,7 +122,7 @@ impl Advisor {
         let now = State { wealth, holding, law: state.law.clone() };
         let Some(log_return) = hypothesis.log_return else { return Ok((step, now)) };
         let Some(following) = following else {
-            let rule = "must be absent: the coming period is the last, and none is left to advise after it";
+            let rule = "must be absent: the coming period is the last, so there is none after it to advise";
             return Err(FieldError::new("log_return", log_return, rule));
         };
         let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;

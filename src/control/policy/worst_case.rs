@@ -98,7 +98,7 @@ impl WorstCase {
     /// Returns the result for a robust step without a finite solution.
     pub fn unknown() -> Self {
         let sentence =
-            "The robust step has no finite solution at this state, or its wealth does not pay for what is withdrawn, so all of it stays in the bank.".to_owned();
+            "The robust step has no finite solution at this state, or its wealth does not cover the withdrawals, so all wealth stays in the bank.".to_owned();
         WorstCase { multiplier: 0.0, radius_cost: 0.0, transport: Vec::new(), normal: None, duality_gap: 0.0, sentence }
     }
 
@@ -163,8 +163,9 @@ fn transport_sentence(
             format!("moves {:.1} % of the probability, down to a return of {lowest:.1} % in one period", 100.0 * share)
         };
         format!(
-            "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} {moves}; against the worst laws \
-             of this period and of any later ones the allocation is still worth {:.2} for certain at the horizon, where the bank \
+            "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} {moves}. Against the \
+             worst laws \
+             of this period and of any later ones, the allocation is still worth {:.2} for certain at the horizon; the bank \
              alone pays {:.2}. A ball of this period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that worth.",
             100.0 * advice.allocation,
             advice.radius,
@@ -193,8 +194,9 @@ fn normal_sentence(worst: NormalLaw, estimate: NormalLaw, advice: &Advice) -> St
     }
     format!(
         "Against an allocation of {:.1} %, the worst normal law in the confidence region has a mean log-return of {:.2} % \
-         and a variance of {:.2e} a period, where {:.2} % and {:.2e} are estimated; against the worst laws of this period and of any \
-         later ones the allocation is still worth {:.2} for certain at the horizon, where the bank alone pays {:.2}.",
+         and a variance of {:.2e} a period; the estimates are {:.2} % and {:.2e}. Against the worst laws of this \
+         period and of any \
+         later ones, the allocation is still worth {:.2} for certain at the horizon; the bank alone pays {:.2}.",
         100.0 * advice.allocation,
         100.0 * worst.mean,
         worst.variance,

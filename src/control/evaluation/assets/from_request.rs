@@ -51,13 +51,14 @@ impl AssetsBacktest {
     fn check_size(&self, field: &str) -> Result<(), FieldError> {
         let (shares, solved) = (self.shares(), self.read());
         if shares > MOST_HELD {
-            let rule =
-                format!("must be fewer: all strategies would hold {shares} shares, and {MOST_HELD} are the most");
+            let rule = format!(
+                "must be fewer: all strategies together would hold {shares} shares, and at most {MOST_HELD} are allowed"
+            );
             return Err(FieldError::new(field, format!("{} periods", self.record.rows.len()), rule));
         }
         if solved > MOST_READ {
             let rule = format!(
-                "must be fewer or shorter: their one-step problems would read {solved} log-returns, and {MOST_READ} are the most"
+                "must be fewer or shorter: their one-step problems would read {solved} log-returns, and at most {MOST_READ} are allowed"
             );
             return Err(FieldError::new("windows", format!("{} windows", self.choices.windows.len()), rule));
         }

@@ -32,7 +32,7 @@ pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures]) -> Vec<String
     let share = |figures: &AssetsFigures| Some(100.0 * figures.performance.mean_allocation);
     sentences.extend([
         format!("Effective number of assets held: {}.", ranges(&walked.lines, figures, number, 1, "")),
-        format!("On average held of wealth: {}.", ranges(&walked.lines, figures, share, 0, " %")),
+        format!("Average share of wealth held: {}.", ranges(&walked.lines, figures, share, 0, " %")),
         format!("Largest fall from a peak: {}.", ranges(&walked.lines, figures, fall, 0, " %")),
         cost(walked.backtest.choices.trading_cost, "no strategy knows of it"),
     ]);
@@ -50,7 +50,7 @@ fn ranking(figures: &[AssetsFigures]) -> String {
         format!(" The first is {} with {:.2}.", quoted(&best.strategy), value(best))
     };
     format!(
-        "With {} of all assets a year from 100 counts as {:.2} for certain, place {} of {}.{best}",
+        "With {} of all assets a year that starts at 100 is worth {:.2} for certain, place {} of {}.{best}",
         quoted(&equal.strategy),
         value(equal),
         equal.place,
@@ -62,16 +62,17 @@ fn against_equal(figures: &[AssetsFigures]) -> String {
     let [ahead, behind, unclear] = of_each(figures, |figures| figures.beyond_equal);
     let compared = all_at_once(figures.len() - 1);
     format!(
-        "By the intervals of the differences, {compared}, ahead of equal shares: {ahead}. Behind them: {behind}. Not to be told \
-         apart from them: {unclear}."
+        "By the intervals of the differences, {compared}, ahead of equal shares: {ahead}. Behind them: {behind}. No \
+         clear difference: {unclear}."
     )
 }
 
 fn against_own_mix(figures: &[AssetsFigures]) -> String {
     let [paid, cost, unclear] = of_each(figures, |figures| figures.performance.beyond_own_mix);
     format!(
-        "Against equal shares at their own average total, which nobody knew beforehand, by intervals that hold at once too, choosing among assets and times paid for: \
-         {paid}. It cost: {cost}. The record shows neither for {unclear}."
+        "Each strategy is also compared with equal shares at its own average total, which nobody knew beforehand. By \
+         intervals that also hold at once, choosing among assets and times paid for: {paid}. It cost: {cost}. The \
+         record shows neither for {unclear}."
     )
 }
 

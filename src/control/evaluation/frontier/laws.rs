@@ -112,7 +112,7 @@ impl RecordLaw {
         let varies =
             |record: &Vec<Vec<f64>>| moments(record).1.iter().all(|deviation| *deviation >= SMALLEST_DEVIATION);
         (0..DRAWS).map(|_| draw()).find(varies).ok_or_else(|| {
-            let rule = "must vary more often: of records drawn from it, hardly one shows how much each asset varies";
+            let rule = "must vary more often: hardly any record drawn from it shows how much each asset varies";
             FieldError::new("problem.history", format!("{count} periods"), rule)
         })
     }

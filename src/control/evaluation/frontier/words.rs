@@ -13,11 +13,11 @@ pub(super) fn sentences(resampled: &[ResampledFrontier], evidence: f64, per_year
     let errors = evidence.abs();
     let chance = if errors < TOLD { "that may be chance" } else { "that is hardly chance" };
     sentences.push(format!(
-        "The average return of the record lies {behind} the bank's by {errors:.1} standard errors: {chance}. The first two figures are of markets with that average, the third of one with the bank's; which is true the record says no better than that."
+        "The average return of the record lies {behind} the bank's by {errors:.1} standard errors: {chance}. The first two figures are for markets with that average, the third for one with the bank's. The record does not settle which is true."
     ));
     sentences.push(
-        "What did best on such records says next to nothing about the future, and the variation from record to record need not fall as \
-         caution grows: more of it speaks for itself only to those who doubt that average."
+        "What did best on such records says next to nothing about the future, and the variation from record to record \
+         need not fall as caution grows. More caution makes sense only if you doubt that average."
             .to_owned(),
     );
     sentences
@@ -62,7 +62,7 @@ fn of_own_mix(resampled: &ResampledFrontier, per_year: bool) -> String {
         .map(|point| format!("{} with {}", lost(point.beyond_own_mix.value), caution(point.scale)))
         .collect();
     format!(
-        "While the market stays as it is, following the record earns nothing beyond holding the average of what it advises: on the first records it loses {per} {}.",
+        "While the market stays as it is, following the record earns nothing more than holding its average advice: on the first records it loses {per} {}.",
         listed(&each)
     )
 }
@@ -76,7 +76,7 @@ fn of_one(resampled: &ResampledFrontier, per_year: bool) -> Option<String> {
     let records = match resampled.bootstrap {
         Bootstrap::Smoothed { .. } => "On records drawn from the smoothed returns".to_owned(),
         Bootstrap::Block { length } => format!("On records of blocks of {length} periods"),
-        Bootstrap::WithoutPremium { .. } => "Were the market to pay no more than the bank,".to_owned(),
+        Bootstrap::WithoutPremium { .. } => "If the market pays no more than the bank,".to_owned(),
     };
     let alike: Vec<String> = resampled
         .points
@@ -86,7 +86,7 @@ fn of_one(resampled: &ResampledFrontier, per_year: bool) -> Option<String> {
         .collect();
     let alike = match alike.as_slice() {
         [] => String::new(),
-        alike => format!("; {} cannot be told apart from it", listed(alike)),
+        alike => format!("; {} cannot be distinguished from it", listed(alike)),
     };
     Some(format!(
         "{records} {} loses least on average: {} {per}{alike}. {} varies least from record to record, by {}.",

@@ -109,7 +109,8 @@ impl Advisor {
             return Ok(());
         }
         let rule = format!(
-            "must be left out above {MOST_DESIGNED} returns times design.count: here they are {found}. Ask POST /advise for the \
+            "must be left out if returns times design.count exceeds {MOST_DESIGNED}: here it is {found}. Use POST \
+             /advise for the \
              sensitivity over the same returns, or train with a smaller design.count"
         );
         Err(FieldError::new("sensitivity", true, rule))
