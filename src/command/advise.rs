@@ -111,12 +111,12 @@ fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> 
 
 fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<dyn Error>> {
     let given = [
-        ("--half-life", arguments.half_life.is_some(), "all returns weigh the same"),
-        ("--sensitivity", arguments.sensitivity, "how near the advice is to changing is not found"),
+        ("--half-life", arguments.half_life.is_some(), "all their returns weigh the same"),
+        ("--sensitivity", arguments.sensitivity, "how close their advice is to changing is not computed"),
     ];
     if let Some((option, _, why)) = given.into_iter().find(|(_, is_given, _)| *is_given) {
-        let rule = format!("must be left out of several assets, of which {why}");
-        return Err(FieldError::new(option, format!("given of {}", returns.record.assets.len()), rule).into());
+        let rule = format!("must be left out with several assets: {why}");
+        return Err(FieldError::new(option, format!("given with {} assets", returns.record.assets.len()), rule).into());
     }
     let problem = arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem));
     let question = AdviseAssets {
@@ -140,7 +140,11 @@ impl AdviseArgs {
             [Holding { column: None, share }] => Ok(*share),
             all => {
                 let given: Vec<String> = all.iter().map(Holding::to_string).collect();
-                Err(FieldError::new("--holding", given.join(" "), "must be one share of wealth, of the one asset"))
+                Err(FieldError::new(
+                    "--holding",
+                    given.join(" "),
+                    "must be one share of wealth, because there is one asset",
+                ))
             }
         }
     }
@@ -149,7 +153,7 @@ impl AdviseArgs {
     fn holdings_of(&self, columns: &[String]) -> Result<BTreeMap<String, f64>, FieldError> {
         let mut by_name = BTreeMap::new();
         for holding in &self.holdings {
-            let rule = "must be COLUMN=SHARE of several assets, each column once";
+            let rule = "must be COLUMN=SHARE if there are several assets, each column once";
             let wrong = || FieldError::new("--holding", holding, rule);
             let column = holding.column.clone().ok_or_else(wrong)?;
             if by_name.insert(column, holding.share).is_some() {
@@ -184,7 +188,7 @@ fn by_option(error: FieldError, count: usize, record: &RecordArguments) -> Field
         // For one step: the returns and one more.
         let most = error.value.parse().map_or(0, |paths: usize| BRIDGE_NUMBERS / paths.max(1) - 1);
         let rule = format!(
-            "must be at most {most}, as the radius is not simulated for more: --window {most} uses the last ones"
+            "must be at most {most}, because the radius is not simulated for more; use --window {most} to keep the last ones"
         );
         return FieldError::new(record.source(), format!("{count} returns"), rule);
     }

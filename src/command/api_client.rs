@@ -20,7 +20,7 @@ pub struct ApiClient {
 pub enum ApiError {
     #[error("{call} could not be built")]
     Build { call: String, source: hyper::http::Error },
-    #[error("{call} found no service")]
+    #[error("{call} did not reach a service")]
     Connect { call: String, source: hyper_util::client::legacy::Error },
     #[error("{call} was cut off")]
     CutOff { call: String, source: hyper::Error },

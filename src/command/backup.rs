@@ -74,7 +74,7 @@ pub struct MoveCommand {
 /// A process holds the folder, an object in it is damaged, or the database has rows or is not reached.
 pub async fn relocate(arguments: MoveCommand) -> Result<(), Box<dyn std::error::Error>> {
     store::relocate(&arguments.from, &arguments.store.url()?, &mut |line| println!("{line}")).await?;
-    println!("moved, and sound; start the service with --store, and never again on {}", arguments.from.display());
+    println!("moved, and sound; from now on start the service with --store, never on {}", arguments.from.display());
     Ok(())
 }
 
@@ -116,12 +116,12 @@ pub async fn repair(arguments: RepairCommand) -> Result<(), Box<dyn std::error::
     };
     let thing = match (arguments.thing.as_str(), &arguments.from) {
         ("totals", None) => store::Repair::Totals,
-        ("totals", Some(_)) => return Err("totals are summed anew, and no backup has them: leave out --from".into()),
-        (_, None) => return Err("--from must name a backup in which the thing is sound".into()),
+        ("totals", Some(_)) => return Err("totals are recomputed and are in no backup: leave out --from".into()),
+        (_, None) => return Err("--from is missing: name a backup in which the object is sound".into()),
         (name, Some(from)) => store::Repair::Thing { name, from },
     };
     let rows = store::repair(&folder, thing, Clock::system().now_milliseconds()).await?;
-    println!("{} is sound: {rows} rows were put right", arguments.thing);
+    println!("{} is sound: {rows} rows were repaired", arguments.thing);
     Ok(())
 }
 

@@ -50,7 +50,7 @@ pub fn level(text: &str) -> Result<CautionLevel, String> {
     let named = levels.clone().find(|level| level.name() == text);
     named.ok_or_else(|| {
         let names: Vec<&str> = levels.map(CautionLevel::name).collect();
-        format!("must be {}; a share of the radius is given by --scale", names.join(", "))
+        format!("must be {}; use --scale to give a share of the radius", names.join(", "))
     })
 }
 
@@ -58,7 +58,7 @@ pub fn support(text: &str) -> Result<Support, String> {
     match text {
         "none" => Ok(Support::None {}),
         factor => {
-            let factor: f64 = factor.parse().map_err(|_| "must be a number, or none".to_owned())?;
+            let factor: f64 = factor.parse().map_err(|_| "must be a number or none".to_owned())?;
             let support = Support::WorstSeen { factor };
             check_support("--support", support).map_err(|FieldError { rule, .. }| rule).map(|()| support)
         }

@@ -41,7 +41,7 @@ pub enum DemoError {
     Market(#[from] ReturnsError),
     #[error("calling the service")]
     Api(#[from] ApiError),
-    #[error("{call} answered JSON of another shape")]
+    #[error("{call} answered JSON of an unexpected shape")]
     Shape { call: &'static str, source: serde_json::Error },
     #[error("the training ended as {state}: {reason}")]
     Training { state: String, reason: String },

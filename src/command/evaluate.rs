@@ -35,9 +35,7 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
             "problem": paper::problem(SAMPLE_SIZE, HORIZON), "design": { "sampling_law": paper::mixture() } }))?,
     };
     if let Some(policy) = request.policies.values().next() {
-        return Err(
-            FieldError::new("policies", policy, "must be left out: policies are known to a service alone").into()
-        );
+        return Err(FieldError::new("policies", policy, "must be left out: only a service keeps policies").into());
     }
     let workshop = ComparisonRun::new()?;
     let evaluation = Evaluation::new(request)?;

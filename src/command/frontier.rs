@@ -105,7 +105,7 @@ fn table(
     };
     let best = 100.0 * best.iter().sum::<f64>();
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "{records}; who knows their law holds {best:.1} %.");
+    let _ = writeln!(text, "{records}; the best share under their law is {best:.1} %.");
     let lost = format!("lost {per}, bp [90 %]");
     let _ = writeln!(
         text,

@@ -190,7 +190,7 @@ async fn list(arguments: List) -> Result<(), Box<dyn std::error::Error>> {
         writeln!(out, "{key}\t{tenant}\t{roles}\t{created}\t{expires}\t{revoked}")?;
     }
     for what in damaged {
-        writeln!(out, "{what} is damaged and lets nobody in; ballast repair restores it")?;
+        writeln!(out, "{what} is damaged and gives no access; ballast repair restores it")?;
     }
     Ok(())
 }
@@ -202,6 +202,6 @@ async fn revoke(arguments: Revoke) -> Result<(), Box<dyn std::error::Error>> {
     if !found {
         return Err(format!("there is no key '{}'", arguments.key).into());
     }
-    eprintln!("revoked; a running service turns it away within {} ms", REFRESH.as_millis());
+    eprintln!("revoked; a running service rejects it within {} ms", REFRESH.as_millis());
     Ok(())
 }

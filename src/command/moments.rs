@@ -18,7 +18,9 @@ pub fn length(text: &str) -> Result<Duration, String> {
 pub fn moment(text: &str) -> Result<i64, String> {
     let midnight = |day: Date| day.to_zoned(TimeZone::UTC).map(|start| start.timestamp());
     let moment = text.parse::<Timestamp>().or_else(|_| text.parse().and_then(midnight));
-    moment.map(Timestamp::as_millisecond).map_err(|_| format!("'{text}' must be as 2027-01-31 or 2027-01-31T12:00:00Z"))
+    moment
+        .map(Timestamp::as_millisecond)
+        .map_err(|_| format!("'{text}' must be a day or a time, such as 2027-01-31 or 2027-01-31T12:00:00Z"))
 }
 
 /// Formats a moment in UTC, to the second; `-` if there is none.

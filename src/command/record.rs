@@ -103,7 +103,7 @@ fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralR
     let SeveralReturns { record, sentence } = &mut returns;
     let found = record.rows.len();
     if !(2..=found).contains(&count) {
-        let rule = "must be at most the returns of the file, and 2 or more";
+        let rule = "must be from 2 to the number of returns in the file";
         return Err(ReturnsError::Option { option: "--window", value: format!("{count} of {found}"), rule });
     }
     record.rows.drain(..found - count);

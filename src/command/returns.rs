@@ -171,7 +171,7 @@ impl Returns {
     /// There are fewer.
     pub fn last(mut self, count: usize) -> Result<Self, ReturnsError> {
         let found = self.rows.len();
-        let rule = "must be at most the returns of the file, and 2 or more";
+        let rule = "must be from 2 to the number of returns in the file";
         if !(2..=found).contains(&count) {
             return Err(ReturnsError::Option { option: "--window", value: format!("{count} of {found}"), rule });
         }

@@ -106,8 +106,8 @@ fn more_days_than_a_radius_is_simulated_for_need_a_window() {
     let refused = ballast(&asked);
     assert_eq!(
         text(&refused.stderr),
-        "ballast: the file is 15000 returns: must be at most 14999, as the radius is not simulated for more: --window 14999 \
-         uses the last ones\n"
+        "ballast: the file is 15000 returns: must be at most 14999, because the radius is not simulated for more; use \
+         --window 14999 to keep the last ones\n"
     );
     let named = ballast(&[&asked[..], &["--window", "15000"]].concat());
     assert!(text(&named.stderr).starts_with("ballast: --window is 15000 returns: must be at most 14999"), "{named:?}");
@@ -179,7 +179,10 @@ fn named_columns_are_an_asset_each() {
     // At such a cost nothing is bought, and no more sold than what is too much.
     assert!(held["trade"]["utilities"] == 0.0 && held["allocation"]["energy"].as_f64().unwrap() > 0.0, "{held}");
     for (options, refusal) in [
-        (&["--holding", "0.1"][..], "--holding is 0.1: must be COLUMN=SHARE of several assets, each column once"),
+        (
+            &["--holding", "0.1"][..],
+            "--holding is 0.1: must be COLUMN=SHARE if there are several assets, each column once",
+        ),
         (&["--holding", "energy=0.1", "--holding", "energy=0.2"], "--holding is energy=0.2: must be COLUMN=SHARE"),
         (&["--holding", "coal=0.1"], "--holding is coal=0.1: must name one of the assets: energy, utilities"),
         (
@@ -187,7 +190,7 @@ fn named_columns_are_an_asset_each() {
             "--holding is shares summing to 1.2: must sum to 1",
         ),
         (&["--holding", "energy=1.5"], "--holding is energy=1.5: must be a number in [0, 1]"),
-        (&["--half-life", "12"], "--half-life is given of 2: must be left out"),
+        (&["--half-life", "12"], "--half-life is given with 2 assets: must be left out"),
     ] {
         let refused = text(&ballast(&[&asked[..], options].concat()).stderr);
         assert!(refused.starts_with(&format!("ballast: {refusal}")), "{options:?}: {refused}");

@@ -368,13 +368,13 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
         "{output}"
     );
 
-    for (options, complaint) in [
-        ("--horizon 4", "--horizon is 4: must be left out of several assets, for which nothing is trained"),
-        ("--alpha 0.1,0.2", "--alpha is 2 levels: must be one of several assets"),
+    for (options, said) in [
+        ("--horizon 4", "--horizon is 4: must be left out with several assets, because nothing is trained for them"),
+        ("--alpha 0.1,0.2", "--alpha is 2 levels: must be one level if there are several assets"),
         ("--window 40", "--window is 40: must be at most 24: the record has 28 periods"),
         (
             "--column energy --window 12,all",
-            "--window is 12,all: must be one number of periods, as the file has one asset",
+            "--window is 12,all: must be one number of periods, because the file has one asset",
         ),
     ] {
         let refused = command(options);

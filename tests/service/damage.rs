@@ -107,7 +107,7 @@ async fn a_damaged_key_closes_alone_and_others_come_and_go() {
     app.enter(&east).await;
     let (_, listed) = ballast(&["keys", "list", "--data", text(app.folder())]);
     let row = listed.lines().find(|line| line.contains("\tsouth\t")).unwrap();
-    assert!(listed.contains("is damaged and lets nobody in"), "{listed}");
+    assert!(listed.contains("is damaged and gives no access"), "{listed}");
     let name = row.split('\t').next().unwrap();
     assert!(ballast(&["keys", "revoke", name, "--data", text(app.folder())]).0);
     app.hold(&south);

@@ -45,10 +45,13 @@ pub fn append_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)])
     }
     let of = |(noun, share): &(&str, Result<f64, FieldError>)| match share {
         Ok(share) => format!("{} by {noun}s", percent(*share, 1)),
-        Err(FieldError { rule, .. }) => format!("no advice by {noun}s (their returns {rule})"),
+        Err(FieldError { rule, .. }) => format!("not available by {noun}s (their returns {rule})"),
     };
     let shares: Vec<String> = coarser.iter().map(of).collect();
-    format!("{text}\n\nThe same record would say {}. Give returns as far apart as you decide.", shares.join(", "))
+    format!(
+        "{text}\n\nWith longer periods the advice from this record is {}. Give returns as far apart as you decide.",
+        shares.join(", ")
+    )
 }
 
 /// Lists the warnings and, if requested, how close the advice is to changing.
@@ -70,7 +73,10 @@ fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: 
         to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
     };
     let leaves = |to: ReturnAndLog| {
-        format!("The next {noun} must return more than {} before it leaves the bank.", percent(to.simple_return, 1))
+        format!(
+            "The next {noun} must return more than {} before the advice leaves the bank.",
+            percent(to.simple_return, 1)
+        )
     };
     sentences.extend(match advice.allocation {
         0.0 => next_return.to_bank.map(leaves),
@@ -150,7 +156,7 @@ fn figures(Advised { advice, levels, .. }: &Advised, wealth: f64, noun: &str) ->
     let mut rows = vec![("allocation", percent(advice.allocation, decimals), of_wealth)];
     if advice.band.low < advice.band.high {
         let (low, high) = (percent(advice.band.low, 1), percent(advice.band.high, 1));
-        rows.push(("band", format!("{low} to {high}"), "a share held between is best kept as it is".into()));
+        rows.push(("band", format!("{low} to {high}"), "if you hold a share between these, keep it".into()));
     }
     let ahead = advice.certainty_equivalent - advice.floor;
     rows.extend([

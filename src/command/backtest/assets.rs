@@ -39,13 +39,17 @@ impl BacktestArgs {
             ("--centre", self.centre.as_ref().map(|centre| centre.name().to_owned())),
         ];
         if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {
-            return Err(refused(option, value, "must be left out of several assets, for which nothing is trained"));
+            return Err(refused(
+                option,
+                value,
+                "must be left out with several assets, because nothing is trained for them",
+            ));
         }
         if let Some(caution) = self.caution {
             return Err(refused(
                 "--caution",
                 caution.name(),
-                "must be left out of several assets: every level is walked",
+                "must be left out with several assets, because every level is compared",
             ));
         }
         let usual = AssetsChoices::usual(record.periods_per_year, record.rows.len());
@@ -61,7 +65,7 @@ impl BacktestArgs {
                 return Err(refused(
                     "--alpha",
                     format!("{} levels", self.alpha.len()),
-                    "must be one of several assets",
+                    "must be one level if there are several assets",
                 ));
             }
         };
@@ -77,7 +81,7 @@ impl BacktestArgs {
         let names_columns = self.returns.names_columns();
         AssetsBacktest::new(record, choices).map_err(|error| match BacktestError::from(error) {
             BacktestError::Option { option, value, rule } if option == "--column" && !names_columns => {
-                refused("the file", value, &format!("{rule}: --column takes one of them, and given again another"))
+                refused("the file", value, &format!("{rule}. Choose assets with --column, once for each"))
             }
             error => error,
         })

@@ -110,7 +110,7 @@ async fn measure(api: &ApiClient, bench: &ActionBench) -> Result<(), Box<dyn Err
         resolved += usize::from(api.get(&action).await?["source"] != "policy_surrogate");
     }
     println!("{:<26} {:>10} {:>10}   of {} sessions", "call", "median us", "99 % us", bench.calls);
-    let calls = [("/observe", &observe), ("/action", &first), ("/action, asked again", &again), ("/livez", &livez)];
+    let calls = [("/observe", &observe), ("/action", &first), ("/action, again", &again), ("/livez", &livez)];
     for (name, times) in calls {
         println!("{name:<26} {:>10.0} {:>10.0}", quantile(times, 0.5), quantile(times, 0.99));
     }

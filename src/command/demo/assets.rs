@@ -29,7 +29,8 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let count = (count / FEWER).max(FEWEST);
     println!("\nSecond act: the same investor, the same year and four industries of the same {HISTORY} months.");
     println!(
-        "One policy, of {count} design points a step, says what of wealth is in a fund of them; what the fund is made of is"
+        "One policy, with {count} design points a step, decides how much wealth is in a fund of them; the fund's \
+         composition is"
     );
     println!("chosen anew each month.");
     let known = json!({
@@ -59,9 +60,13 @@ fn by_name(shares: &BTreeMap<String, f64>) -> String {
 }
 
 fn tell_first(advised: &DemoAssetsAdvice, rate: f64) {
-    println!("\nTold for {FIRST_MONTH}: hold {:.0} % in all, {}.", 100.0 * advised.total, by_name(&advised.allocation));
     println!(
-        "That counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}. The radius, {:.4}, holds for all funds",
+        "\nAdvice for {FIRST_MONTH}: hold {:.0} % in all, {}.",
+        100.0 * advised.total,
+        by_name(&advised.allocation)
+    );
+    println!(
+        "That is worth {:.2} for certain at the horizon; the bank alone pays {:.2}. The radius, {:.4}, holds for all funds",
         advised.certainty_equivalent, advised.floor, advised.radius
     );
     println!(

@@ -45,7 +45,7 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
 
 fn tell_why(past: &Past, advice: &DemoAdvice) {
     println!(
-        "\nTold for {}: hold {:.0} % in stocks (allocation {:.2}, radius {:.4}).",
+        "\nAdvice for {}: hold {:.0} % in stocks (allocation {:.2}, radius {:.4}).",
         past.month,
         100.0 * advice.allocation,
         advice.allocation,
@@ -61,7 +61,7 @@ fn tell_why(past: &Past, advice: &DemoAdvice) {
         100.0 * advice.radius
     );
     println!(
-        "and counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}.",
+        "and is worth {:.2} for certain at the horizon; the bank alone pays {:.2}.",
         advice.certainty_equivalent, advice.floor
     );
 }
@@ -70,7 +70,7 @@ fn tell_why(past: &Past, advice: &DemoAdvice) {
 fn reason(edge: f64, radius: f64) -> &'static str {
     match () {
         () if edge <= 0.0 => "stocks paid less than the bank",
-        () if edge <= radius => "the radius swallows it",
+        () if edge <= radius => "no more than the radius",
         () => "more than the radius",
     }
 }

@@ -38,7 +38,7 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut LoadRep
             Some(rate) => {
                 report.rate(format!("limit: pgbench, a row a commit, {} connections", limits::CONNECTIONS), rate)
             }
-            None => report.note("no pgbench here: what the database itself does is not known"),
+            None => report.note("pgbench is not installed, so the database itself was not measured"),
         }
     }
     let world = LoadFixture::train(server, arguments).await?;
@@ -122,10 +122,10 @@ impl Test<'_> {
             self.against_livez(server, report, sessions).await?;
         }
         if self.arguments.runs(Scenario::ActionIdle) {
-            tell("asking for advice, now and then");
+            tell("requesting advice at a low rate");
             let load = self.now_and_then(server, sessions).await?;
             let must = Must { p99_ms: Some(IDLE_P99_MS), ..Must::default() };
-            report.load("action-idle: first and later asks", &load, must);
+            report.load("action-idle: first and later requests", &load, must);
         }
         if self.arguments.runs(Scenario::ActionWhileTraining) {
             self.observed(server, sessions, 2..=2, 1).await?;
@@ -151,11 +151,11 @@ impl Test<'_> {
         report: &mut LoadReport,
         sessions: &[String],
     ) -> Result<(), Box<dyn Error>> {
-        tell("asking for advice and for life, in turns");
+        tell("requesting advice and /livez in turns");
         let actions: Vec<_> = sessions.iter().map(|session| action(session)).collect();
         let own = |client: usize| actions.iter().skip(client).step_by(self.clients).cloned();
         let first = Load::on(server, saturate(&server.addresses, self.clients, own)).await?;
-        report.load("action: first asks, all clients", &first, Must::default());
+        report.load("action: first requests, all clients", &first, Must::default());
         let (mut livez, mut actions_load) = (Load::default(), Load::default());
         for _ in 0..TURNS {
             let alive = |_| self.for_a_turn(std::iter::repeat(get("/livez")));
@@ -189,7 +189,9 @@ impl Test<'_> {
             })
             .await?;
         let Some(ready) = ready else {
-            report.note("sessions-100k writes into the store itself: not done at a service that runs already");
+            report.note(
+                "sessions-100k was skipped: it writes into the store itself, so it needs a service that this command starts",
+            );
             return Ok(());
         };
         report.note(format!("the {count} sessions were written through the library's store, not over HTTP"));

@@ -28,7 +28,7 @@ pub enum ServerError {
     NoAddress { first_line: String, log: String },
     #[error("{url} names no service")]
     Url { url: String },
-    #[error("{url} is encrypted: say by --ca whose certificates to trust")]
+    #[error("{url} is encrypted: use --ca to name the authorities to trust")]
     NoAuthorities { url: String },
     #[error("cannot speak TLS")]
     Tls(#[from] TunnelError),

@@ -16,7 +16,7 @@ use crate::command::tls_client::{self, TlsClientError};
 pub enum TunnelError {
     #[error(transparent)]
     Tls(#[from] TlsClientError),
-    #[error("a certificate cannot be for that name")]
+    #[error("the host name cannot be the name of a certificate")]
     Name { source: InvalidDnsNameError },
     #[error("opening a tunnel to it")]
     Listen { source: std::io::Error },

@@ -235,11 +235,11 @@ fn slopes(study: &Study) -> Vec<Finding> {
     let stated = study.slopes.iter().filter(|slope| slope.framework == Framework::Adaptive && slope.gap == "value");
     let finding = |slope: &Slope| Finding {
         verdict: equals(slope.last, -0.5, 0.0, TELLING),
-        statement: "Section 2.4: the value of adaptive comes to that of the known law like t0 to the power -1/2."
+        statement: "Section 2.4: the value of adaptive approaches that of the known law as t0 to the power -1/2."
             .to_owned(),
         found: format!(
             "Here the fitted power of its gap is {}, and {} [{}, {}] between the two longest histories. While the \
-             ball keeps the investor in the bank the gap stands still, so short histories flatten the fit.",
+             ball keeps the investor in the bank the gap does not shrink, so short histories flatten the fit.",
             fixed(slope.all, 2),
             fixed(slope.last.value, 2),
             fixed(slope.last.low, 2),

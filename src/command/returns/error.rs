@@ -16,8 +16,8 @@ pub enum ReturnsError {
     #[error("{questions}")]
     Asked { questions: String },
     #[error(
-        "the file does not say what the bank pays: must have a column risk_free_return, rf or rate, or --rate must be \
-         given, as a fraction a period (0.002 is 0.2 %){remarks}"
+        "the file does not say what the bank pays: add a column risk_free_return, rf or rate, or give --rate as a \
+         fraction a period (0.002 is 0.2 %){remarks}"
     )]
     NoBank { remarks: String },
     #[error("the file does not say what a period is: {rule}")]
@@ -26,7 +26,7 @@ pub enum ReturnsError {
     Several { found: usize },
     #[error("{option} is {value}: {rule}")]
     Option { option: &'static str, value: String, rule: &'static str },
-    #[error("{wanted} {noun}s before {date} are wanted: the file holds {found}")]
+    #[error("{wanted} {noun}s before {date} are needed: the file has {found}")]
     TooShort { date: String, wanted: usize, noun: &'static str, found: usize },
 }
 

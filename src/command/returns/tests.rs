@@ -14,7 +14,7 @@ fn the_bundled_file_is_whole() {
     assert_eq!(history[239].risk_free_return, 0.0027);
     assert_eq!(market.year("2008")[9].risky_return, -0.1715);
     let message = market.before("1927-01", 240).unwrap_err().to_string();
-    assert_eq!(message, "240 months before 1927-01 are wanted: the file holds 6");
+    assert_eq!(message, "240 months before 1927-01 are needed: the file has 6");
 }
 
 /// Checks that the sentence reports every column that is not read as fractions.
@@ -113,7 +113,7 @@ fn the_bank_is_a_column_or_an_option_and_never_left_out() {
         assert!(returns.sentence().ends_with(&bank), "{}", returns.sentence());
     }
     let message = read(&file(",other")).unwrap_err().to_string();
-    assert!(message.contains("must have a column risk_free_return, rf or rate, or --rate must be given"), "{message}");
+    assert!(message.contains("add a column risk_free_return, rf or rate, or give --rate"), "{message}");
     let returns = Returns::parse(&file(",rf"), &Choices::default(), Some(-0.003), None).unwrap();
     assert!(
         returns.rows.iter().all(|row| row.risk_free_return == -0.003) && returns.sentence().ends_with("by --rate.")
@@ -170,7 +170,7 @@ fn a_window_is_the_last_returns() {
         let message = market.clone().last(count).unwrap_err().to_string();
         assert_eq!(
             message,
-            format!("--window is {count} of 1109: must be at most the returns of the file, and 2 or more")
+            format!("--window is {count} of 1109: must be from 2 to the number of returns in the file")
         );
     }
 }

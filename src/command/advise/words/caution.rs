@@ -16,7 +16,7 @@ pub fn why_nothing(record: &str, why: &WhyNothing, noun: &str) -> String {
     };
     let left = why.premium_left.filter(|left| why.premium_seen > 0.0 && *left < 0.0);
     let as_well =
-        left.map(|left| format!("At this caution it may as well be {} less than the bank.", percent(left.abs(), 2)));
+        left.map(|left| format!("At this caution the true return may be {} below the bank's.", percent(left.abs(), 2)));
     let half = why.at_half_the_caution.map(|share| match share > 0.0 {
         true => format!("Half the caution would hold {}.", percent(share, 1)),
         false => "Half the caution would hold nothing either.".into(),
@@ -32,16 +32,17 @@ pub fn describe(levels: &LevelsAdvised, periods: f64) -> String {
     if let Some(LevelAdvised { level, scale, regrets, spared, .. }) =
         levels.levels.iter().find(|level| level.level == levels.followed)
     {
-        let saved = if *spared < 0.0 { "costs" } else { "spares" };
+        let saved = if *spared < 0.0 { "costs" } else { "saves" };
         let supposed = match levels.premium_seen > 0.0 {
-            true => "what the record shows and a standard error more",
-            false => "a standard error above none, as the record shows none",
+            true => "what the record shows plus a standard error",
+            false => "a standard error, as the record shows no premium",
         };
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "Caution is {}: {} of the radius is acted on. If the premium is {supposed},\n\
-             this costs {} a year beside the best share; if there is none, it {saved} {} a year beside trusting the record.\n",
+            "Caution is {}: {} of the radius is used. If the premium is {supposed},\n\
+             this costs {} a year compared with the best share; if there is none, it {saved} {} a year compared with \
+             trusting the record.\n",
             level.name(),
             percent(*scale, 0),
             a_year(regrets[2]),
@@ -49,7 +50,7 @@ pub fn describe(levels: &LevelsAdvised, periods: f64) -> String {
         );
     }
     let [none, half, whole] = levels.premiums.map(|premium| percent(periods * premium, 1));
-    let _ = writeln!(text, "  {:<10}{:>9}{:>9}   costs a year if the premium is a year", "caution", "share", "hold");
+    let _ = writeln!(text, "  {:<10}{:>9}{:>9}   yearly cost if the yearly premium is", "caution", "share", "hold");
     let _ = writeln!(text, "  {:<28}   {none:>8}{half:>9}{whole:>9}", "");
     for LevelAdvised { level, scale, regrets, allocation, .. } in &levels.levels {
         let mark = if *level == levels.followed { "<" } else { "" };
