@@ -181,7 +181,7 @@ fn walks_of_assets(pool: &TrainingPool) {
         let date = |year: usize| format!("{:04}-{:02}", 1800 + year / 12, year % 12 + 1);
         let request = json!({ "assets": names, "log_returns": (0..dates).map(row).collect::<Vec<_>>(), "rate": 0.002,
             "dates": (0..dates).map(date).collect::<Vec<_>>(), "windows": [window], "support": { "rule": "none" } });
-        AssetsBacktest::asked(&serde_json::from_value(request).unwrap()).unwrap()
+        AssetsBacktest::from_request(&serde_json::from_value(request).unwrap()).unwrap()
     };
     let watch = Watch::unwatched();
     let backtest = request(30, 1912, 1900);
