@@ -174,7 +174,7 @@ fn admitted(
         Access::Role(role) if !caller.may(role) => {
             let (role, detail) = (role.as_str(), format!("the call needs the role {}", role.as_str()));
             let rule = format!("must be a key with the role {role}");
-            let shown = format!("a key with {}", caller.roles());
+            let shown = format!("a key with the roles {}", caller.roles());
             let problem = ProblemDocument::new(ProblemKind::Forbidden, detail).naming("Authorization", shown, rule);
             Err(Box::new((Asker { tenant: Some(caller.tenant.clone()), key: caller.key().clone() }, problem)))
         }
@@ -192,13 +192,15 @@ fn bearer(headers: &HeaderMap) -> Option<&str> {
 fn unauthenticated(turned: Rejected) -> ProblemDocument {
     let (detail, value) = match turned {
         Rejected::NoKey => ("the call needs a key".to_owned(), "no key".to_owned()),
-        Rejected::WrongKey { .. } => ("the key is not one in force".to_owned(), "another key".to_owned()),
+        Rejected::WrongKey { .. } => {
+            ("the key is unknown or was revoked".to_owned(), "an unknown or revoked key".to_owned())
+        }
         Rejected::Expired { expires_ms, .. } => {
             let at = jiff::Timestamp::from_millisecond(expires_ms).map_or(String::new(), |at| format!(" at {at:.0}"));
             (format!("the key expired{at}"), format!("a key that expired{at}"))
         }
     };
-    let rule = format!("must be `Bearer {PREFIX}...`, with a key that was made here, not revoked and not expired");
+    let rule = format!("must be `Bearer {PREFIX}...`, with a key of this service that is neither revoked nor expired");
     ProblemDocument::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)
 }
 
@@ -340,8 +342,8 @@ mod tests {
         for (path, methods) in description["paths"].as_object().unwrap() {
             for (method, operation) in methods.as_object().unwrap() {
                 if operation["tags"][0] != "operations" {
-                    let asked = access(&method.to_uppercase(), Some(path));
-                    assert_ne!(asked, Access::Role(KeyRole::Admin), "{method} {path}");
+                    let required = access(&method.to_uppercase(), Some(path));
+                    assert_ne!(required, Access::Role(KeyRole::Admin), "{method} {path}");
                     operations += 1;
                 }
             }

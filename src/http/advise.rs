@@ -55,11 +55,11 @@ pub async fn advise(
     let started = Instant::now();
     let (sessions, tenant) = (&service.sessions, &caller.tenant);
     let (answer, mode) = match body.decoded(question).await? {
-        AdviseQuestion::Asset(asked) => {
-            (sessions.advise(tenant, asked).await?.map(|advised| AdviseAnswer::Asset(advised.into())), "advise")
+        AdviseQuestion::Asset(request) => {
+            (sessions.advise(tenant, request).await?.map(|advised| AdviseAnswer::Asset(advised.into())), "advise")
         }
-        AdviseQuestion::Assets(asked) => {
-            (AdviseAnswer::Assets(sessions.advise_assets(tenant, asked).await?.into()).into(), "advise_assets")
+        AdviseQuestion::Assets(request) => {
+            (AdviseAnswer::Assets(sessions.advise_assets(tenant, request).await?.into()).into(), "advise_assets")
         }
     };
     metrics::histogram!(ACTION_SECONDS, "mode" => mode).record(started.elapsed().as_secs_f64());
@@ -79,13 +79,13 @@ pub(super) struct ProblemShape {
 }
 
 /// Reads the shape of `problem`; `None` if there is no readable problem.
-pub(super) fn said(bytes: &[u8]) -> Option<ProblemShape> {
+pub(super) fn peek_shape(bytes: &[u8]) -> Option<ProblemShape> {
     decode::object(bytes).ok().map(|AdviseShape { problem }| problem)
 }
 
 /// Decodes the request; the horizon defaults to 1.
 fn question(bytes: &[u8]) -> Result<AdviseQuestion, ProblemDocument> {
-    let Some(problem) = said(bytes) else { return Ok(AdviseQuestion::Asset(decode::object(bytes)?)) };
+    let Some(problem) = peek_shape(bytes) else { return Ok(AdviseQuestion::Asset(decode::object(bytes)?)) };
     if problem.assets.is_some() {
         return Ok(AdviseQuestion::Assets(decode::object(bytes)?));
     }

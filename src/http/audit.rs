@@ -79,9 +79,9 @@ impl From<AuditRow> for AuditEntry {
 /// Lists who did what, newest first, over all tenants.
 #[utoipa::path(get, path = "/audit", tag = "operations",
     params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
-           ("after" = Option<i64>, Query, description = "The `next` of the page before."),
-           ("tenant" = Option<String>, Query, description = "Of this tenant alone."),
-           ("object" = Option<String>, Query, description = "What was done to this session, job, policy or key alone; a session's observations are shown among it on the first page.")),
+           ("after" = Option<i64>, Query, description = "The `next` of the previous page."),
+           ("tenant" = Option<String>, Query, description = "Only entries of this tenant."),
+           ("object" = Option<String>, Query, description = "Only entries about this session, job, policy or key. For a session, the first page also shows its observations.")),
     responses(
         (status = 200, description = "A page of the audit.", body = AuditPage),
         (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]

@@ -25,7 +25,7 @@ use crate::service::Service;
         "rate": 0.0027, "window": 8, "every": 4, "horizon": 4, "alpha": [0.1, 0.5], "risk_aversion": 3.0,
         "trading_cost": 0.001, "cost_blind": false, "count": 100, "seed": 1
     })),
-    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    params(("Idempotency-Key" = Option<String>, Header, description = "Repeating the key with the same body returns the same job.")),
     responses(Queueing))]
 pub async fn backtest(
     State(service): State<Arc<Service>>,
@@ -33,8 +33,8 @@ pub async fn backtest(
     headers: HeaderMap,
     body: JsonBytes,
 ) -> Result<Response, ProblemDocument> {
-    let asked = body.decoded(question).await?;
-    Ok(accepted(service.jobs.backtest(&caller, asked, idempotency_key(&headers)?).await?))
+    let request = body.decoded(question).await?;
+    Ok(accepted(service.jobs.backtest(&caller, request, idempotency_key(&headers)?).await?))
 }
 
 /// The part of a request that shows if it names assets.

@@ -54,8 +54,11 @@ impl Bodies {
         }
         let units = bytes.div_ceil(UNIT).min(u32::MAX as usize) as u32;
         self.room.clone().try_acquire_many_owned(units).map(Some).map_err(|_| {
-            let detail = format!("bodies under way leave no room for {bytes} more bytes");
-            let rule = format!("must fit, with those of other calls under way, into {} bytes", self.bytes);
+            let detail = format!("the bodies of other calls leave no memory for {bytes} more bytes");
+            let rule = format!(
+                "must fit into {} bytes together with the bodies of other calls; send it again later",
+                self.bytes
+            );
             ProblemDocument::new(ProblemKind::Overloaded, detail).naming("body", bytes, rule)
         })
     }
@@ -136,7 +139,7 @@ pub async fn budgeted(service: &Service, response: Response) -> Response {
     if bytes <= UNIT || response.extensions().get::<Embedded>().is_some() {
         return response;
     }
-    debug_assert!(false, "an answer of {bytes} bytes took no part of the budget");
+    debug_assert!(false, "an answer of {bytes} bytes reserved no memory");
     let (head, body) = response.into_parts();
     let made = async {
         let room = service.room_for(bytes).await?;

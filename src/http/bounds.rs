@@ -264,8 +264,8 @@ fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
             ("executed_allocations", each(within((0.0, 1.0)))),
             ("wealth", within(WEALTH)),
         ];
-        let told = fields.into_iter().filter(move |(field, _)| schema != "WhatIf" || of_assets.contains(field));
-        told.map(move |(field, rule)| (schema, field, rule))
+        let described = fields.into_iter().filter(move |(field, _)| schema != "WhatIf" || of_assets.contains(field));
+        described.map(move |(field, rule)| (schema, field, rule))
     })
 }
 
@@ -402,11 +402,11 @@ mod tests {
         for (name, field, rule) in rules() {
             let schema = &description["components"]["schemas"][name.split(' ').next().unwrap()];
             let variants = schema["oneOf"].as_array().cloned().unwrap_or(vec![schema.clone()]);
-            let told = variants.iter().filter(|variant| {
+            let matching = variants.iter().filter(|variant| {
                 let property = &variant["properties"][field];
                 rule.as_object().unwrap().keys().all(|key| !property[key].is_null())
             });
-            assert!(told.count() > 0, "{field}: {rule} is not told by {name}");
+            assert!(matching.count() > 0, "{name} does not describe {field}: {rule}");
         }
         assert_eq!(description["components"]["schemas"]["Sweep"]["maxProperties"], 1);
         assert_eq!(description["components"]["schemas"]["Reports"]["oneOf"][1]["maxItems"], 1000);

@@ -167,7 +167,7 @@ impl TrackedConnection {
     }
 
     /// Records that the client read something.
-    pub fn taken(&self) {
+    pub fn note_read(&self) {
         self.change(|phase| (phase == ConnectionPhase::Waiting).then_some(ConnectionPhase::Waiting));
     }
 
@@ -359,7 +359,7 @@ mod tests {
             phases,
             [ConnectionPhase::Waiting, ConnectionPhase::Waiting, ConnectionPhase::Closed, ConnectionPhase::Waiting]
         );
-        assert!(!second.connection.begin(ConnectionPhase::Working), "what gave way answers nothing more");
+        assert!(!second.connection.begin(ConnectionPhase::Working), "a closed connection answers nothing more");
     }
 
     #[test]
@@ -372,7 +372,7 @@ mod tests {
         assert_eq!(rare.connection.phase(), ConnectionPhase::Waiting);
         assert_eq!(crowd.iter().filter(|held| held.connection.phase() == ConnectionPhase::Closed).count(), 1);
         drop(crowd);
-        assert_eq!(table.lock().count, 2, "each place is given up once");
+        assert_eq!(table.lock().count, 2, "each slot is released once");
     }
 
     #[test]
@@ -397,7 +397,7 @@ mod tests {
             (ConnectionPhase::Closed, AllowedRequests::Probes)
         );
         assert!(next.connection.begin(ConnectionPhase::Working));
-        assert!(table.place(address(1)).is_none(), "every place is worked on");
+        assert!(table.place(address(1)).is_none(), "every connection is working on a request");
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub struct Stopping {
 
 /// The error of a connection that was closed to make room before its request began.
 #[derive(Debug, Error)]
-#[error("the connection gave way")]
+#[error("the connection was closed to make room for another")]
 struct GaveWay;
 
 /// Serves `stream` until it ends, must close to make room, or the service stops.
@@ -83,7 +83,7 @@ pub async fn hold<S>(
                 tracing::debug!(%error, "connection ended");
             }
         }
-        () = held.connection.gave_way() => tracing::debug!("connection gave way"),
+        () = held.connection.gave_way() => tracing::debug!("connection was closed to make room for another"),
         () = unused_at_the_end(&stopping.shutdown, &held.connection) => {}
     }
 }
@@ -116,8 +116,7 @@ async fn answer(
     request.extensions_mut().insert(LocalAddress(local));
     let mut response = match connection.place {
         AllowedRequests::Probes if !PROBES.contains(&path.as_str()) => {
-            ProblemDocument::new(ProblemKind::Overloaded, "as many calls are under way as may be at a time")
-                .into_response()
+            ProblemDocument::new(ProblemKind::Overloaded, "the limit of simultaneous calls is reached").into_response()
         }
         _ => application.call(request).await.unwrap_or_else(|never: Infallible| match never {}),
     };

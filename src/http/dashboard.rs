@@ -133,8 +133,8 @@ pub fn embedded(name: &str) -> Option<&'static [u8]> {
 /// Serves the dashboard. A program that accepts JSON and not HTML gets the description of the interface instead.
 #[utoipa::path(get, path = "/", tag = "operations",
     responses(
-        (status = 200, description = "A page; the description of this interface where only JSON is accepted.", body = String, content_type = "text/html"),
-        (status = 304, description = "The page is the one that `If-None-Match` names.")))]
+        (status = 200, description = "The dashboard, or the OpenAPI description if the client accepts only JSON.", body = String, content_type = "text/html"),
+        (status = 304, description = "The page still matches `If-None-Match`.")))]
 pub async fn root(Extension(published): Extension<Published>, headers: HeaderMap) -> Response {
     let mut response = match asset("index.html") {
         Some(page) if !wants_json(&headers) => page.served(CONTENT_SECURITY_POLICY, &headers),
@@ -151,10 +151,10 @@ fn wants_json(headers: &HeaderMap) -> bool {
 }
 
 /// Serves a file of the dashboard.
-#[utoipa::path(get, path = "/dashboard/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
+#[utoipa::path(get, path = "/dashboard/{file}", tag = "operations", params(("file" = String, Path, description = "The name of the file.")),
     responses(
         (status = 200, description = "The file.", body = String, content_type = "text/javascript"),
-        (status = 304, description = "The file is the one that `If-None-Match` names."),
+        (status = 304, description = "The file still matches `If-None-Match`."),
         (status = 404, description = "There is no such file.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
     Ok(Asset::find(&ASSETS, &name, "the dashboard")?.served(CONTENT_SECURITY_POLICY, &headers))

@@ -15,7 +15,7 @@ use crate::control::error::FieldError;
 /// Explanations of required fields for which no default is right for everybody.
 const MEANT: [(&str, &str); 1] = [(
     "problem.rate_per_step",
-    "it is what the bank pays per period of problem.history, as a fraction; 3 % a year are 0.00247 where periods are months",
+    "it is what the bank pays per period of problem.history, as a fraction; 3 % a year is 0.00247 if the periods are months",
 )];
 
 /// Parses a JSON body. Refuses NaN, infinities, numbers beyond double precision, unknown fields (if the type does),
@@ -132,7 +132,7 @@ fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Prob
 fn located(value_of: impl Fn(&str) -> Option<String>, path: String, message: &str) -> FieldError {
     let mut field = path;
     let mut rule = message.to_owned();
-    for (marker, meaning) in [("unknown field `", "is not a field here"), ("missing field `", "must be given")] {
+    for (marker, meaning) in [("unknown field `", "must be a known field"), ("missing field `", "must be given")] {
         let Some(name) = message.strip_prefix(marker).and_then(|rest| rest.split('`').next()) else { continue };
         if !field.ends_with(name) {
             field = if field.is_empty() { name.to_owned() } else { format!("{field}.{name}") };

@@ -23,7 +23,7 @@ use crate::control::request::specification::{
 /// Adds to every request schema the defaults of its fields.
 pub fn tell(description: &mut OpenApi) {
     let Some(components) = &mut description.components else { return };
-    for (name, defaults) in told() {
+    for (name, defaults) in documented() {
         let Some(schema) = components.schemas.get_mut(name) else { continue };
         for (field, default) in defaults {
             with_field(schema, &field, None, &mut |property| merged(property, &json!({ "default": default })));
@@ -31,7 +31,7 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
-fn told() -> [(&'static str, Map<String, Value>); 12] {
+fn documented() -> [(&'static str, Map<String, Value>); 12] {
     let least = json!({ "history": [], "rate_per_step": 0.0 });
     [
         ("Specification", of::<Specification>(json!({ "problem": least }))),
@@ -79,6 +79,6 @@ mod tests {
         }
         let rules = schemas["RadiusRule"]["oneOf"].as_array().unwrap();
         assert_eq!(rules.iter().filter(|rule| rule["properties"]["alpha"]["default"] == 0.1).count(), 4);
-        assert!(told().iter().all(|(_, defaults)| !defaults.is_empty()));
+        assert!(documented().iter().all(|(_, defaults)| !defaults.is_empty()));
     }
 }

@@ -58,7 +58,7 @@ pub fn with_every_problem(description: &mut OpenApi) {
 }
 
 const SCHEME: &str = "key";
-const KEY: &str = "A key of `ballast keys create`. A service whose store holds none asks for none.";
+const KEY: &str = "A key made with `ballast keys create`. A service without keys requires none.";
 
 /// Adds that the operation needs a key with this role.
 fn guard(operation: &mut Operation, role: &str) {

@@ -45,17 +45,17 @@ fn embedded(name: &'static str, media: &'static str) -> Option<Asset> {
 /// Serves this interface as a page to read and to try: calls with their parameters, bodies, defaults and examples.
 #[utoipa::path(get, path = "/docs", tag = "operations",
     responses(
-        (status = 200, description = "A page.", body = String, content_type = "text/html"),
-        (status = 304, description = "The page is the one that `If-None-Match` names.")))]
+        (status = 200, description = "The page.", body = String, content_type = "text/html"),
+        (status = 304, description = "The page still matches `If-None-Match`.")))]
 pub async fn docs(headers: HeaderMap) -> Response {
     PAGE.served(CONTENT_SECURITY_POLICY, &headers)
 }
 
 /// Serves a file of the page `/docs`.
-#[utoipa::path(get, path = "/docs/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
+#[utoipa::path(get, path = "/docs/{file}", tag = "operations", params(("file" = String, Path, description = "The name of the file.")),
     responses(
         (status = 200, description = "The file.", body = String, content_type = "text/javascript"),
-        (status = 304, description = "The file is the one that `If-None-Match` names."),
+        (status = 304, description = "The file still matches `If-None-Match`."),
         (status = 404, description = "There is no such file.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn docs_file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
     Ok(Asset::find(&ASSETS, &name, "the page /docs")?.served(CONTENT_SECURITY_POLICY, &headers))

@@ -30,7 +30,7 @@ use crate::service::Service;
         "histories": { "kind": "drawn", "count": 200 },
         "level": 0.95
     })),
-    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    params(("Idempotency-Key" = Option<String>, Header, description = "Repeating the key with the same body returns the same job.")),
     responses(Queueing))]
 pub async fn evaluate(
     State(service): State<Arc<Service>>,

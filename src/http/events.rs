@@ -52,8 +52,8 @@ struct JobStream {
     params(("id" = String, Path, description = "The job."),
            ("Last-Event-ID" = Option<String>, Header, description = "The id of the last event seen.")),
     responses(
-        (status = 200, description = "Server-sent events, each with the job as JSON; a stream ends after some minutes, to be resumed.", body = String, content_type = "text/event-stream"),
-        (status = 204, description = "The terminal state was seen already."),
+        (status = 200, description = "Server-sent events, each with the job as JSON. A stream ends after some minutes; reconnect to resume it.", body = String, content_type = "text/event-stream"),
+        (status = 204, description = "The client has already seen the final state."),
         (status = 404, description = "There is no such job.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn follow(
     State(service): State<Arc<Service>>,

@@ -118,7 +118,7 @@ fn refuse_encoded(headers: &HeaderMap) -> Result<(), ProblemDocument> {
     let mut encodings = headers.get_all(header::CONTENT_ENCODING).iter().map(|value| value.to_str().unwrap_or("?"));
     let Some(encoding) = encodings.find(|encoding| !encoding.eq_ignore_ascii_case("identity")) else { return Ok(()) };
     let problem =
-        ProblemDocument::new(ProblemKind::UnsupportedMediaType, "the body is encoded, and is taken as it is only");
+        ProblemDocument::new(ProblemKind::UnsupportedMediaType, "the body is encoded; it must be sent unencoded");
     Err(problem.naming("content-encoding", encoding, "must be absent"))
 }
 

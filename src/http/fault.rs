@@ -25,21 +25,22 @@ impl From<ServiceError> for ProblemDocument {
                 problem(Kind::NotFound).naming(what, id, format!("must name a {what}"))
             }
             ServiceError::KeyConflict { key } => {
-                let rule = "must come with the body it first came with";
+                let rule = "must come with the same body as the first time; send another body with a new key";
                 problem(Kind::IdempotencyConflict).naming("Idempotency-Key", key, rule)
             }
             ServiceError::PolicyInUse { policy, .. } => {
-                problem(Kind::InUse).naming("policy", policy, "must have no session that lives by it")
+                problem(Kind::InUse).naming("policy", policy, "must not be used by any session")
             }
             ServiceError::Refused(Refused::TooManyStreams { most }) => {
                 problem(Kind::TooManyRequests).naming("streams", most, format!("must be at most {most} at a time"))
             }
             ServiceError::Conflict { what, number } => {
-                problem(Kind::ReportConflict).naming(what, number, "must come with the content first reported for it")
+                let rule = "must have the same content as when it was first reported";
+                problem(Kind::ReportConflict).naming(what, number, rule)
             }
             ServiceError::RenewedAlready { number, .. } => {
                 let next = number + 1;
-                let rule = format!("must be {next} to renew it once more: renewal {number} is made");
+                let rule = format!("must be {next} for another renewal, because renewal {number} exists");
                 problem(Kind::ReportConflict).naming("renewal", number, rule)
             }
             ServiceError::Gap { what, given, expected } => {
@@ -62,11 +63,11 @@ impl From<ServiceError> for ProblemDocument {
                 problem(Kind::Overloaded)
             }
             ServiceError::Refused(Refused::OwnWork) => {
-                let rule = "must leave room for the next call: send it again when others of the tenant have ended";
+                let rule = "must wait until other calls of the tenant have ended; send it again then";
                 problem(Kind::TooManyRequests).naming("work", "this call", rule).to_be_asked_again_in(OWN_WORK)
             }
             ServiceError::Refused(Refused::TooOften(class, TooMany { per_second, wait })) => {
-                let rule = format!("must come at most {per_second} times a second, over all keys of the tenant");
+                let rule = format!("must be at most {per_second} calls a second, over all keys of the tenant");
                 problem(Kind::TooManyRequests).naming("rate", class.name(), rule).to_be_asked_again_in(wait)
             }
             // These errors occur at the start, before there are any callers.
@@ -106,11 +107,11 @@ fn of_quota(over: OverQuota) -> ProblemDocument {
         Quota::Sessions => (ProblemKind::QuotaExceeded, "delete sessions"),
         Quota::Bytes => (ProblemKind::QuotaExceeded, "delete ended jobs, sessions or policies"),
         Quota::AuditEntries => {
-            (ProblemKind::QuotaExceeded, "go on with another key, or wait until older ones are past --audit-days")
+            (ProblemKind::QuotaExceeded, "use another key, or wait until older entries are past --audit-days")
         }
     };
     let option = over.quota.option();
-    let of = if over.quota == Quota::AuditEntries { "of this key" } else { "over all keys of the tenant" };
+    let of = if over.quota == Quota::AuditEntries { "for this key" } else { "over all keys of the tenant" };
     let rule = format!("must be at most {}, {of}: {remedy}, or raise --{option}", over.limit);
     ProblemDocument::new(kind, format!("{over}: {remedy}")).naming(option, over.kept + over.wanted, rule)
 }

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::access::{CallerOf, HeavyCalls};
-use super::advise::{ProblemShape, said};
+use super::advise::{ProblemShape, peek_shape};
 use super::decode;
 use super::extract::JsonBytes;
 use super::jobs::{Queueing, accepted, idempotency_key};
@@ -26,7 +26,7 @@ use crate::service::Service;
             "rate_per_step": 0.001, "periods_per_year": 12.0, "utility": { "kind": "power", "risk_aversion": 3.0 } },
         "scales": [0.0, 0.25, 1.0], "resamples": 100, "block": 3, "seed": 1
     })),
-    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    params(("Idempotency-Key" = Option<String>, Header, description = "Repeating the key with the same body returns the same job.")),
     responses(Queueing))]
 pub async fn frontier(
     State(service): State<Arc<Service>>,
@@ -46,7 +46,7 @@ struct Only<P> {
 
 /// Decodes the request. Its problem is decoded by itself first, so that an error names the right field.
 fn request(bytes: &[u8]) -> Result<FrontierRequest, ProblemDocument> {
-    match said(bytes) {
+    match peek_shape(bytes) {
         Some(ProblemShape { assets: Some(_), .. }) => reads::<AssetsProblem>(bytes)?,
         Some(_) => reads::<ProblemSpecification>(bytes)?,
         None => {}

@@ -48,10 +48,10 @@ const PARTS: &[(&str, &[GuidePage])] = documents! {
         "choosing" "Choosing what to ask" "docs/choosing.md",
         "glossary" "Words" "docs/glossary.md",
         "results" "What it earned and cost" "docs/results.md",
-        "beside" "Beside other tools" "docs/beside.md",
+        "beside" "Compared with other tools" "docs/beside.md",
     ],
     "How to": [
-        "backtest" "Walk a record forward" "docs/backtest.md",
+        "backtest" "Run a walk-forward" "docs/backtest.md",
         "evaluation" "Evaluate a policy" "docs/evaluation.md",
         "python" "Use it from Python" "clients/python/README.md",
         "keys" "Give out keys" "docs/keys.md",
@@ -99,16 +99,16 @@ static FILES: LazyLock<Vec<Asset>> = LazyLock::new(|| {
 #[utoipa::path(get, path = "/guide", tag = "operations",
     responses(
         (status = 200, description = "A page.", body = String, content_type = "text/html"),
-        (status = 304, description = "The page is the one that `If-None-Match` names.")))]
+        (status = 304, description = "The page still matches `If-None-Match`.")))]
 pub async fn start(headers: HeaderMap) -> Response {
     PAGES[0].served(CONTENT_SECURITY_POLICY, &headers)
 }
 
 /// Serves a page of the guide, or a picture.
-#[utoipa::path(get, path = "/guide/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
+#[utoipa::path(get, path = "/guide/{file}", tag = "operations", params(("file" = String, Path, description = "The name of the page or picture.")),
     responses(
         (status = 200, description = "The page or the picture.", body = String, content_type = "text/html"),
-        (status = 304, description = "It is the one that `If-None-Match` names."),
+        (status = 304, description = "The file still matches `If-None-Match`."),
         (status = 404, description = "There is no such page.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
     let files: &[Asset] = if name.contains('.') { &FILES } else { &PAGES };

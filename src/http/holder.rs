@@ -23,7 +23,7 @@ pub struct KeyHolder {
 
 /// Returns the holder of the key in use.
 #[utoipa::path(get, path = "/key", tag = "operations",
-    responses((status = 200, description = "Who is answered, and what he may do.", body = KeyHolder)))]
+    responses((status = 200, description = "The holder of the key, and what they may do.", body = KeyHolder)))]
 pub async fn get(CallerOf(caller, _): CallerOf<ReadCalls>) -> Json<KeyHolder> {
     Json(KeyHolder {
         key: Some(caller.key().to_string()).filter(|key| !key.is_empty()),

@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, Uri, header};
 
 use super::problem::{ProblemDocument, ProblemKind};
 
-const RULE: &str = "must be localhost, a loopback address, the address connected to, or a name given by --host";
+const RULE: &str = "must be localhost, a loopback address, the address of the connection, or a name given with --host";
 
 /// The names that an operator gives, besides the service's own.
 #[derive(Debug, Clone, Default)]
@@ -35,7 +35,7 @@ impl Hosts {
             _ => return Ok(()),
         };
         let problem =
-            ProblemDocument::new(ProblemKind::Misdirected, "a service without keys answers to its own names only");
+            ProblemDocument::new(ProblemKind::Misdirected, "a service without keys accepts only its own host names");
         Err(problem.naming("Host", foreign, RULE))
     }
 
@@ -57,8 +57,10 @@ impl Hosts {
 pub fn refuse_ambiguous(headers: &HeaderMap) -> Result<(), ProblemDocument> {
     let count = |name| headers.get_all(name).iter().count();
     let refused = |name: &str, given: usize, rule: &str| {
-        let problem =
-            ProblemDocument::new(ProblemKind::InvalidHeader, format!("{name} is there {given} times: it {rule}"));
+        let problem = ProblemDocument::new(
+            ProblemKind::InvalidHeader,
+            format!("the header {name} is given {given} times: it {rule}"),
+        );
         Err(problem.naming(name, given, rule))
     };
     match (count(header::HOST), count(header::AUTHORIZATION)) {

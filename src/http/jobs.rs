@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoResponses, ToSchema};
 
 use super::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
-use super::advise::{ProblemShape, said};
+use super::advise::{ProblemShape, peek_shape};
 use super::bodies;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
@@ -68,7 +68,7 @@ pub struct Train {
         "surrogate": { "target": "floor_gain", "features": "standardized", "moment_count": 4 },
         "seed": 1
     })),
-    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    params(("Idempotency-Key" = Option<String>, Header, description = "Repeating the key with the same body returns the same job.")),
     responses(Queueing))]
 pub async fn train(
     State(service): State<Arc<Service>>,
@@ -78,8 +78,8 @@ pub async fn train(
 ) -> Result<Response, ProblemDocument> {
     let key = idempotency_key(&headers)?;
     let (specification, labels) = match body.decoded(question).await? {
-        TrainQuestion::Assets(asked) => asked.specified(&service.sessions, &caller.tenant).await?,
-        TrainQuestion::Asset(asked) => asked.specified(),
+        TrainQuestion::Assets(request) => request.specified(&service.sessions, &caller.tenant).await?,
+        TrainQuestion::Asset(request) => request.specified(),
     };
     Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
 }
@@ -94,7 +94,7 @@ pub enum TrainQuestion {
 
 /// Decodes the request by its shape, so that an error names the right field.
 fn question(bytes: &[u8]) -> Result<TrainQuestion, ProblemDocument> {
-    match said(bytes) {
+    match peek_shape(bytes) {
         Some(ProblemShape { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
         _ => decode::object(bytes).map(TrainQuestion::Asset),
     }
@@ -144,12 +144,12 @@ impl TrainAssets {
 
 /// The answers of every call that queues a job, described here once.
 #[derive(IntoResponses)]
-#[expect(dead_code, reason = "answers are made of their parts: this describes them")]
+#[expect(dead_code, reason = "answers are built from parts; this type only describes them")]
 pub enum Queueing {
     /// Queued. Poll the Location, or follow the job's events.
     #[response(status = 202, headers(
         ("Location" = String, description = "The job."),
-        ("Retry-After" = u32, description = "Seconds to wait before asking for the job.")))]
+        ("Retry-After" = u32, description = "Seconds to wait before requesting the job.")))]
     Queued(wire::AcceptedJob),
     /// The body is not JSON.
     #[response(status = 400, content_type = "application/problem+json")]
@@ -180,7 +180,7 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ProblemDoc
 /// Lists jobs, newest first.
 #[utoipa::path(get, path = "/jobs", tag = "jobs",
     params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
-           ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
+           ("after" = Option<i64>, Query, description = "The `next` of the previous page.")),
     responses(
         (status = 200, description = "A page of jobs.", body = wire::JobPage),
         (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
@@ -229,7 +229,7 @@ pub async fn cancel(
     responses(
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such job.", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 409, description = "It is queued or runs: cancel it first.", body = ProblemDocument, content_type = "application/problem+json")))]
+        (status = 409, description = "The job is queued or running: cancel it first.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn delete(
     State(service): State<Arc<Service>>,
     CallerOf(caller, _): CallerOf<LiveCalls>,

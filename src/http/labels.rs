@@ -15,7 +15,7 @@ use crate::store::{Labelled, Labels, Relabel};
 #[utoipa::path(patch, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
     request_body(content = Relabel, example = json!({ "name": "World, monthly", "tags": ["equity"] })),
     responses(
-        (status = 200, description = "As it is called now.", body = Labels),
+        (status = 200, description = "The name, notes and tags after the change.", body = Labels),
         (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn of_policy(
@@ -31,7 +31,7 @@ pub async fn of_policy(
 #[utoipa::path(patch, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     request_body(content = Relabel, example = json!({ "name": "Ada", "notes": "Reports by post.", "tags": ["monthly"] })),
     responses(
-        (status = 200, description = "As it is called now.", body = Labels),
+        (status = 200, description = "The name, notes and tags after the change.", body = Labels),
         (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn of_session(

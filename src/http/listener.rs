@@ -89,7 +89,7 @@ async fn let_in(stream: TcpStream, held: ConnectionGuard, manners: Manners, stop
     };
     match shaken {
         Ok(Ok(stream)) => conversation::hold(stream, &held, local, patience, application, stopping).await,
-        Ok(Err(error)) => tracing::debug!(%error, "a connection was not encrypted"),
-        Err(_) => tracing::debug!("a connection was not encrypted in time"),
+        Ok(Err(error)) => tracing::debug!(%error, "a TLS handshake failed"),
+        Err(_) => tracing::debug!("a TLS handshake timed out"),
     }
 }

@@ -28,7 +28,7 @@ pub struct Health {
 
 /// Returns 200 as long as the process answers.
 #[utoipa::path(get, path = "/livez", tag = "operations",
-    responses((status = 200, description = "It does.", body = String, content_type = "text/plain")))]
+    responses((status = 200, description = "The process answers.", body = String, content_type = "text/plain")))]
 pub async fn livez() -> &'static str {
     "ok"
 }
@@ -36,8 +36,8 @@ pub async fn livez() -> &'static str {
 /// Returns 200 if the store answers and the service accepts work.
 #[utoipa::path(get, path = "/readyz", tag = "operations",
     responses(
-        (status = 200, description = "It does. If the clock of its machine is wrong, that is said too.", body = String, content_type = "text/plain"),
-        (status = 503, description = "Draining, or the store does not answer.", body = ProblemDocument, content_type = "application/problem+json")))]
+        (status = 200, description = "The service is ready. The text also warns if the clock of its machine is wrong.", body = String, content_type = "text/plain"),
+        (status = 503, description = "The service is draining, or the store does not answer.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, ProblemDocument> {
     service.ready().await?;
     Ok(match service.clock_skew_seconds() {
@@ -49,8 +49,8 @@ pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, Probl
 /// Reports liveness and readiness, with the version and the numbers of jobs and sessions.
 #[utoipa::path(get, path = "/health", tag = "operations",
     responses(
-        (status = 200, description = "Alive and ready.", body = Health),
-        (status = 503, description = "Draining, or the store does not answer.", body = ProblemDocument, content_type = "application/problem+json")))]
+        (status = 200, description = "The service is alive and ready.", body = Health),
+        (status = 503, description = "The service is draining, or the store does not answer.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>, ProblemDocument> {
     service.ready().await?;
     let (jobs, sessions) = service.counts().await?;

@@ -195,25 +195,25 @@ pub struct SessionPage {
 
 /// Lists sessions: all, or those that match, newest first by default.
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
-    params(("search" = Option<String>, Query, max_length = 100, description = "Words, each the beginning of a word of the session's name or tags, of its policy's name or tags, or eight digits or more with which either's identifier begins, in any order and whatever the case."),
-           ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
-           ("state" = inline(Option<SessionFilterName>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
-           ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
+    params(("search" = Option<String>, Query, max_length = 100, description = "Words, in any order and in upper or lower case. Each must begin a word in the name or tags of the session or of its policy, or be at least the first eight digits of the identifier of either."),
+           ("tag" = Option<String>, Query, max_length = 50, description = "A tag that the sessions must have."),
+           ("state" = inline(Option<SessionFilterName>), Query, description = "`waiting`: sessions that wait for their next policy. `care`: sessions that need attention for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
+           ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` in front for descending order; default `-created`."),
            ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
-           ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`."),
-           ("count" = inline(Option<CountName>), Query, description = "`total`: how many match; `care`: that, and how many need care. Each reads every session that matches, so ask for it once, with the first page.")),
+           ("after" = Option<String>, Query, description = "The `next` of the previous page, with the same `sort`."),
+           ("count" = inline(Option<CountName>), Query, description = "`total`: also count the matching sessions. `care`: also count those of them that need attention. Both read every matching session, so request them only with the first page.")),
     responses(
         (status = 200, description = "A page of sessions.", body = SessionPage),
         (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
     CallerOf(caller, _): CallerOf<ReadCalls>,
-    Parameters(asked): Parameters<SessionListQuery>,
+    Parameters(query): Parameters<SessionListQuery>,
 ) -> Result<Response, ProblemDocument> {
-    let asked = asked.read()?;
-    let room = service.room_for(page::bytes(asked.limit)).await?;
-    let found = service.sessions.list(&caller, asked.clone()).await?;
-    let next = found.last.as_ref().map(|place| cursor(&asked, place));
+    let query = query.read()?;
+    let room = service.room_for(page::bytes(query.limit)).await?;
+    let found = service.sessions.list(&caller, query.clone()).await?;
+    let next = found.last.as_ref().map(|place| cursor(&query, place));
     let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
     let (damaged, care) = (found.damaged, found.care.map(CareCount::from));
     let value = SessionPage { sessions, damaged, total: found.total, care, next };
@@ -240,7 +240,7 @@ impl SessionListQuery {
             "wealth" => SessionOrder::Wealth,
             "last_report" => SessionOrder::LastReport,
             _ => {
-                let rule = "must be created, name, wealth or last_report, with - before it for descending";
+                let rule = "must be created, name, wealth or last_report, with - in front for descending order";
                 return Err(refused("sort", sort, rule));
             }
         };
@@ -259,43 +259,43 @@ impl SessionListQuery {
             CountName::Care => Counted::Care,
         });
         let search = self.search.filter(|search| !search.is_empty());
-        let asked =
+        let query =
             SessionQuery { search, tag: self.tag, is, order, descending, limit, counted, ..SessionQuery::default() };
         let after = self.after.map(|text| {
-            let rule = "must be the `next` of the page before, of the same sort";
-            place(&asked, &text).ok_or_else(|| refused("after", &text, rule))
+            let rule = "must be the `next` of the previous page, with the same sort";
+            place(&query, &text).ok_or_else(|| refused("after", &text, rule))
         });
-        Ok(SessionQuery { after: after.transpose()?, ..asked })
+        Ok(SessionQuery { after: after.transpose()?, ..query })
     }
 }
 
 /// Returns the prefix of a cursor, which identifies the order of the list.
-fn mark(asked: &SessionQuery) -> String {
-    let order = match asked.order {
+fn mark(query: &SessionQuery) -> String {
+    let order = match query.order {
         SessionOrder::Created => 'c',
         SessionOrder::Name => 'n',
         SessionOrder::Wealth => 'w',
         SessionOrder::LastReport => 'r',
     };
-    format!("{order}{}", if asked.descending { 'd' } else { 'a' })
+    format!("{order}{}", if query.descending { 'd' } else { 'a' })
 }
 
 /// Returns the cursor of a page's last row: its sort key at that time, and its sequence number among equal keys.
-fn cursor(asked: &SessionQuery, SessionPlace { key, sequence }: &SessionPlace) -> String {
+fn cursor(query: &SessionQuery, SessionPlace { key, sequence }: &SessionPlace) -> String {
     let key = match key {
         SessionKey::Created => String::new(),
         SessionKey::Name(name) => name.bytes().map(|byte| format!("{byte:02x}")).collect(),
         SessionKey::Wealth(wealth) => format!("{:016x}", wealth.to_bits()),
         SessionKey::LastReport(reported_ms) => reported_ms.to_string(),
     };
-    format!("{}.{sequence}.{key}", mark(asked))
+    format!("{}.{sequence}.{key}", mark(query))
 }
 
-fn place(asked: &SessionQuery, text: &str) -> Option<SessionPlace> {
+fn place(query: &SessionQuery, text: &str) -> Option<SessionPlace> {
     let (marked, rest) = text.split_once('.')?;
     let (sequence, key) = rest.split_once('.')?;
-    let key = match asked.order {
-        _ if marked != mark(asked) => return None,
+    let key = match query.order {
+        _ if marked != mark(query) => return None,
         SessionOrder::Created => key.is_empty().then_some(SessionKey::Created)?,
         SessionOrder::Name => SessionKey::Name(text_of(key)?),
         SessionOrder::Wealth => {
@@ -327,15 +327,15 @@ mod tests {
             (SessionOrder::Wealth, SessionKey::Wealth(0.1 + 0.2)),
             (SessionOrder::LastReport, SessionKey::LastReport(-7)),
         ] {
-            let asked = SessionQuery { order, descending: true, ..SessionQuery::default() };
+            let query = SessionQuery { order, descending: true, ..SessionQuery::default() };
             let found = SessionPlace { key, sequence: 41 };
-            let written = cursor(&asked, &found);
-            assert_eq!(place(&asked, &written), Some(found), "{written}");
-            assert_eq!(place(&SessionQuery { descending: false, ..asked.clone() }, &written), None);
+            let written = cursor(&query, &found);
+            assert_eq!(place(&query, &written), Some(found), "{written}");
+            assert_eq!(place(&SessionQuery { descending: false, ..query.clone() }, &written), None);
         }
-        let asked = SessionQuery { order: SessionOrder::Wealth, ..SessionQuery::default() };
+        let query = SessionQuery { order: SessionOrder::Wealth, ..SessionQuery::default() };
         for text in ["", "wa", "wa.1", "wa.x.3ff0000000000000", "wa.1.7ff0000000000000", "wa.1.zz", "17"] {
-            assert_eq!(place(&asked, text), None, "{text}");
+            assert_eq!(place(&query, text), None, "{text}");
         }
     }
 }

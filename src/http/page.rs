@@ -44,7 +44,7 @@ impl Page {
         let after = self
             .after
             .as_deref()
-            .map(|text| text.parse().map_err(|_| refused("after", text, "must be the `next` of the page before")));
+            .map(|text| text.parse().map_err(|_| refused("after", text, "must be the `next` of the previous page")));
         Ok((limit, after.transpose()?))
     }
 }

@@ -64,7 +64,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
         let written = write(Pin::new(&mut self.stream), context);
         if written.is_ready() {
             self.stalled = None;
-            self.connection.taken();
+            self.connection.note_read();
             return written;
         }
         let limit = self.patience.to_read;
@@ -95,12 +95,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
     /// Discards what the client still sends; ready once the client has ended or has sent too much.
     fn finish(&mut self, context: &mut Context<'_>) -> Poll<()> {
         let patience = self.patience;
-        let (taken, over) = self.end.get_or_insert_with(|| (0, Box::pin(tokio::time::sleep(patience.to_finish))));
+        let (discarded, over) = self.end.get_or_insert_with(|| (0, Box::pin(tokio::time::sleep(patience.to_finish))));
         let mut space = [0; 16 << 10];
-        while *taken < patience.left_bytes && over.as_mut().poll(context).is_pending() {
+        while *discarded < patience.left_bytes && over.as_mut().poll(context).is_pending() {
             let mut buffer = ReadBuf::new(&mut space);
             match ready!(Pin::new(&mut self.stream).poll_read(context, &mut buffer)) {
-                Ok(()) if !buffer.filled().is_empty() => *taken += buffer.filled().len(),
+                Ok(()) if !buffer.filled().is_empty() => *discarded += buffer.filled().len(),
                 _ => break,
             }
         }
@@ -148,15 +148,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for Patient<S> {
     ) -> Poll<io::Result<()>> {
         let before = buffer.filled().len();
         let read = Pin::new(&mut self.stream).poll_read(context, buffer);
-        let asked = self.connection.requests();
-        self.head = self.head.filter(|(of, _)| *of == asked);
+        let requests = self.connection.requests();
+        self.head = self.head.filter(|(of, _)| *of == requests);
         if self.connection.phase() != ConnectionPhase::Waiting {
             return read;
         }
         match read {
             Poll::Pending => self.silence(context).map(Err),
             Poll::Ready(_) if buffer.filled().len() > before => {
-                let (_, began) = *self.head.get_or_insert_with(|| (asked, Instant::now()));
+                let (_, began) = *self.head.get_or_insert_with(|| (requests, Instant::now()));
                 // A client that sends a byte now and then never leaves a read pending.
                 if began.elapsed() < self.patience.for_head {
                     read
@@ -196,10 +196,10 @@ mod tests {
         let (here, mut there) = tokio::io::duplex(16);
         let (_held, mut patient) = patient(here);
         let reading = tokio::spawn(async move {
-            let mut taken = [0; 16];
+            let mut chunk = [0; 16];
             for _ in 0..6 {
                 tokio::time::sleep(LIMIT / 4).await;
-                there.read_exact(&mut taken).await.unwrap();
+                there.read_exact(&mut chunk).await.unwrap();
             }
             there
         });
@@ -256,7 +256,7 @@ mod tests {
 
     #[tokio::test]
     async fn what_is_left_of_a_request_is_taken_within_bounds() {
-        for (sent, taken) in [(48, true), (96 + 16 + 1, false)] {
+        for (sent, accepted) in [(48, true), (96 + 16 + 1, false)] {
             let (here, mut there) = tokio::io::duplex(16);
             let (held, mut patient) = patient(here);
             held.connection.leave();
@@ -266,7 +266,7 @@ mod tests {
             });
             patient.shutdown().await.unwrap();
             drop(patient);
-            assert_eq!(sending.await.unwrap().0, taken, "{sent}");
+            assert_eq!(sending.await.unwrap().0, accepted, "{sent}");
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::service::memory::Large;
 /// Lists policies, newest first.
 #[utoipa::path(get, path = "/policies", tag = "policies",
     params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
-           ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
+           ("after" = Option<i64>, Query, description = "The `next` of the previous page.")),
     responses(
         (status = 200, description = "A page of policies.", body = wire::PolicyPage),
         (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
@@ -81,7 +81,7 @@ pub async fn export(
 /// Stores an exported policy.
 #[utoipa::path(post, path = "/policies/import", tag = "policies", request_body = serde_json::Value,
     responses(
-        (status = 201, description = "Stored, or known already.", body = wire::Imported,
+        (status = 201, description = "The policy is stored, or was stored already.", body = wire::Imported,
             headers(("Location" = String, description = "The policy."))),
         (status = 422, description = "The document is not a usable policy.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn import(
@@ -99,7 +99,7 @@ pub async fn import(
     responses(
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 409, description = "Sessions live by it.", body = ProblemDocument, content_type = "application/problem+json")))]
+        (status = 409, description = "Sessions use the policy.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn delete(
     State(service): State<Arc<Service>>,
     CallerOf(caller, _): CallerOf<LiveCalls>,

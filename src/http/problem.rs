@@ -86,26 +86,26 @@ impl ProblemKind {
             Self::Unauthenticated => ("unauthenticated", S::UNAUTHORIZED, "The call needs a key"),
             Self::Forbidden => ("forbidden", S::FORBIDDEN, "The key lacks a role"),
             Self::UnknownRoute => ("unknown-route", S::NOT_FOUND, "There is nothing at this address"),
-            Self::NotFound => ("not-found", S::NOT_FOUND, "There is no such thing"),
-            Self::WrongMethod => ("wrong-method", S::METHOD_NOT_ALLOWED, "The address does not take this method"),
+            Self::NotFound => ("not-found", S::NOT_FOUND, "The requested object does not exist"),
+            Self::WrongMethod => ("wrong-method", S::METHOD_NOT_ALLOWED, "The address does not accept this method"),
             Self::IdempotencyConflict => {
                 ("idempotency-conflict", S::CONFLICT, "The idempotency key was used with another body")
             }
-            Self::InUse => ("in-use", S::CONFLICT, "Something else depends on it"),
-            Self::JobNotEnded => ("job-not-ended", S::CONFLICT, "The job is queued or runs"),
-            Self::ReportConflict => ("report-conflict", S::CONFLICT, "It was reported with other content"),
-            Self::ReportGap => ("report-gap", S::CONFLICT, "It is not the one expected"),
-            Self::Unconfirmed => ("unconfirmed", S::CONFLICT, "The report is most likely a slip"),
+            Self::InUse => ("in-use", S::CONFLICT, "Something else uses it"),
+            Self::JobNotEnded => ("job-not-ended", S::CONFLICT, "The job is queued or running"),
+            Self::ReportConflict => ("report-conflict", S::CONFLICT, "It was reported before with other content"),
+            Self::ReportGap => ("report-gap", S::CONFLICT, "It is not the next in order"),
+            Self::Unconfirmed => ("unconfirmed", S::CONFLICT, "The report is probably a mistake"),
             Self::SessionCompleted => ("session-completed", S::CONFLICT, "The session has reached its horizon"),
             Self::BodyTooLarge => ("body-too-large", S::PAYLOAD_TOO_LARGE, "The body is too large"),
-            Self::QuotaExceeded => ("quota-exceeded", S::PAYLOAD_TOO_LARGE, "The tenant keeps as much as it may"),
+            Self::QuotaExceeded => ("quota-exceeded", S::PAYLOAD_TOO_LARGE, "The tenant's quota is used up"),
             Self::UnsupportedMediaType => {
                 ("unsupported-media-type", S::UNSUPPORTED_MEDIA_TYPE, "The body must be application/json")
             }
-            Self::Misdirected => ("misdirected", S::MISDIRECTED_REQUEST, "The service does not answer to this name"),
+            Self::Misdirected => ("misdirected", S::MISDIRECTED_REQUEST, "The service does not accept this host name"),
             Self::InvalidField => ("invalid-field", S::UNPROCESSABLE_ENTITY, "A field breaks a rule"),
             Self::TooManyRequests => ("too-many-requests", S::TOO_MANY_REQUESTS, "The tenant calls too often"),
-            Self::QueueFull => ("queue-full", S::TOO_MANY_REQUESTS, "The tenant has as many jobs queued as it may"),
+            Self::QueueFull => ("queue-full", S::TOO_MANY_REQUESTS, "The tenant's job queue is full"),
             Self::Internal => ("internal", S::INTERNAL_SERVER_ERROR, "The service failed"),
             Self::Overloaded => ("overloaded", S::SERVICE_UNAVAILABLE, "The service cannot answer now"),
             Self::StorageFull => ("storage-full", S::INSUFFICIENT_STORAGE, "The data folder is full"),

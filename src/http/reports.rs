@@ -71,7 +71,7 @@ impl<'de> Visitor<'de> for OneOrMany {
 /// The answer to one report, or the answers to a list in its order.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
-#[expect(dead_code, reason = "answers travel as they are stored: this describes them")]
+#[expect(dead_code, reason = "answers are sent as they are stored; this type only describes them")]
 pub enum ReportsAnswered {
     One(Box<Observed>),
     Many(Vec<ElementAnswered>),
@@ -100,9 +100,9 @@ pub struct ElementAnswered {
         "session": "session_0123456789abcdef0123456789abcdef", "period": 1, "simple_return": 0.012, "executed_allocation": 0.3
     })),
     responses(
-        (status = 200, description = "Recorded; the same period and content again give the same answer. Of a list, the answer to each element with a status of its own.", body = ReportsAnswered),
+        (status = 200, description = "Recorded. Repeating the period with the same content returns the same answer. A list gets one answer for each element, with a status of its own.", body = ReportsAnswered),
         (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, a gap, past the horizon, or most likely a slip that nobody confirms.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "The period was reported with other content, is not the next, or is past the horizon; or the report is probably a mistake and is not confirmed.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule, or a list names a session twice.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn observe(
     State(service): State<Arc<Service>>,

@@ -24,7 +24,7 @@ const ANSWERED_A_BYTE: usize = 16;
         "text": "month,fund,rf\n2020-01,1.2,0.1\n2020-02,-3.4,0.1\n2020-03,2.1,0.1\n",
         "choices": { "unit": "percent" }
     })),
-    responses((status = 200, description = "The reading.", body = Reading)))]
+    responses((status = 200, description = "The history, the open questions, or the place of the error.", body = Reading)))]
 pub async fn read(
     State(service): State<Arc<Service>>,
     CallerOf(caller, _): CallerOf<HeavyCalls>,

@@ -36,13 +36,13 @@ const BODY_BYTES: usize = 4 << 20;
 #[openapi(
     // `jobs::Queueing` refers to it without describing it.
     components(schemas(wire::AcceptedJob)),
-    info(title = "Ballast", description = "Nonparametric adaptive robust control of an investor. Every error is a problem document (RFC 9457)."),
+    info(title = "Ballast", description = "Nonparametric adaptive robust control for an investor. Every error is a problem document (RFC 9457)."),
     tags(
-        (name = "advice", description = "Ask now: nothing is trained, nothing is stored."),
-        (name = "jobs", description = "Train and compare, offline."),
-        (name = "policies", description = "What trainings give."),
-        (name = "sessions", description = "Act, live."),
-        (name = "operations", description = "For the operator."))
+        (name = "advice", description = "Get advice at once: nothing is trained and nothing is stored."),
+        (name = "jobs", description = "Train and compare policies in the background."),
+        (name = "policies", description = "Manage trained policies."),
+        (name = "sessions", description = "Run sessions: report returns and get live advice."),
+        (name = "operations", description = "Operate the service."))
 )]
 struct Description;
 
@@ -199,12 +199,12 @@ async fn unknown_route(
     }
     caller?;
     let problem = ProblemDocument::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()));
-    Err(problem.naming("path", uri.path(), "must be a path of /openapi.json"))
+    Err(problem.naming("path", uri.path(), "must be a path listed in /openapi.json"))
 }
 
 async fn wrong_method(_: Option<CallerOf<ReadCalls>>, method: Method, uri: Uri) -> ProblemDocument {
-    let problem = ProblemDocument::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()));
-    problem.naming("method", method.as_str(), "must be one that the Allow header names")
+    let problem = ProblemDocument::new(ProblemKind::WrongMethod, format!("{} does not accept {method}", uri.path()));
+    problem.naming("method", method.as_str(), "must be one of the methods in the Allow header")
 }
 
 /// Bounds the time to the head of the response, and so also the time for a slow body; event streams run on.

@@ -9,7 +9,7 @@ use crate::numerics::summary::Estimate;
 
 /// A figure and its interval.
 #[derive(ToSchema)]
-#[expect(dead_code, reason = "read by the derive alone")]
+#[expect(dead_code, reason = "only the derive reads it")]
 struct Described {
     /// The estimate.
     value: f64,

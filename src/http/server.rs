@@ -46,14 +46,14 @@ pub enum ServeError {
     #[error("cannot listen on {address}")]
     Listen { address: SocketAddr, source: std::io::Error },
     #[error(
-        "{address} can be reached by others, and what is said there would not be encrypted: give --tls-cert and --tls-key, listen on loopback, or say --allow-plaintext where something in front of it encrypts"
+        "{address} can be reached from other machines, and its traffic would not be encrypted: give --tls-cert and --tls-key, listen on loopback, or give --allow-plaintext if a proxy in front of it encrypts"
     )]
     Plaintext { address: SocketAddr },
     #[error("cannot encrypt connections")]
     Encryption(#[from] TlsError),
     #[error("cannot start the service")]
     Start(#[from] ServiceError),
-    #[error("asked to stop before the service had started")]
+    #[error("the service was stopped before it had started")]
     Stopped,
 }
 
@@ -79,7 +79,7 @@ impl RunningServer {
             biased;
             ended = self.task => {
                 if let Err(error) = ended {
-                    tracing::error!(%error, "the server ended by a panic");
+                    tracing::error!(%error, "the server panicked");
                 }
                 Ok(())
             }
@@ -211,11 +211,11 @@ impl Doors {
 }
 
 /// Returns the requested limit, or less if the store would otherwise find no descriptor for its files.
-fn connection_limit(asked: usize) -> usize {
+fn connection_limit(requested: usize) -> usize {
     let others = OTHER_DESCRIPTORS + OPERATORS + 2 * PROBES;
     match descriptors() {
-        Some(descriptors) => asked.min(descriptors.saturating_sub(others).max(1)),
-        None => asked,
+        Some(descriptors) => requested.min(descriptors.saturating_sub(others).max(1)),
+        None => requested,
     }
 }
 

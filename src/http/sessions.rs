@@ -37,7 +37,7 @@ use crate::store::{Labels, Relabel};
         "policy": "2c882522ef92e64d9ad1cb0dd2b4ff4e7c3b0c1e8f5d2a6b9c0d1e2f3a4b5c6d", "wealth": 2500.0
     })),
     params(("Idempotency-Key" = Option<String>, Header,
-            description = "The same key and body again give the same session and answer, until it is deleted.")),
+            description = "Repeating the key with the same body returns the same session and answer, until the session is deleted.")),
     responses(
         (status = 201, description = "Opened.", body = wire::Session, headers(("Location" = String, description = "The session."))),
         (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
@@ -97,9 +97,9 @@ pub async fn history(
         "correction": 1, "period": 3, "simple_return": 0.011, "reason": "the index was revised"
     })),
     responses(
-        (status = 200, description = "Recorded; the same correction and content again give the same answer.", body = Corrected),
+        (status = 200, description = "Recorded. Repeating the correction with the same content returns the same answer.", body = Corrected),
         (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, not the next correction, or most likely a slip that nobody confirms.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "The correction was reported with other content or is not the next; or it is probably a mistake and is not confirmed.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn correct(
     State(service): State<Arc<Service>>,
@@ -119,9 +119,9 @@ pub async fn correct(
         "renewal": 1, "policy": "2c882522ef92e64d9ad1cb0dd2b4ff4e7c3b0c1e8f5d2a6b9c0d1e2f3a4b5c6d", "window": 240
     })),
     responses(
-        (status = 200, description = "Recorded; the same renewal and content again give the same answer.", body = Renewed),
+        (status = 200, description = "Recorded. Repeating the renewal with the same content returns the same answer.", body = Renewed),
         (status = 404, description = "There is no such session or policy.", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, or not the next renewal.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 409, description = "The renewal was reported with other content, or is not the next.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn renew(
     State(service): State<Arc<Service>>,
@@ -188,13 +188,13 @@ impl access::ClassedQuery for ActionQuery {
     params(("session" = String, Query, description = "The session."),
            ("mode" = inline(Option<Mode>), Query, description = "`surrogate` (default) or `resolve`."),
            ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law."),
-           ("sensitivity" = Option<bool>, Query, description = "`true`: say how near the advice is to changing.")),
+           ("sensitivity" = Option<bool>, Query, description = "`true`: also return how close the advice is to changing.")),
     responses(
         (status = 200, description = "The allocation.", body = ActionAnswer),
         (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 409, description = "The session has reached its horizon.", body = ProblemDocument, content_type = "application/problem+json"),
-        (status = 422, description = "The sensitivity of this session is not told.", body = ProblemDocument, content_type = "application/problem+json")))]
+        (status = 422, description = "The sensitivity is not available for this session.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn action(
     State(service): State<Arc<Service>>,
     CallerAsking(caller, ask): CallerAsking<ActionQuery>,

@@ -33,7 +33,7 @@ pub fn install_recorder() {
         names::describe();
         process::describe();
         problem::count_from_zero();
-        handle.inspect_err(|error| tracing::error!(%error, "no metrics")).ok()
+        handle.inspect_err(|error| tracing::error!(%error, "metrics are not available")).ok()
     });
 }
 
@@ -50,7 +50,7 @@ pub async fn keep_up(connections: Arc<Connections>) {
         }
         let left_out = LEFT_OUT.swap(0, Ordering::Relaxed);
         if left_out > 0 {
-            tracing::warn!(left_out, "lines about callers without a key were left out");
+            tracing::warn!(left_out, "log lines about callers without a key were left out");
         }
         if let Some(recorder) = RECORDER.get().and_then(Option::as_ref) {
             recorder.run_upkeep();

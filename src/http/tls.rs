@@ -37,9 +37,9 @@ pub enum TlsError {
     NoCertificate { path: PathBuf },
     #[error("{} holds no private key", path.display())]
     NoKey { path: PathBuf, source: PemError },
-    #[error("the certificate in {} and the key in {} are no pair to serve by", certificate.display(), key.display())]
+    #[error("the certificate in {} and the key in {} do not form a usable pair", certificate.display(), key.display())]
     Pair { certificate: PathBuf, key: PathBuf, source: rustls::Error },
-    #[error("this build of TLS lacks a version")]
+    #[error("this build of the TLS library lacks a required protocol version")]
     Version { source: rustls::Error },
 }
 
@@ -111,7 +111,7 @@ impl Certificate {
                 let mut current = self.current.write().unwrap_or_else(PoisonError::into_inner);
                 if current.cert != key.cert {
                     metrics::counter!(CERTIFICATE_LOADS, "outcome" => "taken").increment(1);
-                    tracing::info!(file = %self.files.certificate.display(), "another certificate is in force");
+                    tracing::info!(file = %self.files.certificate.display(), "a new certificate is in use");
                 }
                 if let Some(expires) = key.cert.iter().filter_map(|certificate| expiry(certificate)).min() {
                     metrics::gauge!(CERTIFICATE_EXPIRES).set(expires as f64);
@@ -122,7 +122,7 @@ impl Certificate {
             Err(error) => {
                 metrics::counter!(CERTIFICATE_LOADS, "outcome" => "refused").increment(1);
                 let error = &error as &dyn std::error::Error;
-                tracing::error!(error, "the certificate before stays in force");
+                tracing::error!(error, "the certificate files cannot be used; the previous certificate stays in use");
                 Pair::read(&self.files).ok()
             }
         }

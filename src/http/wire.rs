@@ -105,7 +105,7 @@ impl From<Accepted> for AcceptedJob {
 /// The report of a job: of an evaluation, of a walk-forward backtest or of a frontier.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
-#[expect(dead_code, reason = "reports travel as they are stored: this describes them")]
+#[expect(dead_code, reason = "reports are sent as they are stored; this type only describes them")]
 pub enum JobReport {
     Evaluation(Box<EvaluationReport>),
     Backtest(Box<BacktestReport>),

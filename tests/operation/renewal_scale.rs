@@ -140,7 +140,7 @@ async fn a_deleted_session_takes_its_training_with_it(mut app: App) {
         .await;
     assert_eq!(
         (status, conflict["rule"].as_str()),
-        (StatusCode::CONFLICT, Some("must be 2 to renew it once more: renewal 1 is made")),
+        (StatusCode::CONFLICT, Some("must be 2 for another renewal, because renewal 1 exists")),
         "{conflict}"
     );
     assert!(conflict["detail"].as_str().unwrap().contains("read the session again"), "{conflict}");

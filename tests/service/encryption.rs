@@ -165,7 +165,7 @@ fn a_certificate_that_cannot_serve_refuses_the_start() {
         ("an empty certificate", &put("cert.pem", String::new()), "holds no certificate"),
         ("a certificate that is a key", &put("cert.pem", one.key.clone()), "holds no certificate"),
         ("a key that is none", &put("key.pem", "x".into()), "holds no private key"),
-        ("another's key", &put("key.pem", other.key.clone()), "no pair to serve by"),
+        ("another's key", &put("key.pem", other.key.clone()), "do not form a usable pair"),
     ] {
         let complaint = complaint(prepare);
         assert!(

@@ -399,7 +399,7 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
     let at: jiff::Timestamp = value.strip_prefix("a key that expired at ").unwrap().parse().unwrap();
     assert!(at < jiff::Timestamp::now() && expired["detail"] == format!("the key expired at {at}"), "{expired}");
     let (_, gone) = shown(&mut app, &revoked).await;
-    assert_eq!(gone["value"], "another key");
+    assert_eq!(gone["value"], "an unknown or revoked key");
     assert_eq!(gone, shown(&mut app, "ballast_0").await.1);
     let (code, _, stderr) = ballast(&["keys", "rotate", &old_name, "--data", &data]);
     assert!(code == Some(1) && stderr.contains("must be in force"), "{stderr}");
