@@ -71,7 +71,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
     let path = folder.path().join("returns.csv");
     std::fs::write(&path, "date,return\n2008-01,0.01\n2008-02,-0.04\n2008-03,0.02\n2008-05,0.02\n").unwrap();
     let file = path.to_str().unwrap();
-    for (arguments, said) in [
+    for (arguments, refusal) in [
         (&["advise", file][..], "the file does not say what the bank pays"),
         (&["advise", file, "--rate", "0.001"], "line 5: date is \"2008-05\": must be the month after 2008-03"),
         (&["advise", "no such file"], "reading no such file: "),
@@ -89,7 +89,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
     ] {
         let output = ballast(arguments);
         assert_eq!(output.status.code(), Some(1), "{output:?}");
-        assert!(text(&output.stderr).starts_with(&format!("ballast: {said}")), "{output:?}");
+        assert!(text(&output.stderr).starts_with(&format!("ballast: {refusal}")), "{output:?}");
     }
 }
 
@@ -102,16 +102,16 @@ fn more_days_than_a_radius_is_simulated_for_need_a_window() {
         format!("{},{}\n", first.checked_add(jiff::Span::new().days(day)).unwrap(), 0.001 * (day % 7 - 3) as f64)
     };
     std::fs::write(&path, format!("date,return\n{}", (0..15_000).map(day).collect::<String>())).unwrap();
-    let asked = ["advise", path.to_str().unwrap(), "--rate", "0"];
-    let refused = ballast(&asked);
+    let arguments = ["advise", path.to_str().unwrap(), "--rate", "0"];
+    let refused = ballast(&arguments);
     assert_eq!(
         text(&refused.stderr),
         "ballast: the file is 15000 returns: must be at most 14999, because the radius is not simulated for more; use \
          --window 14999 to keep the last ones\n"
     );
-    let named = ballast(&[&asked[..], &["--window", "15000"]].concat());
+    let named = ballast(&[&arguments[..], &["--window", "15000"]].concat());
     assert!(text(&named.stderr).starts_with("ballast: --window is 15000 returns: must be at most 14999"), "{named:?}");
-    let answered = ballast(&[&asked[..], &["--window", "14999"]].concat());
+    let answered = ballast(&[&arguments[..], &["--window", "14999"]].concat());
     assert!(text(&answered.stdout).starts_with("14999 daily returns, 1970-01-02 to 2011-01-25, "), "{answered:?}");
 }
 
@@ -161,20 +161,20 @@ fn the_pages_show_what_commands_print() {
 fn named_columns_are_an_asset_each() {
     let root = env!("CARGO_MANIFEST_DIR");
     let file = format!("{root}/data/us_industries_monthly.csv");
-    let asked = ["advise", &file, "--window", "120", "--column", "energy", "--column", "utilities"];
-    let answered = ballast(&[&asked[..], &["--json"]].concat());
+    let arguments = ["advise", &file, "--window", "120", "--column", "energy", "--column", "utilities"];
+    let answered = ballast(&[&arguments[..], &["--json"]].concat());
     let advised: serde_json::Value = serde_json::from_str(&text(&answered.stdout)).unwrap();
     let held = advised["allocation"].as_object().unwrap();
     assert_eq!(held.keys().collect::<Vec<_>>(), ["energy", "utilities"]);
     let total: f64 = held.values().map(|share| share.as_f64().unwrap()).sum();
     assert!((total - advised["total"].as_f64().unwrap()).abs() < 1e-12 && total > 0.0, "{advised}");
-    let told = text(&ballast(&asked).stdout);
+    let printed = text(&ballast(&arguments).stdout);
     for part in
         ["of wealth in these assets through the coming month", "\n  energy ", "\n  utilities ", "Caution is balanced"]
     {
-        assert!(told.contains(part), "{told}");
+        assert!(printed.contains(part), "{printed}");
     }
-    let held = ballast(&[&asked[..], &["--holding", "energy=0.4", "--trading-cost", "0.05", "--json"]].concat());
+    let held = ballast(&[&arguments[..], &["--holding", "energy=0.4", "--trading-cost", "0.05", "--json"]].concat());
     let held: serde_json::Value = serde_json::from_str(&text(&held.stdout)).unwrap();
     // At such a cost nothing is bought, and no more sold than what is too much.
     assert!(held["trade"]["utilities"] == 0.0 && held["allocation"]["energy"].as_f64().unwrap() > 0.0, "{held}");
@@ -192,7 +192,7 @@ fn named_columns_are_an_asset_each() {
         (&["--holding", "energy=1.5"], "--holding is energy=1.5: must be a number in [0, 1]"),
         (&["--half-life", "12"], "--half-life is given with 2 assets: must be left out"),
     ] {
-        let refused = text(&ballast(&[&asked[..], options].concat()).stderr);
+        let refused = text(&ballast(&[&arguments[..], options].concat()).stderr);
         assert!(refused.starts_with(&format!("ballast: {refusal}")), "{options:?}: {refused}");
     }
     // Not named, they are asked for: a file of prices has more columns than assets.

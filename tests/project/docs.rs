@@ -230,19 +230,19 @@ fn every_field_of_every_request_has_its_row_and_its_bounds() {
             let body = &operation["requestBody"]["content"]["application/json"]["schema"];
             fields(&description, body, "", &mut found);
             for (field, schema) in found {
-                let mut said = rows(&section, &field);
+                let mut described = rows(&section, &field);
                 let outermost = rows(&section, field.split(['.', '[']).next().unwrap());
                 for (link, elsewhere) in &linked {
                     if outermost.iter().any(|row| row.contains(link)) {
-                        said.extend(rows(elsewhere, &field));
+                        described.extend(rows(elsewhere, &field));
                     }
                 }
                 if outermost.iter().any(|row| row.contains("[`problem.centre`](#centres)")) {
-                    said.extend(rows(&linked[0].1, &format!("problem.{field}")));
+                    described.extend(rows(&linked[0].1, &format!("problem.{field}")));
                 }
-                assert!(!said.is_empty(), "{operation_name}: no row for {field}");
+                assert!(!described.is_empty(), "{operation_name}: no row for {field}");
                 for end in ends(&schema) {
-                    assert!(has_number(&said.join(" "), end), "{field} does not say {end}");
+                    assert!(has_number(&described.join(" "), end), "{field} does not say {end}");
                 }
                 seen += 1;
             }
@@ -256,7 +256,7 @@ fn every_answer_is_described_where_it_is_given() {
     let (description, page) = (description(), read("docs/requests.md"));
     let frontier = section(&page, "POST /frontier");
     let report = [read("docs/evaluation.md"), read("docs/backtest.md"), frontier].map(|text| spans(&text)).concat();
-    let mut said: Vec<(String, Vec<String>, BTreeSet<String>)> = Vec::new();
+    let mut answers: Vec<(String, Vec<String>, BTreeSet<String>)> = Vec::new();
     for (path, operations) in description["paths"].as_object().unwrap() {
         for (method, operation) in operations.as_object().unwrap() {
             let section: Vec<String> = spans(&section(&page, &format!("{} {path}", method.to_uppercase())));
@@ -268,13 +268,13 @@ fn every_answer_is_described_where_it_is_given() {
                 let mut found = Vec::new();
                 fields(&description, schema, "", &mut found);
                 let own = found.into_iter().map(|(field, _)| field).filter(|field| !field.contains(['.', '[']));
-                said.push((schema["$ref"].to_string(), section.clone(), own.collect()));
+                answers.push((schema["$ref"].to_string(), section.clone(), own.collect()));
             }
         }
     }
-    assert!(said.len() >= 15, "{} answers", said.len());
-    for (schema, _, fields) in &said {
-        let somewhere = said.iter().filter(|(other, ..)| other == schema).map(|(_, section, _)| section);
+    assert!(answers.len() >= 15, "{} answers", answers.len());
+    for (schema, _, fields) in &answers {
+        let somewhere = answers.iter().filter(|(other, ..)| other == schema).map(|(_, section, _)| section);
         let complete = |spans: &Vec<String>| fields.iter().all(|field| spans.contains(field));
         assert!(somewhere.chain([&report]).any(complete), "no section has all of {schema}: {fields:?}");
     }
@@ -397,8 +397,8 @@ fn measured() -> Vec<(String, Date, Vec<String>)> {
     let sections = page.split("\n## ").skip(1).map(|section| {
         let (heading, rest) = section.split_once("\n\n").unwrap();
         let line = rest.lines().next().unwrap();
-        let said = line.strip_prefix("Measured ").and_then(|line| line.split_once(": "));
-        let (date, code) = said.unwrap_or_else(|| panic!("{heading}: {line:?} must be `Measured DATE: CODE`"));
+        let parts = line.strip_prefix("Measured ").and_then(|line| line.split_once(": "));
+        let (date, code) = parts.unwrap_or_else(|| panic!("{heading}: {line:?} must be `Measured DATE: CODE`"));
         let date = date.parse().unwrap_or_else(|error| panic!("{heading}: {date}: {error}"));
         (heading.to_owned(), date, spans(code))
     });

@@ -96,9 +96,9 @@ async fn every_metric_of_the_dashboard_and_the_alerts_exists_in_a_service_in_use
     let exposition = exposition().await;
     let (panels, rules) = (panels(), rules());
     assert!(panels.len() >= 10 && rules.len() >= 5, "{} panels, {} rules", panels.len(), rules.len());
-    let asked: BTreeSet<_> = panels.iter().chain(&rules).flat_map(|expression| metrics(expression)).collect();
+    let used: BTreeSet<_> = panels.iter().chain(&rules).flat_map(|expression| metrics(expression)).collect();
     let samples: Vec<_> = exposition.lines().filter(|line| !line.starts_with('#')).collect();
-    for (name, label) in asked {
+    for (name, label) in used {
         let named = |line: &&str| line.split(['{', ' ']).next() == Some(name.as_str());
         let mut found = samples.iter().copied().filter(named).peekable();
         assert!(found.peek().is_some(), "nothing is called {name} in\n{exposition}");
@@ -137,8 +137,8 @@ fn every_alert_is_fired_by_prometheus_own_rules() {
     let Some(promtool) = promtool() else { return };
     for arguments in [["check", "rules", "docker/alerts.yaml"], ["test", "rules", "tests/data/alerts_fired.yaml"]] {
         let output = Command::new(&promtool).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
-        let said = [output.stdout, output.stderr].concat();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&said));
+        let printed = [output.stdout, output.stderr].concat();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&printed));
     }
 }
 

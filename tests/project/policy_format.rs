@@ -13,15 +13,15 @@ use serde_json::{Value, json};
 
 const HISTORY: [f64; 8] = [0.021, -0.034, 0.052, 0.043, -0.008, 0.017, 0.029, -0.011];
 
-/// What `tests/evaluate_policy.py` makes of `asked`.
-fn python(arguments: &[&str], asked: &Value) -> Value {
+/// What `tests/evaluate_policy.py` makes of `request`.
+fn python(arguments: &[&str], request: &Value) -> Value {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/evaluate_policy.py");
     let mut command = Command::new(std::env::var("PYTHON").unwrap_or("python3".into()));
     command.arg(script).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut child = command.spawn().expect("python3");
-    child.stdin.take().unwrap().write_all(asked.to_string().as_bytes()).unwrap();
+    child.stdin.take().unwrap().write_all(request.to_string().as_bytes()).unwrap();
     let output = child.wait_with_output().unwrap();
-    assert!(output.status.success(), "{asked}");
+    assert!(output.status.success(), "{request}");
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -202,8 +202,8 @@ fn another_program_finds_the_bridge_radius_with_random_numbers_of_its_own() {
         let law = problem.specification.problem.learning.law(&HISTORY);
         let measure = problem.sets.measure(&law);
         let radii = problem.sets.radii(&law, measure.radius);
-        let asked = json!({ "learning": learning, "returns": HISTORY, "alpha": alpha, "paths": paths });
-        let found = python(&["bridge"], &asked);
+        let question = json!({ "learning": learning, "returns": HISTORY, "alpha": alpha, "paths": paths });
+        let found = python(&["bridge"], &question);
         let sizes = [law.effective_size(), law.effective_sizes_ahead()[0]];
         for (which, radius, size) in [("now", radii.radius, sizes[0]), ("ahead", radii.radius_ahead, sizes[1])] {
             let number = |field: &str| found[which][field].as_f64().unwrap();

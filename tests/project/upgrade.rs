@@ -113,11 +113,11 @@ async fn every_schema_is_opened_and_advises_as_it_did() {
         Store::open(left.path()).await.unwrap().close().await;
         Inspection::of_folder(left.path()).await.unwrap().run(&mut |_| {}).await.unwrap();
         // As its backup: restored, then served.
-        let mut told = String::new();
+        let mut printed = String::new();
         let restored = app.folder().join("restored");
-        let mut tell = |line: String| told += &(line + "\n");
+        let mut tell = |line: String| printed += &(line + "\n");
         restore(&name.with_extension("sqlite"), &restored, Damage::Refused, &mut tell).await.unwrap();
-        assert!(told.contains("sessions: 2, with 4 entries") && told.contains("keys: 1"), "{told}");
+        assert!(printed.contains("sessions: 2, with 4 entries") && printed.contains("keys: 1"), "{printed}");
         app.move_to("restored").await;
 
         app.hold("");

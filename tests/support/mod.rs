@@ -418,10 +418,10 @@ pub async fn read(response: Response) -> (StatusCode, Value) {
 fn assert_described(method: &Method, path: &str, status: StatusCode) {
     let description: Value = serde_json::from_str(include_str!("../../api/openapi.json")).expect("JSON");
     let parts = |path: &str| path.split('?').next().unwrap_or("").split('/').map(str::to_owned).collect::<Vec<_>>();
-    let asked = parts(path);
+    let requested = parts(path);
     let fits = |template: &str| {
         let template = parts(template);
-        template.len() == asked.len() && template.iter().zip(&asked).all(|(t, a)| t == a || t.starts_with('{'))
+        template.len() == requested.len() && template.iter().zip(&requested).all(|(t, a)| t == a || t.starts_with('{'))
     };
     let paths = description["paths"].as_object().expect("paths");
     let mut operations = paths.iter().filter(|(template, _)| fits(template)).map(|(_, operations)| operations);

@@ -29,8 +29,8 @@ pub async fn until<T>(what: &str, mut reached: impl AsyncFnMut() -> Option<T>) -
     }
 }
 
-/// Asserts that a request sent at `asked` took no longer than `promised`.
-pub fn assert_within(promised: Duration, asked: Instant, what: &str) {
-    let taken = asked.elapsed();
-    assert!(taken < within(promised), "{what} took {taken:?}, where {promised:?} is promised");
+/// Asserts that a request sent at `started` took no longer than `promised`.
+pub fn assert_within(promised: Duration, started: Instant, what: &str) {
+    let elapsed = started.elapsed();
+    assert!(elapsed < within(promised), "{what} took {elapsed:?}, but {promised:?} is promised");
 }
