@@ -116,9 +116,9 @@ impl Tally {
                 Some("queued" | "running") => true,
                 Some("succeeded") => job["policy"] == content_hash(&undisturbed(steps)),
                 // Three may die under it before it has solved one step.
-                Some("failed") if self.deaths >= 3 => job["error"]
-                    .as_str()
-                    .is_some_and(|error| error.starts_with("its worker process ended 3 times")),
+                Some("failed") if self.deaths >= 3 => {
+                    job["error"].as_str().is_some_and(|error| error.starts_with("its worker process ended 3 times"))
+                }
                 _ => false,
             };
             if !sound {

@@ -368,7 +368,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
         "{output}"
     );
 
-    for (options, said) in [
+    for (options, complaint) in [
         ("--horizon 4", "--horizon is 4: must be left out with several assets, because nothing is trained for them"),
         ("--alpha 0.1,0.2", "--alpha is 2 levels: must be one level if there are several assets"),
         ("--window 40", "--window is 40: must be at most 24: the record has 28 periods"),
