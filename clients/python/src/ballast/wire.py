@@ -7,18 +7,24 @@ from typing import Any, Literal, TypeAlias, TypedDict
 from typing_extensions import NotRequired
 
 AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outside_design", "resolved_other_radius", "unsolved"]
-"""Where an advice came from."""
+"""How an advice was computed."""
 
 
 class Annualised(TypedDict):
-    """The problem's rate and record by the year, with p periods in one. Fractions, each at most the largest double."""
+    """Annual rate and returns of a problem, with p periods in a year. All are fractions, capped at the largest double."""
 
     rate: float
-    """What the bank pays, compounded: `(1 + r)^p - 1`."""
+    """Annual return of the bank, compounded: `(1 + r)^p - 1`."""
     mean_return: float
-    """What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history."""
+    """
+    Annual return of the asset, compounded: `m^p - 1`, with m the mean of `e^z` over the log-returns z of the
+    history.
+    """
     deviation: float
-    """Standard deviation of the history's simple returns, a sample's, of independent periods: `sqrt(p)` times that of one."""
+    """
+    Annual standard deviation of the history's simple returns, for independent periods: `sqrt(p)` times the sample
+    standard deviation of one period.
+    """
 
 
 Asset: TypeAlias = str
@@ -40,25 +46,25 @@ Window: TypeAlias = int | None
 
 
 class AssetsNow(TypedDict):
-    """What stands of a period of several assets with all corrections made."""
+    """A period of several assets after all corrections."""
 
     log_returns: NotRequired[dict[str, float]]
-    """By the names of the assets; null where they are missing."""
+    """Log-returns by asset name; null if they are missing."""
 
 
 class AssetsPeriods(TypedDict):
-    """What one strategy did, a number a period."""
+    """The decisions and results of one strategy, one number per period."""
 
     strategy: str
-    """Its name."""
+    """Name of the strategy."""
     allocations: dict[str, list[float]]
     """Share of wealth held in each asset, by its name."""
     radius: list[float]
-    """Of the ball, in log-return; 0 where there was none."""
+    """Radius of the ball, in log-return; 0 if there was none."""
     traded: list[float]
-    """Share of wealth that was bought and sold at the start."""
+    """Share of wealth that was bought and sold at the start of the period."""
     wealth: list[float]
-    """At the end, from 100."""
+    """Wealth at the end of the period, from 100."""
 
 
 ActionIntervalItem: TypeAlias = float
@@ -71,75 +77,81 @@ HistoryItem: TypeAlias = list[HistoryItemItem]
 
 
 class AuditEntry(TypedDict):
-    """One thing that was done."""
+    """One recorded action."""
 
     at_ms: int
-    """When, in milliseconds since 1970."""
+    """Time of the action, in milliseconds since 1970."""
     tenant: str
     key: NotRequired[str | None]
-    """The key's name; null where none was asked for, and of what was done by a command on the store."""
+    """Name of the key; null if no key was needed, or if a command on the store did it."""
     roles: str
     """
-    The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`. Empty for
-    `session.observe`: an observation keeps the name of the key alone.
+    Roles of the key. `anybody` if no key was needed, `operator` for a command on the store, or `service`. Empty for
+    `session.observe`, because an observation keeps only the name of the key.
     """
     action: str
     object: str
-    """What it was done to."""
+    """The object of the action."""
     outcome: str
-    """What came of it."""
+    """Result of the action."""
     number: int
-    """From 1 among the entries of its key in this tenant; of `session.observe`, among the entries of its session."""
+    """
+    Number of the entry, from 1, among those of its key in this tenant. For `session.observe`, among those of its
+    session.
+    """
     seal: str
     """
-    SHA-256 over the entry and the seal of the one before, in hexadecimal digits: a copy of it shows later that the entry and
-    all before it are what they were.
+    SHA-256 over the entry and the seal of the entry before it, in hexadecimal digits. A saved copy proves later
+    that this entry and all before it are unchanged.
     """
 
 
 class AuditPage(TypedDict):
-    """A page of the audit, newest first."""
+    """A page of the audit log, newest first."""
 
     entries: list[AuditEntry]
     next: NotRequired[int | None]
-    """Give it as `after` for the next page; null on the last."""
+    """Cursor to pass as `after` for the next page; null on the last page."""
 
 
 class BacktestIntervals(TypedDict):
     """
-    How the intervals were made: of certainty equivalents from what each year adds to them, of chances from whole years, of other figures
-    by circular blocks of what was lived, the same for all strategies.
+    How the intervals were made: for certainty equivalents from each year's contribution to them, for chances from whole
+    years, for other figures from circular blocks of the periods, the same for all strategies.
     """
 
     confidence: float
-    """Probability that an interval is meant to hold; those of differences all hold at once with it."""
+    """Intended coverage probability of an interval; intervals of differences hold simultaneously with it."""
     comparisons: int
-    """Differences from one strategy, whose intervals hold at once; those from own mixes are as many as have one."""
+    """
+    Differences from one strategy, whose intervals hold simultaneously. Differences from own mixes number as many as
+    there are strategies with one.
+    """
     resamples: int
-    """How many, where figures are resampled."""
+    """Number of resamples, for figures that are resampled."""
     period_block: int
-    """Periods of a block of them."""
+    """Periods per block in these resamples."""
     year_block: int
-    """Neighbouring years that may depend on each other."""
+    """Consecutive years that may depend on each other."""
 
 
 class BacktestPeriods(TypedDict):
-    """What one strategy did, a number a period."""
+    """The decisions and results of one strategy, one number per period."""
 
     strategy: str
-    """Its name."""
+    """Name of the strategy."""
     allocation: list[float]
-    """Share of wealth held through the period."""
+    """Share of wealth held in the period."""
     low: list[float]
-    """Lower end of the holdings that were kept as they were."""
+    """Lower end of the no-trade region."""
     high: list[float]
-    """Upper end of them."""
+    """Upper end of the no-trade region."""
     radius: list[float]
-    """Of the ball, in log-return; 0 where there was none."""
+    """Radius of the ball, in log-return; 0 if there was none."""
     traded: list[float]
-    """Share of wealth that changed between bank and asset at the start."""
+    """Share of wealth moved between bank and asset at the start of the period."""
     wealth: list[float]
-    """At the end, from 100."""
+    """Wealth at the end of the period, from 100."""
 
 
 LogReturn1: TypeAlias = float
@@ -152,126 +164,129 @@ AlphaItem: TypeAlias = float
 
 
 class BankRate(TypedDict):
-    """What the bank paid in each period, as fractions."""
+    """The rate that the bank paid in each period, as a fraction."""
 
     column: str
     """The name of the column."""
     rates: list[float]
-    """In the order of the returns."""
+    """Rates in the order of the returns."""
 
 
 class Bootstrap1(TypedDict):
-    """Independent draws of the returns seen, spread by a kernel."""
+    """Independent draws of the past returns, spread by a kernel."""
 
     bandwidth: float
-    """Deviation of the kernel over that of the record, before the variance is brought back."""
+    """Deviation of the kernel over that of the record, before the variance is restored."""
     kind: Literal["smoothed"]
 
 
 class Bootstrap2(TypedDict):
-    """The same, every return moved by as much, to where its asset's mean is the bank's: were there no premium."""
+    """The smoothed law with each asset's returns shifted so that its mean is the bank's: no premium."""
 
     bandwidth: float
-    """Deviation of the kernel over that of the record, before the variance is brought back."""
+    """Deviation of the kernel over that of the record, before the variance is restored."""
     kind: Literal["without_premium"]
 
 
 class Bootstrap3(TypedDict):
-    """Blocks of the returns seen, in a row; the last is followed by the first."""
+    """Blocks of consecutive past returns; the last is followed by the first."""
 
     length: int
-    """Periods of a block."""
+    """Periods per block."""
     kind: Literal["block"]
 
 
 Bootstrap: TypeAlias = Bootstrap1 | Bootstrap2 | Bootstrap3
-"""How records are drawn from the one at hand."""
+"""How records are drawn from the given one."""
 
 
 class BootstrapEstimate(TypedDict):
     """A figure with its interval."""
 
     value: float
-    """Of what was lived."""
+    """Value on the actual record."""
     interval: list[float]
-    """Its ends."""
+    """Lower and upper end."""
 
 
 class CareCount(TypedDict):
-    """How many sessions need care, and why; one may have several reasons."""
+    """Numbers of sessions that need care, by reason; a session may have several reasons."""
 
     sessions: int
-    """Those that are found."""
+    """Sessions that match."""
     any: int
-    """In need of care for any of the reasons."""
+    """Sessions that need care for any of the reasons."""
     overdue: int
-    """Their next report is late."""
+    """Sessions whose next report is late."""
     renewal: int
-    """They wait for their next policies."""
+    """Sessions that wait for their next policies."""
     alarm: int
-    """Their returns have changed."""
+    """Sessions whose returns have changed (drift alarm)."""
     ending: int
-    """Completed, or in their last period and not renewed by themselves."""
+    """Sessions that are completed, or in their last period without automatic renewal."""
 
 
 CareReason: TypeAlias = Literal["overdue", "renewal", "alarm", "ending"]
-"""Why a session needs care."""
+"""Reason why a session needs care."""
 
 
 CautionCode: TypeAlias = Literal["short_record", "one_return", "not_certified", "waiting"]
-"""The reasons."""
+"""The kinds of reasons."""
 
 
 class CautionLevel1(TypedDict):
-    """This share, whatever is seen: 0 takes the record for the truth."""
+    """A fixed share, from 0 to 10, independent of the record. At 0 the record is taken as the true law."""
 
     scale: float
-    """This share, whatever is seen: 0 takes the record for the truth."""
+    """A fixed share, from 0 to 10, independent of the record. At 0 the record is taken as the true law."""
 
 
 CautionLevel: TypeAlias = Literal["paper"] | Literal["bold"] | Literal["balanced"] | Literal["cautious"] | CautionLevel1
-"""The share of the radius that is acted on: a level by its name, or a number."""
+"""
+Share of the radius that is used: a named level, or a number. `bold`, `balanced` and `cautious` are found by
+simulation in three worlds: with no premium, with half of it, and with the whole of it.
+"""
 
 
 class CautionScale(TypedDict):
-    """A share of the radius and its price in the three worlds. Losses are in log certainty equivalent per step."""
+    """A share of the radius and its cost in the three worlds. Losses are in log certainty equivalent per step."""
 
     scale: float
     """Share of the radius."""
     standard_error: float
-    """Its standard error, of the simulation of records."""
+    """Standard error of the share, from the simulation of records."""
     regrets: list[float]
-    """Loss beside the best share in each of the three worlds: without a premium, with half, and with the whole."""
+    """Loss relative to the best share in each of the three worlds: without a premium, with half, and with the whole."""
     spared: float
-    """Spared beside taking the record for the truth, in the world without a premium."""
+    """Loss avoided relative to taking the record as the true law, in the world without a premium."""
 
 
 class CentreSpecification1(TypedDict):
-    """The law of the returns seen."""
+    """The empirical law of the returns seen."""
 
     kind: Literal["empirical"]
 
 
 class CentreSpecification2(TypedDict):
     """
-    The perturbed empirical law: that of a return seen plus a normal error. Its radius is that of the returns seen, of which
-    smoothing makes no more.
+    The perturbed empirical law: a return seen plus a normal error. Its radius is that of the returns seen, because
+    smoothing does not add returns.
     """
 
     bandwidth: float
-    """Standard deviation of the error, in log-return. 0 is `empirical`."""
+    """Standard deviation of the error, in log-return, 0 to 1. At 0 the centre is that of `empirical`."""
     kind: Literal["smoothed"]
 
 
 class CentreSpecification3(TypedDict):
     """
-    The law of the returns seen, each brought to the volatility that is expected for the coming period: of an exponentially
-    weighted mean of squares. Of a static ball, or for one period: what a return yet to come does to the volatility is no part of
-    a state.
+    The law of the returns seen, each rescaled to the volatility expected for the coming period. That volatility is
+    estimated by an exponentially weighted mean of squares. This needs the framework `static` or one period, because
+    the effect of later returns on the volatility is not part of a state.
     """
 
     half_life: float
-    """Periods in which the weight of a square halves."""
+    """Number of periods in which the weight of a square halves, 1 to 1e15."""
     kind: Literal["volatility_scaled"]
 
 
@@ -279,36 +294,39 @@ HistoryItem1: TypeAlias = float
 
 
 Change: TypeAlias = Literal["replace", "insert", "remove"]
-"""Changes of the periods that passed."""
+"""A change to observed periods."""
 
 
 class CompositionRule1(TypedDict):
-    """These shares, in the order of the assets, which sum to 1."""
+    """These shares, one for each asset in order; they sum to 1."""
 
     given: list[float]
-    """These shares, in the order of the assets, which sum to 1."""
+    """These shares, one for each asset in order; they sum to 1."""
 
 
 CompositionRule: TypeAlias = Literal["one_step"] | Literal["equal"] | Literal["inverse_volatility"] | CompositionRule1
-"""How the composition of the fund is chosen."""
+"""How the composition of the fund is chosen. Default: `one_step`."""
 
 
 Contributions: TypeAlias = float | list[float]
-"""C, money added at the end of each period."""
+"""
+C, the money added at the end of each period, or withdrawn if negative: one number for all periods, or a list with
+one number for each. Default 0.
+"""
 
 
 class Correct(TypedDict):
-    """A change of the periods that passed: a period is reported anew, all of it, is put in between others, or is taken out."""
+    """A change of observed periods: a period is reported again in full, inserted between others, or removed."""
 
     correction: int
     """Number of the correction, from 1."""
     period: int
-    """The period that is put right or taken out, or that the new one is put in before."""
+    """The period to correct or remove, or the one to insert before."""
     change: NotRequired[Change]
     reason: str
-    """Why, in at most 200 letters."""
+    """The reason, in at most 200 characters."""
     confirm: NotRequired[bool]
-    """The correction is meant, whatever is doubted in it."""
+    """Confirms the correction despite any doubts."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
     """`price / previous price - 1`."""
@@ -317,38 +335,38 @@ class Correct(TypedDict):
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
     log_returns: NotRequired[dict[str, float]]
-    """Of several assets, by their names; each has one."""
+    """Log-returns of several assets by name; each has one."""
     simple_returns: NotRequired[dict[str, float]]
-    """Of several assets, `price / previous price - 1` each."""
+    """`price / previous price - 1` of several assets by name."""
     prices: NotRequired[dict[str, float]]
     """Prices of several assets at the end of the period."""
     previous_prices: NotRequired[dict[str, float]]
-    """Their prices at the start of the period. Default: those reported for the period before."""
+    """Prices of several assets at the start of the period. Default: those reported for the period before."""
     missing: NotRequired[bool]
-    """In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved."""
+    """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
-    """What the bank paid in the period. Default: the policy's rate."""
+    """Rate that the bank paid in the period. Default: the policy's rate."""
     flow: NotRequired[float | None]
-    """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
+    """Money added at the end of the period; negative if withdrawn. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
-    """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    """Share of wealth held in the risky asset through the period. Default: the advised allocation."""
     executed_allocations: NotRequired[dict[str, float]]
-    """Share of wealth held in each of several assets through the period. Default: what was advised for it."""
+    """Share of wealth held in each of several assets through the period. Default: the advised allocations."""
     wealth: NotRequired[float | None]
-    """Wealth reached, with what was added, where it differs from what all of the above gives."""
+    """Wealth reached, with what was added, if it differs from what the fields above give."""
 
 
 class Costs(TypedDict):
-    """What the evaluation cost; the only part that differs between two runs."""
+    """Run times of the evaluation, the only part that differs between two runs."""
 
     training_seconds: float
     """Seconds of all trainings."""
     simulation_seconds: float
     """Seconds of the simulation."""
     resolve_seconds: NotRequired[float | None]
-    """Mean of one re-solved step; null where there was none."""
+    """Mean seconds of one re-solved step; null if there was none."""
 
 
 DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "differs_from_peers"]
@@ -356,18 +374,18 @@ DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "
 
 
 DriftLevel: TypeAlias = Literal["none", "warning", "alarm"]
-"""What the highest capital says."""
+"""The meaning of the highest value."""
 
 
 class Estimate(TypedDict):
-    """A figure and the interval around it."""
+    """A figure and its interval."""
 
     value: float
-    """The estimate itself."""
+    """The estimate."""
     low: float
-    """Lower end of its interval."""
+    """Lower end of the interval."""
     high: float
-    """Upper end of its interval."""
+    """Upper end of the interval."""
 
 
 ConstantMix: TypeAlias = float
@@ -375,44 +393,44 @@ ConstantMix: TypeAlias = float
 
 class ExpectedError(TypedDict):
     """
-    Root mean square errors of the value that a step serves, in basis points of the certainty equivalent: over the design's own law
-    of its states, at the holdings it was solved at. They say nothing of states that this law seldom visits, such as those after a
-    return beyond the record, where the value may be off by a hundred times as much, nor of the first step of a design that starts
-    at one law.
+    Root mean square errors of the value of a step, in basis points of the certainty equivalent: over the design's own
+    law of its states, at the holdings it was solved at. They do not cover states that this law seldom visits, such as
+    those after a return beyond the record, where the value may be off by a hundred times as much. Nor do they cover the
+    first step of a design that starts at one law.
     """
 
     own: float
-    """Of the surrogate of the step alone."""
+    """The error of the surrogate of the step alone."""
     total: float
-    """With those of the steps after it, as errors that are independent of each other add up."""
+    """The error with those of the steps after it, added up as independent errors."""
 
 
 Explain: TypeAlias = Literal["worst_case"]
-"""What is shown beside an allocation."""
+"""The explanation shown beside an allocation."""
 
 
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
-"""How a state becomes the inputs of a surrogate."""
+"""The map from a state to the inputs of a surrogate."""
 
 
 Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in", "parametric_static", "parametric_adaptive"]
-"""What the investor is robust against, and whether observing returns changes it."""
+"""The framework: what the advice is robust against, and whether new returns change it. Default: `adaptive`."""
 
 
 class FrontierPoint(TypedDict):
-    """What one multiple of the radius loses."""
+    """The loss at one multiple of the radius."""
 
     scale: float
-    """Of the radius."""
+    """Multiple of the radius."""
     lost: Estimate
-    """Basis points of certainty equivalent behind the best allocation, on average over records."""
+    """Basis points of certainty equivalent below the best allocation, on average over records."""
     deviation: Estimate
-    """Of that loss from record to record."""
+    """Standard deviation of that loss from record to record."""
     beyond_least: NotRequired[Estimate | None]
     beyond_own_mix: Estimate
     """
-    What the advice gains over a constant mix of its own average allocation over all records, in the unit of `lost`: at most 0, up
-    to rounding, since what an allocation is worth under one law is concave in it.
+    Gain of the advice over a constant mix of its own average allocation over all records, in the unit of `lost`. It
+    is at most 0, up to rounding, because worth under one law is concave in the allocation.
     """
     total: float
     """Share of wealth held in all assets together, on average over records."""
@@ -428,11 +446,11 @@ HistoryItem2: TypeAlias = list[HistoryItem2Item]
 
 
 GroundNorm: TypeAlias = Literal["scaled_one", "sup"]
-"""The distance between two dates' log-returns."""
+"""The distance between the log-returns of two dates. Default: `scaled_one`."""
 
 
 class Health(TypedDict):
-    """The service in a few words."""
+    """The state of the service."""
 
     status: str
     version: str
@@ -442,20 +460,20 @@ class Health(TypedDict):
 
 
 class HistoryReport(TypedDict):
-    """One initial history."""
+    """Results at one initial history."""
 
     quantile: NotRequired[float | None]
-    """The bridge quantile there; null under other radius rules than `bridge` and `calibrated`."""
+    """The bridge quantile there; null under radius rules other than `bridge` and `calibrated`."""
     radius: float
-    """Of the first framework with a ball, in log-return; 0 where there is none."""
+    """Radius of the first framework with a ball, in log-return; 0 if there is none."""
     promised: list[float]
-    """What each framework promises there: the certainty equivalent of its first advice, by its own account."""
+    """Certainty equivalent that each framework promises there, in its first advice."""
     mean_utility: list[float]
     """Mean terminal utility of each strategy, in their order."""
 
 
 Holds: TypeAlias = Literal["dates", "values", "rate", "other"]
-"""What a column holds."""
+"""The contents of a column."""
 
 
 LengthscaleItem: TypeAlias = float
@@ -468,14 +486,14 @@ NoiseVarianceItem: TypeAlias = float
 
 
 class HyperparameterBounds(TypedDict):
-    """Box of the maximum-likelihood search, for inputs and targets scaled to unit variance."""
+    """Bounds of the maximum-likelihood search, lowest first, for inputs and targets scaled to unit variance."""
 
     lengthscale: NotRequired[list[LengthscaleItem]]
-    """In standard deviations of an input over the design."""
+    """Length scales, in standard deviations of an input over the design. Default: `[0.05, 1000]`."""
     signal_variance: NotRequired[list[SignalVarianceItem]]
-    """In mean squares of the target over the design."""
+    """Signal variances, in mean squares of the target over the design. Default: `[0.001, 100000]`."""
     noise_variance: NotRequired[list[NoiseVarianceItem]]
-    """In mean squares of the target over the design."""
+    """Noise variances, in mean squares of the target over the design. Default: `[1e-10, 1]`."""
 
 
 class Imported(TypedDict):
@@ -485,25 +503,29 @@ class Imported(TypedDict):
 
 
 class InitialHistories1(TypedDict):
-    """The problem's own."""
+    """The problem's own history."""
 
     kind: Literal["given"]
 
 
 class InitialHistories2(TypedDict):
-    """So many draws from the true law, each as long as the problem's own."""
+    """Histories drawn from the true law, each as long as the problem's own."""
 
     count: int
-    """How many."""
+    """Number of histories, 2 to 1000."""
     kind: Literal["drawn"]
 
 
 InitialHistories: TypeAlias = InitialHistories1 | InitialHistories2
-"""Which histories paths start from."""
+"""Histories that paths start from."""
+
+
+InitialHistory: TypeAlias = list[float] | list[list[float]]
+"""Log-returns known at the start of a session, oldest first."""
 
 
 InitialLaws: TypeAlias = Literal["given", "resampled"]
-"""Where the design's empirical laws start."""
+"""Starting point of the design's empirical laws."""
 
 
 class Interval(TypedDict):
@@ -516,117 +538,116 @@ class Interval(TypedDict):
 
 
 JobKind: TypeAlias = Literal["train", "evaluate", "backtest", "frontier"]
-"""What a job computes."""
+"""The kind of computation that a job runs."""
 
 
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
 class KeyHolder(TypedDict):
-    """Who a call is answered to."""
+    """The caller that the key belongs to."""
 
     key: NotRequired[str | None]
-    """The key's name, which is no secret; null where the store asks for none."""
+    """Name of the key, which is no secret; null if the store needs no keys."""
     tenant: str
-    """Whose jobs, policies and sessions are answered."""
+    """Tenant whose jobs, policies and sessions the key reaches."""
     roles: list[str]
-    """What the holder may do: `read`, `operate`, `train`, `admin`. Who is an admin may do all of them."""
+    """Roles of the key: `read`, `operate`, `train`, `admin`. An admin may do everything that the others may."""
     expires_ms: NotRequired[int | None]
-    """When the key ends, in milliseconds since 1970; null where that is not set."""
+    """Expiry of the key, in milliseconds since 1970; null if it does not expire."""
 
 
 Kind: TypeAlias = Literal["simple", "log", "price", "gross", "cumulated"]
-"""What the numbers are."""
-
-
-KnownReturns: TypeAlias = list[float] | list[list[float]]
-"""Log-returns known at the start of a session, oldest first."""
+"""The kind of the numbers."""
 
 
 class Labels(TypedDict):
-    """What a policy or a session is called; each part is empty where nothing was said."""
+    """The labels of a policy or a session; a part that was not set is empty."""
 
     name: str
-    """Not necessarily of this one alone."""
+    """The name, which need not be unique."""
     notes: str
     tags: list[str]
 
 
 class Learning1(TypedDict):
-    """As much as any other."""
+    """All returns have the same weight."""
 
     kind: Literal["equal"]
 
 
 class Learning2(TypedDict):
-    """Half as much as one that is `half_life` periods newer: the law forgets what is long past."""
+    """A return has half the weight of one that is `half_life` periods newer: the law forgets the distant past."""
 
     half_life: float
-    """In periods."""
+    """Half-life, in periods, 1 to 1e15."""
     kind: Literal["decay"]
 
 
 Learning: TypeAlias = Learning1 | Learning2
-"""What a return weighs in the law that is learned: of the history and of what is seen after it alike."""
+"""Weight of a return in the learned law, for the history and for later returns alike. Default: `equal`."""
 
 
 class LeftOut(TypedDict):
     """The advice without one return."""
 
     index: int
-    """Of the return in the record, from 0; the first of equal ones."""
+    """Index of the return in the record, from 0; the first of equal ones."""
     log_return: float
-    """The return."""
+    """The return that is left out."""
     simple_return: float
-    """The same as `price / previous price - 1`."""
+    """The return as `price / previous price - 1`."""
     allocation: float
     """The share of wealth that would be advised."""
 
 
 class LevelAdvised(TypedDict):
-    """A level, its share of the radius, its price, and what it would hold."""
+    """A level, its share of the radius, its price, and its allocation."""
 
     level: CautionLevel
-    """Its name."""
+    """Name of the level."""
     scale: float
     """Share of the radius."""
     regrets: list[float]
-    """Loss of log certainty equivalent per step beside the best share of the radius, in the three worlds."""
+    """Loss of log certainty equivalent per step against the best share of the radius, in the three worlds."""
     spared: float
-    """Spared per step in the world without a premium, beside taking the record for the truth."""
+    """Gain per step in the world without a premium, against taking the record as true."""
     allocation: NotRequired[float | None]
-    """Share of wealth that it would hold; null where that would take long to find, of several assets in long records."""
+    """
+    Share of wealth that the level would hold; null if it would take long to compute, for several assets in long
+    records.
+    """
     allocation_error: NotRequired[float | None]
-    """Its standard error, of the simulation behind the level; of the level followed alone."""
+    """Standard error of the allocation, from the simulation behind the level; only for the level that is followed."""
 
 
 class LevelsAdvised(TypedDict):
     """The levels of caution on a record."""
 
     followed: CautionLevel
-    """The one followed."""
+    """The level that is followed."""
     premium_seen: float
     """Mean simple return of the record beyond the bank, per step."""
     standard_error: float
-    """Its standard error."""
+    """Standard error of this premium."""
     premiums: list[float]
     """
-    The same beyond the bank in the three worlds that losses are told for: none, half, and the whole of the premium seen, or of 0
-    where it is negative, plus its standard error.
+    Mean simple return beyond the bank in the three worlds for which losses are reported: none, half, and the whole
+    of the observed premium plus its standard error. A negative premium counts as 0.
     """
     levels: list[LevelAdvised]
-    """From the boldest to the paper's."""
+    """The levels, from the boldest to the paper's."""
 
 
 class MixtureComponent(TypedDict):
     """One normal law of a mixture, of log-returns per step."""
 
     weight: float
-    """Its probability."""
+    """Probability of the component, above 0 and at most 1."""
     mean: float
-    """In log-return."""
+    """Mean, in log-return, -1 to 1."""
     variance: float
-    """In squared log-return."""
+    """Variance, in squared log-return, 1e-12 to 1."""
 
 
 class NextAdvice(TypedDict):
@@ -635,21 +656,21 @@ class NextAdvice(TypedDict):
     quantile: float
     """Share of the record below it; interpolated between its returns (Hyndman and Fan, type 7)."""
     log_return: float
-    """The return supposed."""
+    """The hypothetical return."""
     simple_return: float
-    """The same as `price / previous price - 1`."""
+    """The return as `price / previous price - 1`."""
     allocation: float
     """The share of wealth that would be advised."""
 
 
 class Observe(TypedDict):
-    """The return of one period, given in exactly one of three ways or as missing, and what was done in it."""
+    """The return of one period, given in exactly one of three ways or as missing, and the trades in it."""
 
     session: str
     period: int
     """Number of the period, from 1."""
     confirm: NotRequired[bool]
-    """The report is meant, whatever is doubted in it."""
+    """Confirms the report despite any doubts."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
     """`price / previous price - 1`."""
@@ -658,80 +679,75 @@ class Observe(TypedDict):
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
     log_returns: NotRequired[dict[str, float]]
-    """Of several assets, by their names; each has one."""
+    """Log-returns of several assets by name; each has one."""
     simple_returns: NotRequired[dict[str, float]]
-    """Of several assets, `price / previous price - 1` each."""
+    """`price / previous price - 1` of several assets by name."""
     prices: NotRequired[dict[str, float]]
     """Prices of several assets at the end of the period."""
     previous_prices: NotRequired[dict[str, float]]
-    """Their prices at the start of the period. Default: those reported for the period before."""
+    """Prices of several assets at the start of the period. Default: those reported for the period before."""
     missing: NotRequired[bool]
-    """In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved."""
+    """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
-    """What the bank paid in the period. Default: the policy's rate."""
+    """Rate that the bank paid in the period. Default: the policy's rate."""
     flow: NotRequired[float | None]
-    """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
+    """Money added at the end of the period; negative if withdrawn. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
-    """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    """Share of wealth held in the risky asset through the period. Default: the advised allocation."""
     executed_allocations: NotRequired[dict[str, float]]
-    """Share of wealth held in each of several assets through the period. Default: what was advised for it."""
+    """Share of wealth held in each of several assets through the period. Default: the advised allocations."""
     wealth: NotRequired[float | None]
-    """Wealth reached, with what was added, where it differs from what all of the above gives."""
+    """Wealth reached, with what was added, if it differs from what the fields above give."""
 
 
 Tag: TypeAlias = str
 
 
 class OwnMix(TypedDict):
-    """The constant mix of a strategy's own average allocation, which nobody could have chosen beforehand, on the same returns."""
+    """
+    The constant mix of a strategy's own average allocation, on the same returns. Nobody could have chosen it
+    beforehand.
+    """
 
     allocation: float
-    """The average, over all periods of all paths."""
+    """The average allocation, over all periods of all paths."""
     beyond: Estimate
-    """Certainty equivalent of the strategy less that of the mix, in terminal wealth: what changing the allocation earned."""
+    """
+    Certainty equivalent of the strategy less that of the mix, in terminal wealth: the gain from changing the
+    allocation.
+    """
 
 
 class Performance(TypedDict):
-    """What a strategy was worth and how it varied; returns as fractions."""
+    """The worth of a strategy and its variation; returns are fractions."""
 
     yearly_certainty_equivalent: BootstrapEstimate
-    """Of mean utility over the whole years, each from wealth 100."""
+    """Certainty equivalent of mean utility over the whole years, each from wealth 100."""
     beyond_own_mix: NotRequired[BootstrapEstimate | None]
     annual_mean: BootstrapEstimate
-    """Mean simple return of a year, compounded: `(1 + m)^p - 1`, m the mean of a period and p the periods of a year."""
+    """Mean simple return per year, compounded: `(1 + m)^p - 1`, m the mean per period and p the periods per year."""
     annual_volatility: BootstrapEstimate
-    """Standard deviation of simple returns."""
+    """Standard deviation of simple returns, per square root of a year."""
     sharpe_ratio: BootstrapEstimate
-    """Mean excess over the bank by its deviation."""
+    """Mean excess over the bank divided by its deviation."""
     annual_turnover: BootstrapEstimate
-    """Share of wealth that is bought and sold in a year."""
+    """Share of wealth that is bought and sold per year."""
     chance_of_loss: BootstrapEstimate
-    """Share of the years, one beginning with every period, that end with less than they began with."""
+    """Share of years that end with a loss, among the years that begin with every period."""
     worst_twentieth: BootstrapEstimate
     """Mean return of the worst twentieth of these years."""
     max_drawdown: float
     """Largest fall below the highest wealth so far, as a share of it."""
     final_wealth: float
-    """From 100."""
+    """Terminal wealth, from 100."""
     mean_allocation: float
-    """Share of wealth at risk."""
+    """Mean share of wealth in the risky asset, or in all assets together."""
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
-"""What a job is doing."""
-
-
-class Place(TypedDict):
-    """Where in the text something is wrong."""
-
-    line: int
-    """From 1."""
-    column: int
-    """From 1: of the fields of the line."""
-    value: str
-    """What stands there, shortened where it is long."""
+"""The phase of a job."""
 
 
 class PolicyEntry(Labels):
@@ -740,7 +756,7 @@ class PolicyEntry(Labels):
     policy: str
     created_ms: int
     bytes: int
-    """Length of the exported document."""
+    """Length of the exported document, in bytes."""
 
 
 class PolicyPage(TypedDict):
@@ -748,26 +764,30 @@ class PolicyPage(TypedDict):
 
     policies: list[PolicyEntry]
     next: NotRequired[int | None]
-    """Give it as `after` for the next page; null on the last."""
+    """Cursor to pass as `after` for the next page; null on the last page."""
 
 
 class Premium(TypedDict):
-    """What the record pays beyond the bank, and what it would have to."""
+    """The record's mean return beyond the bank, and the mean at which the advice changes."""
 
     present: float
-    """Mean simple return of the record, by its weights, less `rate_per_step`: what it paid a period beyond what the bank pays now."""
+    """
+    Mean simple return of the record, by its weights, less `rate_per_step`: its excess per period over what the bank
+    pays now.
+    """
     needed: NotRequired[float | None]
     """
-    The same of the record with every log-return shifted by the amount at which the advice leaves the bank, to 1e-6: above
-    `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
-    highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
-    `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/solver/sensitivity.rs against that.
+    The premium after every log-return is shifted by the amount at which the advice leaves the bank, to 1e-6. It is
+    above `present` if all is in the bank now, or else below it. Null if no shift separates the two. A shift is at
+    most the distance between the lowest and the highest return, and keeps all of them in `support`. In one period
+    without trading cost the shift is `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball.
+    Checked by: tests/solver/sensitivity.rs against that.
     """
     periods_more: NotRequired[int | None]
     """
-    More returns, of the law of those seen, after which the advice leaves the bank: the least number m at which the step with
-    the radius times sqrt(n / (n + m)) advises anything. 0 where it has left already; null where it does not within 10000
-    periods, or the radius rule is `fixed`.
+    Number of further returns, of the law of the record, after which the advice leaves the bank: the least m at
+    which the step with the radius times sqrt(n / (n + m)) advises anything. 0 if it has left already; null if it
+    does not within 10000 periods, or the radius rule is `fixed`.
     """
 
 
@@ -775,34 +795,34 @@ HistoryItem3: TypeAlias = float
 
 
 class RadiusRule1(TypedDict):
-    """`scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths."""
+    """`scale Q / sqrt(n)`, with Q the (1 - alpha)-quantile of the bridge statistic over simulated paths."""
 
     alpha: NotRequired[float]
-    """Miscoverage, the probability that the ball misses the true law."""
+    """Miscoverage: the probability that the ball misses the true law, 0.001 to 0.999. Default 0.1."""
     paths: NotRequired[int]
-    """Simulated paths."""
+    """Number of simulated paths, 100 to 100,000. Default 2000."""
     scale: NotRequired[float]
-    """A factor on the radius."""
+    """Factor on the radius, 0 to 100. Default 1."""
     correction: NotRequired[float | None]
     """
-    By what every simulated quantile is multiplied, so that that of the history is exact: found, never asked for. What a
-    request says here is found anew.
+    Factor on every simulated quantile that makes the quantile of the history exact. The service computes it and
+    replaces any value in a request.
     """
     rule: Literal["bridge"]
 
 
 class RadiusRule2(TypedDict):
     """
-    That of `bridge` times a factor found once, from the history: with it, the balls of a share 1 - alpha of records drawn from the
-    smoothed law of the history hold that law.
+    The radius of `bridge` times a factor found once, from the history. For records drawn from the smoothed law of
+    the history, a share 1 - alpha of the balls with this factor contain that law.
     """
 
     alpha: NotRequired[float]
-    """Miscoverage."""
+    """Miscoverage, 0.01 to 0.999. Default 0.1."""
     paths: NotRequired[int]
-    """Simulated paths."""
+    """Number of simulated paths, 100 to 100,000. Default 2000."""
     scale: NotRequired[float]
-    """One more factor on the radius."""
+    """Further factor on the radius, 0 to 100. Default 1."""
     rule: Literal["calibrated"]
 
 
@@ -810,11 +830,11 @@ class RadiusRule3(TypedDict):
     """`sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin."""
 
     alpha: NotRequired[float]
-    """Miscoverage."""
+    """Miscoverage, 0.001 to 0.999. Default 0.1."""
     C: float
-    """C of the inequality."""
+    """Constant C of the inequality, from `alpha` to 1e9."""
     c: float
-    """c of the inequality, per squared log-return."""
+    """Constant c of the inequality, per squared log-return, 1e-9 to 1e12."""
     rule: Literal["concentration"]
 
 
@@ -822,33 +842,34 @@ class RadiusRule4(TypedDict):
     """`kappa / sqrt(n)`."""
 
     kappa: float
-    """In log-return."""
+    """kappa, in log-return, 0 to 100."""
     rule: Literal["root_n"]
 
 
 class RadiusRule5(TypedDict):
-    """The same radius at every sample size."""
+    """A fixed radius at every sample size."""
 
     radius: float
-    """In log-return."""
+    """Radius, in log-return, 0 to 10."""
     rule: Literal["fixed"]
 
 
 class RadiusRule6(TypedDict):
     """
-    `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
-    of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    `sqrt(kappa / n)` estimated standard deviations, with kappa the (1 - alpha)-quantile of chi-square with two
+    degrees of freedom. The region is `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, with m and v the
+    sample's mean and variance.
     """
 
     alpha: NotRequired[float]
-    """Miscoverage."""
+    """Miscoverage, 0.001 to 1. Default 0.1."""
     rule: Literal["chi_square"]
 
 
 RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5 | RadiusRule6
 """
-How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
-confidence region, every other of the Wasserstein ball.
+Rule by which the radius of the uncertainty set follows from the sample of size n. `chi_square` is for the
+confidence region of the parametric frameworks, every other rule for the Wasserstein ball.
 """
 
 
@@ -856,70 +877,61 @@ class RadiusSpread(TypedDict):
     """The radius over paths."""
 
     mean: float
-    """Over paths, in log-return, as all below."""
+    """Mean over paths; all fields are in log-return."""
     quantile_10: float
-    """A tenth of the paths have less."""
+    """Value below which a tenth of the paths lie."""
     quantile_50: float
     """The median."""
     quantile_90: float
-    """Nine tenths of the paths have less."""
+    """Value below which nine tenths of the paths lie."""
     first_path: float
-    """On the first path."""
+    """Radius on the first path."""
 
 
 RateUnit: TypeAlias = Literal["fraction", "percent", "unused"]
-"""What the rates of the bank are counted in, where a column tells them."""
+"""The unit of the bank's rates, if a column holds them."""
 
 
 Rates: TypeAlias = float | list[float]
-"""What the bank pays in each period."""
-
-
-class Reading3(TypedDict):
-    """It is none."""
-
-    sentence: str
-    """What is wrong, and where."""
-    place: NotRequired[Place | None]
-    outcome: Literal["refused"]
+"""Return of the bank in each period."""
 
 
 class Relabel(TypedDict):
-    """A change of labels: what is absent stays, what is null or empty is cleared."""
+    """A change of labels: an absent field stays, a null or empty one is cleared."""
 
     name: NotRequired[str | None]
     """At most 100 letters, without control characters."""
     notes: NotRequired[str | None]
-    """At most 2,000 letters, without control characters but line breaks."""
+    """At most 2,000 letters, without control characters except line breaks."""
     tags: NotRequired[list[Tag] | None]
-    """At most 20, each another, of 1 to 50 letters without control characters."""
+    """At most 20 distinct tags, each of 1 to 50 letters without control characters."""
 
 
 class Renew(TypedDict):
-    """The policy that a session goes on by."""
+    """A request to continue a session with another policy."""
 
     renewal: int
     """Number of the renewal, from 1."""
     policy: str
     """The next policy."""
     window: NotRequired[int | None]
-    """Returns that the law is made of, the last ones. Default: all that were seen."""
+    """Number of last returns that the law is made of. Default: all observed returns."""
 
 
 RenewalState: TypeAlias = Literal["due", "training", "failed", "trained"]
 
 
 class Renewing(TypedDict):
-    """How a session is renewed by itself."""
+    """How a session renews itself."""
 
     every: int
-    """Periods by one policy, until the next is trained; fewer than its horizon."""
+    """Periods with one policy until the next is trained; fewer than its horizon."""
     window: NotRequired[int | None]
-    """Returns that the next policy is trained on, the last ones. Default: all that were seen."""
+    """Number of last returns that the next policy is trained on. Default: all observed returns."""
 
 
 class Report(TypedDict):
-    """What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it."""
+    """The record of a period: its return, given in exactly one of three ways or as missing, and the trades in it."""
 
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
@@ -929,45 +941,45 @@ class Report(TypedDict):
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
     log_returns: NotRequired[dict[str, float]]
-    """Of several assets, by their names; each has one."""
+    """Log-returns of several assets by name; each has one."""
     simple_returns: NotRequired[dict[str, float]]
-    """Of several assets, `price / previous price - 1` each."""
+    """`price / previous price - 1` of several assets by name."""
     prices: NotRequired[dict[str, float]]
     """Prices of several assets at the end of the period."""
     previous_prices: NotRequired[dict[str, float]]
-    """Their prices at the start of the period. Default: those reported for the period before."""
+    """Prices of several assets at the start of the period. Default: those reported for the period before."""
     missing: NotRequired[bool]
-    """In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved."""
+    """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
-    """What the bank paid in the period. Default: the policy's rate."""
+    """Rate that the bank paid in the period. Default: the policy's rate."""
     flow: NotRequired[float | None]
-    """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
+    """Money added at the end of the period; negative if withdrawn. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
-    """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    """Share of wealth held in the risky asset through the period. Default: the advised allocation."""
     executed_allocations: NotRequired[dict[str, float]]
-    """Share of wealth held in each of several assets through the period. Default: what was advised for it."""
+    """Share of wealth held in each of several assets through the period. Default: the advised allocations."""
     wealth: NotRequired[float | None]
-    """Wealth reached, with what was added, where it differs from what all of the above gives."""
+    """Wealth reached, with what was added, if it differs from what the fields above give."""
 
 
 Reports: TypeAlias = Observe | list[Observe]
-"""One report, or a list of reports of as many sessions."""
+"""One report, or a list of reports, each for another session."""
 
 
-class Resampled(TypedDict):
+class ResampledFrontier(TypedDict):
     """The frontier on records drawn from one law."""
 
     bootstrap: Bootstrap
-    """How they were drawn."""
+    """How the records were drawn."""
     best: list[float]
-    """The best allocation for who knows the law: the share of wealth in each asset."""
+    """The best allocation under the known law: the share of wealth in each asset."""
     points: list[FrontierPoint]
-    """Scale by scale."""
+    """Results scale by scale."""
 
 
-class Return(TypedDict):
+class ReturnAndLog(TypedDict):
     """A return in both units."""
 
     log_return: float
@@ -980,25 +992,25 @@ class SamplingLaw1(TypedDict):
     """A mixture of normal laws."""
 
     components: list[MixtureComponent]
-    """At least one; their weights sum to 1."""
+    """Components of the mixture, 1 to 32; their weights sum to 1."""
     kind: Literal["gaussian_mixture"]
 
 
 class SamplingLaw2(TypedDict):
-    """Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives."""
+    """Smoothed bootstrap of the history with the weights of its returns, with the same weighted mean and variance."""
 
     kind: Literal["bootstrap"]
 
 
 class SamplingLaw3(TypedDict):
-    """A Student t law, moved and stretched."""
+    """A Student t law, shifted and scaled."""
 
     location: float
-    """Its mean, in log-return per step."""
+    """Mean, in log-return per step, -1 to 1."""
     scale: float
-    """What a standard t variable is multiplied by, in log-return."""
+    """Factor on a standard t variable, in log-return, 1e-6 to 1."""
     degrees_of_freedom: float
-    """Above 2: its variance is finite."""
+    """Degrees of freedom, 2.1 to 1e6: above 2 the variance is finite."""
     kind: Literal["student_t"]
 
 
@@ -1006,60 +1018,61 @@ SamplingLaw: TypeAlias = SamplingLaw1 | SamplingLaw2 | SamplingLaw3
 """A law of log-returns that can be drawn from."""
 
 
-SessionState: TypeAlias = Literal["active", "waiting", "completed"]
+SessionStatus: TypeAlias = Literal["active", "waiting", "completed"]
 
 
 class Spread(TypedDict):
     """Mean and quantiles over paths."""
 
     mean: float
-    """Over paths."""
+    """Mean over paths."""
     quantile_10: float
-    """A tenth of the paths have less."""
+    """Value below which a tenth of the paths lie."""
     quantile_90: float
-    """Nine tenths of the paths have less."""
+    """Value below which nine tenths of the paths lie."""
 
 
 StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"]
-"""A kind of strategy that walks through a record, which decides its colour and its sentences."""
+"""A kind of strategy in a walk-forward, which decides its colour and its sentences."""
 
 
 class Support1(TypedDict):
     """
-    From `min(factor z_min, m - 5 s)` to `max(factor z_max, m + 5 s)`, z_min and z_max the worst and the best log-return of the
-    law in the middle, m and s its mean and standard deviation; never narrower than from z_min to z_max.
+    From `min(factor z_min, m - 5 s)` to `max(factor z_max, m + 5 s)`, with z_min and z_max the worst and the best
+    log-return of the ball's centre, and m and s its mean and standard deviation. Never narrower than from z_min to
+    z_max.
     """
 
     factor: NotRequired[float]
-    """Multiple of the worst and the best log-return, 1 to 10."""
+    """Multiple of the worst and the best log-return, 1 to 10. Default 2."""
     rule: Literal["worst_seen"]
 
 
 class Support2(TypedDict):
-    """All log-returns: the paper's."""
+    """All log-returns, as in the paper."""
 
     rule: Literal["none"]
 
 
 class Support3(TypedDict):
-    """Those between two bounds, whatever is seen."""
+    """The log-returns between two bounds, whatever returns are seen."""
 
     min: float
-    """The lowest."""
+    """The lowest log-return, at least -20."""
     max: float
-    """The highest."""
+    """The highest log-return, at most 20."""
     rule: Literal["between"]
 
 
 Support: TypeAlias = Support1 | Support2 | Support3
 """
-The log-returns that the laws in a ball may give mass to. Part of the law, as its radius is: under `worst_seen` it follows the
-returns seen so far.
+The log-returns that the laws in a ball may give mass to. They depend on the law, as its radius does: under
+`worst_seen` they follow the returns seen so far.
 """
 
 
 class SurrogateDiagnostics(TypedDict):
-    """A fitted surrogate in figures."""
+    """The figures of a fitted surrogate."""
 
     features: list[str]
     """Names of the inputs, in the order of the lengthscales."""
@@ -1070,7 +1083,7 @@ class SurrogateDiagnostics(TypedDict):
     noise_variance: float
     """In units of the target's variance over the design."""
     log_likelihood_per_point: float
-    """Of the scaled targets, at the hyperparameters found."""
+    """Log likelihood of the scaled targets, at the hyperparameters found."""
     leave_one_out_error: float
     """Root mean square of the leave-one-out errors, in the target's own unit."""
     jitter: float
@@ -1080,7 +1093,7 @@ class SurrogateDiagnostics(TypedDict):
 
 
 SurrogateTarget: TypeAlias = Literal["floor_gain", "value"]
-"""What the value surrogate regresses."""
+"""The quantity that the value surrogate regresses."""
 
 
 SweepRange = TypedDict(
@@ -1094,92 +1107,104 @@ SweepRange = TypedDict(
 
 
 class Terms(TypedDict):
-    """Rate, cost and flows of the periods that a policy is lived by, and how its law is learned."""
+    """Rate, cost and flows of the periods in which a policy is followed, and how its law is learned."""
 
     horizon: int
-    """T, periods."""
+    """T, the number of periods."""
     rate_per_step: float
-    """r, simple return of the bank per step."""
+    """r, the simple return of the bank per step, as a fraction."""
     trading_cost: float
-    """c, of what is traded."""
+    """c, the trading cost, as a share of the amount traded."""
     contributions: Contributions
-    """C, money added at the end of each period."""
+    """C, the money added at the end of each period; negative if it is withdrawn."""
     learning: Learning
-    """What older returns weigh."""
+    """Weights of older returns in the learned law."""
     periods_per_year: NotRequired[float | None]
-    """By which a period without a day takes the next one due."""
+    """Number of periods in a year. A period reported without a date gets the next due date, found from this number."""
+
+
+class TextPosition(TypedDict):
+    """The place of an error in the text."""
+
+    line: int
+    """Line, from 1."""
+    column: int
+    """Field of the line, from 1."""
+    value: str
+    """The value at this place, shortened if it is long."""
 
 
 class TransportedMass(TypedDict):
-    """Mass of one atom and where the adversary puts it."""
+    """Mass of one atom and the adversary's destination for it."""
 
     atom: float
     """Log-return of the centre; an observed one, unless `problem.centre` says otherwise."""
     moved_to: float
-    """Log-return in the worst case; equal to `atom` where the mass stays."""
+    """Log-return in the worst case; equal to `atom` if the mass stays."""
     mass: float
-    """A probability."""
+    """The mass, a probability."""
 
 
 class Uncertainty(TypedDict):
-    """The uncertainty set of a state, in figures."""
+    """The figures of a state's uncertainty set."""
 
     sample_size: int
-    """Returns seen, those of the history among them."""
+    """Number of returns observed, including the history."""
     effective_size: float
-    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
+    """Effective sample size; equal to `sample_size` if `learning` is `equal`."""
     moments: list[float]
-    """Raw moments of the law learned, first to the specification's count."""
+    """Raw moments of the learned law, from the first to the specification's count."""
     quantile: NotRequired[float | None]
     """
-    (1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`. Under `bridge`
-    it is exact for the history of the policy, and simulated in proportion to that after returns were learned.
+    (1 - alpha)-quantile of the bridge statistic; absent under radius rules other than `bridge` and `calibrated`.
+    Under `bridge` it is exact for the history of the policy. After more returns it is simulated in proportion to
+    that value.
     """
     radius: float
-    """As in an advice."""
+    """The radius, as in an advice."""
 
 
 Unit: TypeAlias = Literal["fraction", "percent"]
-"""What returns are counted in."""
+"""The unit of returns."""
 
 
 class UtilityReport(TypedDict):
-    """Terminal utility."""
+    """Statistics of terminal utility."""
 
     mean: Estimate
-    """Over paths."""
+    """Mean over paths."""
     variance: Estimate
-    """Over paths."""
+    """Variance over paths."""
     quantile_20: Estimate
-    """A fifth of the paths end with less."""
+    """Value below which a fifth of the paths end."""
     quantile_90: Estimate
-    """Nine tenths of the paths end with less."""
+    """Value below which nine tenths of the paths end."""
     max: float
-    """Of the paths of one history, averaged over histories; an extreme has no interval."""
+    """Largest value over the paths of one history, averaged over histories; an extreme has no interval."""
     min: float
-    """Of the paths of one history, averaged over histories; an extreme has no interval."""
+    """Smallest value over the paths of one history, averaged over histories; an extreme has no interval."""
 
 
 class UtilitySpecification1(TypedDict):
-    """`(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth. Exactly one of its fields is given."""
+    """Exponential utility, `(1 - exp(-risk_aversion x)) / risk_aversion`. Exactly one of its fields is given."""
 
     risk_aversion: NotRequired[float]
-    """Absolute, per unit of wealth."""
+    """Absolute risk aversion, per unit of wealth, 1e-18 to 1e9."""
     risk_aversion_relative: NotRequired[float | None]
-    """The same times the initial wealth, without unit; a completed specification has the absolute one."""
+    """Risk aversion times initial wealth, without unit, 0.001 to 100. Completion replaces it by the absolute one."""
     kind: Literal["exponential"]
 
 
 class UtilitySpecification2(TypedDict):
-    """`(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1."""
+    """Power utility, `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`."""
 
     risk_aversion: float
-    """Relative, without unit."""
+    """Relative risk aversion, without unit, above 1 and at most 100."""
     kind: Literal["power"]
 
 
 class UtilitySpecification3(TypedDict):
-    """`ln x`."""
+    """Log utility, `ln x`."""
 
     kind: Literal["log"]
 
@@ -1189,60 +1214,60 @@ UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 
 
 
 WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high"]
-"""What is warned of."""
+"""Kind of a warning."""
 
 
 class WealthReport(TypedDict):
-    """Terminal wealth, and how it came to be."""
+    """Statistics of terminal wealth and of its course."""
 
     mean: Estimate
-    """Over paths."""
+    """Mean over paths."""
     quantile_20: Estimate
-    """A fifth of the paths end with less."""
+    """Value below which a fifth of the paths end."""
     quantile_90: Estimate
-    """Nine tenths of the paths end with less."""
+    """Value below which nine tenths of the paths end."""
     max: float
-    """Of the paths of one history, averaged over histories; an extreme has no interval."""
+    """Largest value over the paths of one history, averaged over histories; an extreme has no interval."""
     min: float
-    """Of the paths of one history, averaged over histories; an extreme has no interval."""
+    """Smallest value over the paths of one history, averaged over histories; an extreme has no interval."""
     worst_twentieth: Estimate
     """The mean of the worst twentieth of the paths."""
     histogram: list[int]
-    """Counts of the bins between `wealth_edges`, without the paths that end as all in the bank does."""
+    """Counts of the bins between `wealth_edges`, without the paths that end with the wealth of all in the bank."""
     at_bank: int
-    """Paths that end as all in the bank does, to a billionth of it."""
+    """Number of paths that end with the wealth of all in the bank, to a billionth of it."""
     chance_of_loss: Estimate
-    """Share of the paths that end with less than was put in: the initial wealth and all contributions."""
+    """Share of the paths that end below the initial wealth plus all contributions."""
     max_drawdown: Estimate
     """
-    Mean over paths of the largest fall on the way below the highest so far, as a share of it; what is added or withdrawn is
-    neither gain nor fall.
+    Mean over paths of the largest fall below the highest value so far, as a share of it. Contributions and
+    withdrawals are neither gain nor fall.
     """
 
 
 class WhyNothing(TypedDict):
-    """Why an advice holds nothing: of several assets by the fund of inverse volatilities."""
+    """Why an advice holds nothing. For several assets, the figures are those of the inverse-volatility fund."""
 
     premium_seen: float
     """Mean simple return of the record beyond the bank, per step."""
     standard_error: float
-    """Its standard error."""
+    """Standard error of this premium."""
     premium_left: NotRequired[float | None]
     """
-    The least that it is under the laws in the ball: 0 or less, unless what is bought or sold costs something. Null of several
-    assets, of each of which `worst_means` tells it.
+    The least mean excess return under the laws in the ball: 0 or less, unless trading costs something. Null for
+    several assets, for which `worst_means` gives it asset by asset.
     """
     at_half_the_caution: NotRequired[float | None]
-    """Share of wealth that would be held within half of the radius, in all assets together; null where the radius is not simulated."""
+    """Share of wealth held within half of the radius, in all assets together; null if the radius is not simulated."""
 
 
 class WithoutOne(TypedDict):
     """
     The range of the advice over the records that lack one return.
 
-    Each distinct return is left out in turn. Of a record of more than 360, or of fewer where a step takes long, the returns that move
-    the advice the most are: those furthest from the mean by their weight, and others evenly between by their rank. Checked by:
-    tests/solver/sensitivity.rs against leaving out every one.
+    Each distinct return is left out in turn. Fewer are left out in a record of more than 360, or if a step takes long:
+    those that move the advice the most. These are the returns furthest from the mean by their weight, and others spread
+    evenly by rank. Checked by: tests/solver/sensitivity.rs against leaving out every one.
     """
 
     lowest: LeftOut
@@ -1250,192 +1275,216 @@ class WithoutOne(TypedDict):
     highest: LeftOut
     """The highest advice, and the return whose absence gives it."""
     tried: int
-    """Returns left out in turn."""
+    """Number of returns left out in turn."""
 
 
 class WorstLawSummary(TypedDict):
-    """The worst-case law in figures, of log-returns."""
+    """The figures of the worst-case law of log-returns."""
 
     mean: float
-    """Per step."""
+    """Mean per step."""
     standard_deviation: float
-    """Per root of a step."""
+    """Standard deviation per square root of a step."""
     share_moved: NotRequired[float | None]
-    """Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen."""
+    """
+    Share of the probability that moves; absent if laws are normal, because none is a transport of the observed
+    returns.
+    """
     lowest_destination: NotRequired[float | None]
-    """Lowest log-return that mass moves to; absent where none moves."""
+    """Lowest log-return that mass moves to; absent if none moves."""
 
 
 class WorstMean(TypedDict):
     """The mean of an asset's log-return."""
 
     seen: float
-    """Of those seen."""
+    """The mean of the log-returns seen."""
     worst: float
-    """Under the worst law."""
+    """The mean under the worst law."""
 
 
 class WorstNormalLaw(TypedDict):
     """The worst mean and variance of the log-return of one period, within the confidence region of the estimates."""
 
     mean: float
-    """Of the log-return, per step."""
+    """Worst mean of the log-return, per step."""
     variance: float
-    """Of the log-return, per step."""
+    """Worst variance of the log-return, per step."""
     estimated_mean: float
-    """As the returns seen say, per step."""
+    """Mean estimated from the returns, per step."""
     estimated_variance: float
-    """As the returns seen say, per step."""
+    """Variance estimated from the returns, per step."""
 
 
 class Advice(TypedDict):
-    """The robust allocation for the coming period and what it is worth."""
+    """The robust allocation for the coming period and its worth."""
 
     allocation: float
-    """Share of wealth to hold in the risky asset: the holding, brought to the nearer end of the band."""
+    """Share of wealth to hold in the risky asset: the nearest point of the band to the holding."""
     holding: float
     """Share of wealth in the risky asset before trading."""
     band: list[float]
-    """The holdings that are best kept as they are; where trading costs nothing both ends are the allocation."""
+    """
+    The no-trade region: holdings that are best kept as they are. If trading costs nothing, both ends are the
+    allocation.
+    """
     trade: float
-    """The allocation less the holding: the share of wealth to buy, or where it is negative to sell."""
+    """The allocation less the holding: the share of wealth to buy, or to sell if negative."""
     contribution: float
-    """Money added at the end of the period, withdrawn where it is negative."""
+    """Money added at the end of the period, or withdrawn if negative."""
     certainty_equivalent: float
     """Certainty equivalent of the robust value, in terminal wealth."""
     floor: float
     """
-    Terminal wealth of selling everything now and staying in the bank, with all that is added and withdrawn until then: no
-    law can take it away.
+    Terminal wealth if everything is sold now and stays in the bank, with all later contributions and withdrawals.
+    No law can take it away.
     """
     radius: float
     """
-    Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
-    of the confidence region in the mean, in estimated standard deviations of a return.
+    Radius of the uncertainty set. For the Wasserstein ball it is in log-return. In the parametric frameworks it is
+    half the width of the confidence region in the mean, in estimated standard deviations of a return.
     """
     sample_size: int
-    """Returns seen, those of the history among them."""
+    """Number of returns observed, including the history."""
     effective_size: float
-    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
+    """Effective sample size; equal to `sample_size` if `learning` is `equal`."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
-    """Whether the state lies where the surrogates were trained."""
+    """True if the state lies within the region where the surrogates were trained."""
     source: AdviceSource
-    """How it was found."""
+    """How the advice was computed."""
 
 
 class AssetsBacktestRequest(TypedDict):
-    """A walk-forward through a record of several assets, by the one-step problem and by rules that people use."""
+    """A walk-forward through a record of several assets. It compares the one-step problem with rules that people use."""
 
     assets: list[Asset]
-    """Names of the assets, each another, in the order of the columns."""
+    """Names of the assets, 2 to 30, all different, in the order of the columns."""
     log_returns: NotRequired[list[LogReturn] | None]
-    """Of the assets, date by date, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
+    """
+    Log-returns of the assets, oldest first, without gaps; each period has one value for each asset. Exactly one of
+    this and `simple_returns` is given.
+    """
     simple_returns: NotRequired[list[SimpleReturn] | None]
-    """`price / previous price - 1`, likewise."""
+    """Simple returns of the assets, `price / previous price - 1`, in the same layout as `log_returns`."""
     rate: Rates
-    """What the bank pays a period, as a fraction: one number for all, or one for each."""
+    """Return of the bank per period, as a fraction from -0.5 to 0.5: one number for all periods, or one for each."""
     dates: list[str]
-    """One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`."""
+    """Date of each period, evenly spaced: `2008-01-31`, `2008-01` or `2008`."""
     periods_per_year: NotRequired[int | None]
-    """Default: what `dates` tell."""
+    """Number of periods in a year, 1 to 366. Default: derived from `dates`."""
     windows: NotRequired[list[Window] | None]
-    """How many of the last periods strategies know; null is all since the first. Default: 10 years, 20 years and all."""
+    """
+    Numbers of most recent periods that strategies know; null stands for all periods since the first. Default: 10
+    years, 20 years and all.
+    """
     every: NotRequired[int | None]
-    """Periods from one measuring of the radius, and one choice of the static strategy, to the next. Default: a year of them."""
+    """
+    Number of periods between estimates of the radius, and between choices of the static strategy. Default: one
+    year.
+    """
     alpha: NotRequired[float | None]
-    """Miscoverage of the radius. Default: 0.1."""
+    """Miscoverage of the radius, 0.001 to 0.999: the probability that the ball misses the true law. Default 0.1."""
     support: NotRequired[Support]
-    """The log-returns of each asset that the adversary may use."""
+    """The log-returns of each asset that the adversary may use. Default: `worst_seen`."""
     risk_aversion: NotRequired[float]
-    """Relative: 1 is log utility."""
+    """Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3."""
     trading_cost: NotRequired[float]
-    """Lost of what is traded, as a share of it; no strategy knows of it."""
+    """Trading cost, as a share of the amount traded, 0 to 0.1. No strategy takes it into account. Default 0."""
     seed: NotRequired[int]
-    """The same request and seed give the same report, bit for bit."""
+    """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
 
 
 class AssetsChoices(TypedDict):
-    """How a record of several assets is walked through."""
+    """The choices of a walk-forward of several assets."""
 
     windows: list[int | None]
-    """Periods that strategies know; null is all since the first."""
+    """Numbers of past periods that strategies know; null means all since the first."""
     every: int
-    """Periods from one measuring of the radius, and one choice of the static strategy, to the next."""
+    """Periods from one measurement of the radius, and one choice of the static strategy, to the next."""
     alpha: float
     """Miscoverage of the radius."""
     support: Support
     """The log-returns of each asset that the adversary may use."""
     risk_aversion: float
-    """Relative."""
+    """Relative risk aversion."""
     trading_cost: float
-    """Lost of what is traded, as a share of it."""
+    """Share of each trade that is lost."""
     seed: int
-    """Of the bridges and of the resamples."""
+    """Seed of the bridges and of the resamples."""
 
 
 class AssetsFigures(Performance):
-    """One strategy in figures."""
+    """The figures of one strategy."""
 
     strategy: str
-    """Its name."""
+    """Name of the strategy."""
     kind: StrategyKind
-    """Its kind."""
+    """Kind of the strategy."""
     place: int
-    """Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it."""
+    """Its rank by `yearly_certainty_equivalent`, 1 for the best; equal ones share it."""
     beyond_equal: NotRequired[BootstrapEstimate | None]
     effective_assets: NotRequired[float | None]
-    """`(sum a)^2 / sum a^2`, the mean over the periods in which anything is held; null where nothing ever is."""
+    """`(sum a)^2 / sum a^2`, averaged over the periods in which anything is held; null if nothing ever is."""
     mean_allocations: dict[str, float]
     """Share of wealth in each asset, by its name."""
 
 
 class AssetsProblem(TypedDict):
-    """What is known of several assets, and the investor who may hold them."""
+    """The investor, several assets, and what is known of their returns."""
 
     assets: list[Asset]
-    """Names of the assets, each another, in the order of the columns of `history`."""
+    """Names of the assets, 2 to 30, all different, in the order of the columns of `history`."""
     ground_norm: NotRequired[GroundNorm]
-    """What moving a law costs the adversary."""
+    """Distance that sets the adversary's cost of moving a law. Default: `scaled_one`."""
     composition: NotRequired[CompositionRule]
-    """How the shares of the assets in what is held are chosen, period after period."""
+    """How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`."""
     horizon: NotRequired[int | None]
-    """Number of decisions that a policy is trained for. Default: 10 of a policy, 1 of an advice."""
+    """
+    Number of allocation decisions that a policy is trained for, 1 to 520. Default: 10 for a policy; always 1 for
+    advice.
+    """
     rate_per_step: float
-    """Bank return per step, as a fraction."""
+    """Return of the bank per step, as a fraction, -0.5 to 0.5."""
     periods_per_year: NotRequired[float | None]
-    """Periods of the history in a year: what is said a year is said with it. It changes no advice."""
+    """
+    Number of periods of the history in a year, 1 to 366. It is used for annual figures and does not change the
+    advice.
+    """
     initial_wealth: NotRequired[float]
-    """Wealth, in any currency."""
+    """Initial wealth, in any currency, 1e-6 to 1e15. Default 100."""
     action_interval: NotRequired[list[ActionIntervalItem]]
-    """Share of wealth that may be held in all assets together: `[0, highest]`."""
+    """Share of wealth that may be held in all assets together: `[0, highest]`. Default: `[0, 1]`."""
     trading_cost: NotRequired[float]
-    """Lost of what is moved between the bank and any asset, as a share of it. An advice takes it under power and log utility."""
+    """
+    Cost of moving money between the bank and any asset, as a share of the amount moved, 0 to 0.1. Default 0. Advice
+    accepts a cost under power and log utility only.
+    """
     contributions: NotRequired[Contributions]
-    """Money added at the end of each period, withdrawn where it is negative; none of an advice."""
+    """Money added at the end of each period, or withdrawn if negative. Default 0. Advice accepts no other value."""
     risk_aversion: NotRequired[float | None]
-    """Relative risk aversion, in the place of `utility`: log utility at 1, power utility above."""
+    """Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above."""
     utility: NotRequired[UtilitySpecification]
-    """Of wealth at the horizon. Default: power utility, risk aversion 3."""
+    """Utility of wealth at the horizon. Default: power utility with risk aversion 3."""
     radius: NotRequired[RadiusRule | None]
     caution: NotRequired[CautionLevel | None]
     support: NotRequired[Support | None]
     history: list[HistoryItem]
-    """Log-returns, date by date, oldest first; each date has one for each asset."""
+    """Log-returns by date, oldest first, 2 to 2000 dates; each date has one value for each asset."""
 
 
 class BacktestFigures(Performance):
-    """One strategy in figures."""
+    """The figures of one strategy."""
 
     strategy: str
-    """Its name."""
+    """Name of the strategy."""
     kind: StrategyKind
-    """Its kind."""
+    """Kind of the strategy."""
     hindsight: bool
-    """Whether it was chosen with what only the end could tell."""
+    """True if it was chosen with knowledge of the whole record."""
     place: NotRequired[int | None]
-    """Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it. Null in hindsight."""
+    """Its rank by `yearly_certainty_equivalent`, 1 for the best; equal ones share it. Null in hindsight."""
     adaptive_ahead: BootstrapEstimate
     """The certainty equivalent of the main adaptive strategy less that of this one."""
     all_bank_share: float
@@ -1446,182 +1495,189 @@ class Caution(TypedDict):
     """A reason to be careful with an advice."""
 
     code: CautionCode
-    """For programs."""
+    """Code for programs."""
     sentence: str
-    """For people."""
+    """Sentence for people."""
 
 
 class CautionLevels(TypedDict):
-    """The shares of the radius that the levels act on, and what each costs, found from the record."""
+    """The share of the radius at each level and its cost, found from the record."""
 
     premiums: list[float]
     """
-    Mean simple returns beyond the bank, per step, that the three worlds are supposed to have: none, half, and one of the
-    premium seen, or 0 where it is negative, plus its standard error.
+    Mean simple return in excess of the bank, per step, in each of the three worlds: none, half, and the whole of a
+    premium. That premium is the premium seen, or 0 if that is negative, plus its standard error.
     """
     premium_seen: float
-    """Premium seen: the mean simple return of the record beyond the bank, per step."""
+    """Premium seen: the mean simple return of the record in excess of the bank, per step."""
     standard_error: float
-    """Its standard error."""
+    """Standard error of the premium seen."""
     bold: CautionScale
-    """Least worst regret, double regret in the world of the whole premium."""
+    """The level `bold`: least worst regret, with double regret in the world with the whole premium."""
     balanced: CautionScale
-    """Least worst regret."""
+    """The level `balanced`: least worst regret."""
     cautious: CautionScale
-    """Least worst regret, double regret in the world without a premium."""
+    """The level `cautious`: least worst regret, with double regret in the world without a premium."""
     paper: CautionScale
-    """The whole radius."""
+    """The level `paper`: the whole radius."""
 
 
 class CentreSpecification4(TypedDict):
     """
-    The law of the returns seen, mixed with one that counts as so many more. Exactly one of `law` and `history` is given. With n
-    returns seen the radius is theirs times n / (n + weight): the ball allows for what they may miss. That returns are drawn from
-    the law given is the user's assumption, and the ball does not allow for its error.
+    The law of the returns seen, mixed with an assumed law that counts as additional returns. Exactly one of `law`
+    and `history` is given. With n returns seen the radius is theirs times n / (n + weight): the ball allows for
+    what they may miss. The assumed law is the user's assumption, and the ball does not allow for its error.
     """
 
     law: NotRequired[SamplingLaw | None]
     history: NotRequired[list[HistoryItem1] | None]
-    """As log-returns, all of the same weight: of another market, or of a longer record."""
+    """The assumed law as log-returns of equal weight, from another market or a longer record: 2 to 20,000 values."""
     weight: float
-    """Returns that the law given counts as. 0 is `empirical`."""
+    """Number of returns that the assumed law counts as, 0 to 1,000,000. At 0 the centre is that of `empirical`."""
     kind: Literal["mixed"]
 
 
 CentreSpecification: TypeAlias = CentreSpecification1 | CentreSpecification2 | CentreSpecification3 | CentreSpecification4
-"""The law in the middle of the ball, made of the law of the returns seen: those of the history and those seen after it alike."""
+"""The centre of the ball of laws, built from the returns seen: those of the history and those seen later."""
 
 
 class Choices(TypedDict):
-    """What is said of a text; what is left out follows from it, or is asked."""
+    """Choices about a text. A choice that is left out is inferred from the text, or asked for."""
 
     columns: NotRequired[list[str]]
-    """A column of returns or prices, by its name or its number from 1; several of them are several assets"""
+    """A column of returns or prices, by its name or its number from 1; several columns are several assets"""
     kind: NotRequired[Kind | None]
     unit: NotRequired[Unit | None]
     rate_unit: NotRequired[RateUnit | None]
     day_first: NotRequired[bool | None]
-    """Whether 01/02/2020 is the first of February, and not the second of January"""
+    """If true, 01/02/2020 is the first of February; if false, the second of January"""
     newest_first: NotRequired[bool | None]
-    """Whether the first row is the newest, where no dates tell"""
+    """If true, the first row is the newest; used only if no dates are understood"""
     decimal_comma: NotRequired[bool | None]
-    """Whether a comma is the decimal mark"""
+    """If true, a comma is the decimal mark"""
     comma_parts: NotRequired[bool | None]
-    """Whether a comma parts numbers, and is not within them"""
+    """If true, a comma separates numbers; if false, it is part of a number"""
     one_record: NotRequired[bool | None]
-    """Whether numbers in several columns are one record, line by line"""
+    """If true, numbers in several columns are one record, read line by line"""
     gaps: NotRequired[bool | None]
-    """Whether a record from which periods are missing is taken as it is, without the rows that have no number"""
+    """If true, a record with missing periods is accepted as it is, without the rows that have no number"""
     unusual: NotRequired[bool | None]
     """
-    Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year
-    beyond chance, or a return far from all others
+    If true, numbers that are unusual for an asset are right: a deviation above 30 % a period or 150 % a year, a
+    mean above 100 % a year beyond chance, or a return far from all others
     """
     excess: NotRequired[bool | None]
-    """Whether the returns are those beyond the bank, to which what its column says is added"""
+    """If true, the returns are in excess of the bank's, and the rates in its column are added"""
     latest: NotRequired[int | None]
-    """How many of the last returns count; all of them unless given"""
+    """Number of the latest returns to use; all of them by default"""
 
 
 class ColumnFound(TypedDict):
     """A column that was found."""
 
     name: str
-    """Its heading, or its number; empty where the text is one run of numbers."""
+    """The heading of the column, or its number; empty if the text is one run of numbers."""
     holds: Holds
-    """What it holds."""
+    """The contents of the column."""
 
 
 class CoverageAtSize(TypedDict):
     """How often the ball held the true law at one sample size."""
 
     sample_size: int
-    """Returns known then."""
+    """Number of returns known."""
     covered: Estimate
-    """Share of the paths."""
+    """Share of paths whose ball held the true law."""
 
 
 class DesignSpecification(TypedDict):
-    """Which states the surrogates are trained on."""
+    """The states that the surrogates are trained on."""
 
     accuracy: NotRequired[float | None]
     """
-    Basis points of the certainty equivalent by which the value served may be off, as a root mean square over the states of a
-    step, the errors of the steps after it included. Design points are added until fresh states say that it is reached.
-    Default 0.5 where there is no `count`; where the state is wealth alone, `count` decides.
+    Target accuracy of the value served, in basis points of the certainty equivalent, 0.01 to 100. It bounds the
+    root mean square error over the states of a step, including the errors of later steps. Design points are added
+    until fresh states show that the target is reached. Default 0.5 if there is no `count`. If the state is wealth
+    alone, `count` decides.
     """
     count: NotRequired[int | None]
-    """Design points per step, N; with an `accuracy`, at most. Default 1000; 200 where the state is wealth alone."""
+    """
+    Number of design points per step, N, 10 to 10,000; with an `accuracy`, the largest number. Default 1000, or 200
+    if the state is wealth alone.
+    """
     initial_laws: NotRequired[InitialLaws]
-    """Where the empirical laws of the design start."""
+    """Starting point of the design's empirical laws. Default: `given`."""
     sampling_law: NotRequired[SamplingLaw | None]
     wealth: NotRequired[Interval | None]
 
 
 class Difference(TypedDict):
-    """A paired difference to the reference."""
+    """A paired difference from the reference."""
 
     utility: Estimate
-    """Of mean terminal utility."""
+    """Difference of mean terminal utility."""
     certainty_equivalent: Estimate
-    """Of the certainty equivalent, in terminal wealth."""
+    """Difference of certainty equivalents, in terminal wealth."""
 
 
 class Doubt(TypedDict):
-    """Something in a report that is most likely a slip."""
+    """Something in a report that is probably a mistake."""
 
     reason: DoubtReason
     field: str
     """Dotted path of the field."""
     value: Any
-    """Content of the field."""
+    """Value of the field."""
     sentence: str
     """The doubt, in one sentence."""
     missing: NotRequired[list[str]]
-    """Last days of the periods missing before the one reported, unless they are more than 120."""
+    """Last days of the periods missing before the reported one, unless they are more than 120."""
 
 
 class Drift(TypedDict):
     """
-    A bet that the order of the returns means something. It wins where new returns lie further from the median of all than those
+    A bet that the order of the returns matters. It wins if new returns lie further from the median of all than those
     before them did: their volatility or their mean has changed.
     """
 
     p_value: NotRequired[float | None]
-    """Of the last return: how much of the record lies as far from its median. Null where none was observed."""
+    """P-value of the last return: the share of the record that lies as far from its median. Null if none was observed."""
     capital: float
-    """What a capital of 1 has become, at most 1e12."""
+    """The value of the test martingale, which starts at 1; at most 1e12."""
     highest: float
-    """The most that it ever was: of sessions where nothing changes, a share of at most 1 / c ever sees c."""
+    """Its highest value so far. If nothing changes, at most a share 1 / c of sessions ever reaches c."""
     level: DriftLevel
-    """By the highest: `warning` from 20 on, `alarm` from 100 on."""
+    """Level of the highest value: `warning` from 20 on, `alarm` from 100 on."""
 
 
 class FundSpecification(TypedDict):
-    """What a policy for several assets knows beside the problem of their fund, whose shares are those of inverse volatilities."""
+    """
+    The data of a policy for several assets, beside the problem of their fund. The shares of that fund are proportional
+    to inverse volatilities.
+    """
 
     assets: list[Asset]
-    """Names of the assets."""
+    """Names of the assets, 2 to 30, all different."""
     ground_norm: GroundNorm
-    """What moving a law costs the adversary."""
+    """Distance that sets the adversary's cost of moving a law."""
     composition: CompositionRule
-    """How the shares of the assets in what is held are chosen."""
+    """How the shares of the assets within the risky holdings are chosen."""
     radius_factor: float
     """
-    What the radius of one fund was multiplied by, for laws of all funds to lie in their balls at once: the scale of the
-    problem's radius holds it. 1 under rules that look at the sample size alone.
+    Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100. The scale
+    of the problem's radius includes it. It is 1 under rules that depend on the sample size alone.
     """
     history: list[HistoryItem2]
-    """Log-returns, date by date, oldest first; each date has one for each asset."""
+    """Log-returns by date, oldest first; each date has one value for each asset."""
 
 
 class JobProgress(TypedDict):
-    """How far a job is."""
+    """The progress of a job."""
 
     steps_done: int
     steps_total: int
     step: NotRequired[int | None]
-    """The step being solved; steps are solved from the last to the first. Null in a simulation."""
+    """Step being solved; steps are solved from the last to the first. Null in a simulation."""
     phase: NotRequired[Phase | None]
     points_done: NotRequired[int | None]
     """Design points solved, or paths simulated, in this step."""
@@ -1631,90 +1687,93 @@ class JobProgress(TypedDict):
 
 class NextReturn(TypedDict):
     """
-    What one more return would change.
+    The effect of one more return.
 
-    Returns are tried from the lowest of the record less half the distance between its extremes to the highest and half of it
-    more, within `support` where there is one: at 49 of them, evenly, and between neighbours of which one is advised an end of
-    the action interval and the other is not, by halving, to 1e-6. The advice need not rise with the return, for one far out
-    widens the radius whichever side it lies on: of several crossings the one nearest to the median is told, and a pair of them
-    between two neighbours is missed. Checked by: tests/solver/sensitivity.rs on a finer grid.
+    Returns are tried over the range of the record, extended by half its width on both sides, within `support` if there
+    is one. 49 are evenly spaced. If an end of the action interval is advised at only one of two adjacent returns, the
+    crossing is located by bisection to 1e-6. The advice need not rise with the return, because an extreme return on
+    either side widens the radius. Of several crossings the one nearest to the median is reported; two crossings between
+    adjacent returns are missed. Checked by: tests/solver/sensitivity.rs on a finer grid.
     """
 
     range: list[float]
     """The lowest and the highest log-return tried."""
-    to_bank: NotRequired[Return | None]
-    to_highest: NotRequired[Return | None]
+    to_bank: NotRequired[ReturnAndLog | None]
+    to_highest: NotRequired[ReturnAndLog | None]
     low: NextAdvice
-    """After a return at the 5 % quantile of the record."""
+    """Advice after a return at the 5 % quantile of the record."""
     high: NextAdvice
-    """After a return at the 95 % quantile of the record."""
+    """Advice after a return at the 95 % quantile of the record."""
 
 
 class Now(TypedDict):
-    """A period with all corrections made."""
+    """A period after all corrections."""
 
     reported: NotRequired[Report | None]
     log_return: NotRequired[float | None]
-    """Null where it is missing."""
+    """Null if it is missing."""
     assets: NotRequired[AssetsNow | None]
     advised_allocation: float
-    """What would have been advised for it."""
+    """The allocation that would have been advised for it."""
     executed_allocation: float
     wealth: float
     """Wealth at its end."""
     holding: float
-    """Share of it in the risky asset."""
+    """Share of wealth in the risky asset."""
     date: NotRequired[str | None]
-    """Its last day, where it is known."""
+    """Its last day, if it is known."""
     radius: float
-    """Radius of the uncertainty set after it, in the unit of an advice's."""
+    """Radius of the uncertainty set after it, in the unit of an advice's radius."""
 
 
 class OneStep(TypedDict):
     """The one-step problem of several assets, by their names."""
 
     allocation: dict[str, float]
-    """Shares of wealth that are best for who looks one period ahead."""
+    """Shares of wealth that are best when looking one period ahead."""
     certainty_equivalent: float
-    """Wealth for certain after the period that they are worth against the worst law: at least this."""
+    """Lower bound on the certain wealth after the period that is worth as much as they are against the worst law."""
     bound: float
     """No allocation is worth more than this."""
     worst_means: dict[str, WorstMean]
-    """What the worst law makes of each asset."""
+    """The mean of each asset under the worst law."""
     caution: NotRequired[list[Caution]]
-    """What to know before the allocation is followed; left out where there is nothing."""
+    """Warnings to read before following the allocation; left out if there are none."""
 
 
 class OpenSession(TypedDict):
     """A session to open."""
 
     policy: str
-    """The policy to live by."""
-    history: NotRequired[KnownReturns | None]
+    """The policy to use."""
+    history: NotRequired[InitialHistory | None]
     wealth: NotRequired[float | None]
-    """Default: the policy's initial wealth."""
+    """Wealth at the start. Default: the policy's initial wealth."""
     holding: NotRequired[float | None]
     """Share of wealth in the risky asset at the start. Default: 0."""
     holdings: NotRequired[dict[str, float]]
     """Share of wealth in each of several assets at the start, by their names. Default: 0."""
     renew: NotRequired[Renewing | None]
     rolling: NotRequired[bool]
-    """Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false."""
+    """
+    If true, the first step of a policy with decaying learning advises every period, for up to 5200 periods.
+    Default: false.
+    """
     name: NotRequired[str | None]
-    """What the session is called, in at most 100 letters."""
+    """Name of the session, at most 100 letters."""
     notes: NotRequired[str | None]
-    """At most 2,000 letters."""
+    """Notes, at most 2,000 letters."""
     tags: NotRequired[list[Tag] | None]
-    """At most 20, each another, of 1 to 50 letters."""
+    """Tags: at most 20, all different, of 1 to 50 letters each."""
 
 
 class PeriodReport(TypedDict):
     """One period over all paths."""
 
     period: int
-    """From 1."""
+    """Number of the period, from 1."""
     sample_size: int
-    """Returns known at its start."""
+    """Number of returns known at its start."""
     allocation: Spread
     """Share of wealth held in the risky asset."""
     all_bank_share: float
@@ -1722,7 +1781,7 @@ class PeriodReport(TypedDict):
     radius: NotRequired[RadiusSpread | None]
 
 
-class Problem(TypedDict):
+class ProblemDocument(TypedDict):
     """A problem document (RFC 9457)."""
 
     type: str
@@ -1730,67 +1789,88 @@ class Problem(TypedDict):
     title: str
     status: int
     detail: str
-    """This occurrence, in one sentence."""
+    """This occurrence of the problem, in one sentence."""
     field: NotRequired[str | None]
-    """Dotted path of the offending field, header or parameter; every problem that the client can mend names it."""
+    """The invalid field (as a dotted path), header or parameter; every problem that the client can correct names it."""
     value: NotRequired[Any]
-    """What the field held."""
+    """Value that the field had."""
     rule: NotRequired[str | None]
-    """What the field must be."""
+    """Rule that the field must satisfy."""
     doubts: NotRequired[list[Doubt] | None]
-    """All that is doubted in a report; with `confirm` it is recorded."""
+    """Everything in a report that is probably a mistake; sent again with `confirm`, the report is recorded."""
 
 
 class ProblemSpecification(TypedDict):
     """The investor, the asset, and what is known of its returns."""
 
     framework: NotRequired[Framework]
-    """What the investor is robust against."""
+    """The framework: what the advice is robust against. Default: `adaptive`."""
     horizon: NotRequired[int]
-    """Number of allocation decisions, T."""
+    """Number of allocation decisions, T, 1 to 520. Default 10."""
     rate_per_step: float
-    """Bank return per step, r, as a fraction: wealth in the bank grows by the factor 1 + r. 3 % a year are 0.00247 a month."""
+    """
+    Return of the bank per step, r, as a fraction, -0.5 to 0.5: wealth in the bank grows by the factor 1 + r. For
+    example, 3 % a year is 0.00247 a month.
+    """
     periods_per_year: NotRequired[float | None]
-    """Periods of the history in a year, 12 where they are months: what is said a year is said with it. It changes no advice."""
+    """
+    Periods of the history in a year, 1 to 366; 12 for months. Used for annual figures; it does not change the
+    advice.
+    """
     initial_wealth: NotRequired[float]
-    """x_0, in any currency."""
+    """Initial wealth, x_0, in any currency, 1e-6 to 1e15. Default 100."""
     action_interval: NotRequired[list[ActionIntervalItem]]
-    """Share of wealth that may be held in the risky asset: `[0, highest]`."""
+    """Share of wealth that may be held in the risky asset: `[0, highest]`. Default: `[0, 1]`."""
     trading_cost: NotRequired[float]
-    """Lost of what is moved between bank and asset, as a share of it, both ways alike."""
+    """Cost of moving money either way between bank and asset, as a share of it: 0, or 1e-9 to 0.1. Default 0."""
     contributions: NotRequired[Contributions]
-    """Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers."""
+    """Money added at the end of each period, or withdrawn if negative: one number, or `horizon` numbers. Default 0."""
     risk_aversion: NotRequired[float | None]
-    """Relative risk aversion, in the place of `utility`: log utility at 1, power utility above."""
+    """Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above."""
     utility: NotRequired[UtilitySpecification]
-    """Of terminal wealth. Default: power utility, risk aversion 3."""
+    """Utility of terminal wealth. Default: power utility with risk aversion 3."""
     learning: NotRequired[Learning]
-    """What older returns weigh in the law that is learned."""
+    """Weights of older returns in the learned law. Default: `equal`."""
     centre: NotRequired[CentreSpecification]
-    """What the ball is centred on. `known_law` and the parametric frameworks, which have no ball, take no other than the default."""
+    """
+    Centre of the ball. Default: `empirical`. `known_law` and the parametric frameworks have no ball, so they accept
+    only the default.
+    """
     radius: NotRequired[RadiusRule | None]
     caution: NotRequired[CautionLevel | None]
     levels: NotRequired[CautionLevels | None]
     support: NotRequired[Support | None]
     law: NotRequired[SamplingLaw | None]
     history: list[HistoryItem3]
-    """The log-returns observed before the start, at least two of them distinct."""
+    """
+    The log-returns observed before the start, oldest first: 2 to 20,000 values from -5 to 5, at least two of them
+    distinct.
+    """
 
 
 class ReadReturns(TypedDict):
-    """A text, and what is said of it."""
+    """A text with returns, and the choices for reading it."""
 
     text: str
-    """As it was pasted, or stands in a file: at most 8 MB."""
+    """The text as pasted or read from a file: at most 8 MB."""
     choices: NotRequired[Choices]
-    """Nothing at first, then the answers to what is asked."""
+    """Empty at first, then the answers to the questions about the text."""
+
+
+class Reading3(TypedDict):
+    """The text is no record."""
+
+    sentence: str
+    """A sentence that says what is wrong, and where."""
+    place: NotRequired[TextPosition | None]
+    outcome: Literal["refused"]
 
 
 class RenewalDue(TypedDict):
-    """Where a renewal is that is due."""
+    """A due renewal and its progress."""
 
     renewal: int
-    """Its number."""
+    """Number of the renewal."""
     state: RenewalState
     job: NotRequired[str | None]
     """The job that trains the policy, or last did; null before there is one."""
@@ -1801,33 +1881,33 @@ class RenewalDue(TypedDict):
 
 
 class Sensitivity(TypedDict):
-    """How near an advice is to changing."""
+    """How close an advice is to changing."""
 
     without_one: NotRequired[WithoutOne | None]
     next_return: NextReturn
-    """With one more return."""
+    """Effect of one more return."""
     premium: Premium
-    """With another mean, and with more returns like those seen."""
+    """Effect of another mean, and of more returns like those in the record."""
 
 
 class Series(TypedDict):
     """Returns of one asset."""
 
     column: str
-    """The name of its column; empty where the text is one run of numbers."""
+    """The name of its column; empty if the text is one run of numbers."""
     kind: Kind
-    """What the column holds."""
+    """The kind of the numbers in the column."""
     unit: NotRequired[Unit | None]
     log_returns: list[float]
-    """Returns as the service takes them."""
+    """Log-returns, as the service accepts them."""
     mean: float
     """Mean of the simple returns of a period."""
     deviation: float
-    """Their standard deviation."""
+    """Standard deviation of the simple returns of a period."""
     mean_per_year: NotRequired[float | None]
-    """Mean of a year, compounded: `(1 + mean)^p - 1` of p periods."""
+    """Mean per year, compounded: `(1 + mean)^p - 1` with p periods a year."""
     deviation_per_year: NotRequired[float | None]
-    """Deviation times the square root of the periods of a year."""
+    """Deviation times the square root of the periods in a year."""
 
 
 class SessionEntry(Labels):
@@ -1835,40 +1915,41 @@ class SessionEntry(Labels):
 
     session: str
     policy: str
-    """The one that advises the coming period."""
+    """The policy that advises the coming period."""
     policy_name: str
-    """What that is called; empty where it is called nothing."""
+    """Name of that policy; empty if it has none."""
     periods_per_year: NotRequired[float | None]
-    """Of that policy, where it says."""
+    """Periods a year of that policy; null if it gives none."""
     period: int
     """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
     """The last period that the policy advises."""
-    state: SessionState
+    state: SessionStatus
     initial_wealth: float
     wealth: float
     holding: float
     """Share of wealth in the risky asset, before trading."""
     wealth_change: NotRequired[float | None]
-    """Change of wealth by the last period; null before the first."""
+    """Change of wealth in the last period; null before the first."""
     date: NotRequired[str | None]
-    """The last day that was reported."""
+    """Last day that was reported."""
     last_report_ms: NotRequired[int | None]
-    """When it last reported a period, or put one right."""
+    """Time of the last report or correction, in milliseconds since 1970."""
     next: NotRequired[str | None]
     """
-    The last day on which its next report is not overdue, by how many periods a year its policy has: a period after the last day
-    reported, else after the day, in UTC, of the last report or of its opening. Null where that is not known, or it is completed.
+    Last day on which the next report is not overdue, by the policy's periods a year. It is one period after the
+    last day reported. If no day was reported, it counts from the day, in UTC, of the last report or of the opening.
+    Null if this is not known, or the session is completed.
     """
     care: list[CareReason]
-    """Why it needs care, where it does."""
+    """Reasons why the session needs care; empty if it needs none."""
     deviation: NotRequired[float | None]
     """
-    Standard deviation of the log-returns learned; of several assets, of their fund. Null before the first report, or where the
-    policy tells fewer than two moments.
+    Standard deviation of the log-returns learned so far; for several assets, those of their fund. Null before the
+    first report, or if the policy reports fewer than two moments.
     """
     drift: DriftLevel
-    """Whether the returns still come as they came."""
+    """Evidence that the returns have changed."""
     created_ms: int
 
 
@@ -1878,25 +1959,25 @@ class SessionPage(TypedDict):
     sessions: list[SessionEntry]
     damaged: list[str]
     """
-    Sessions of this page that are not what was written: nothing of them is shown, and a call for one gets 500 until an
+    Sessions of this page whose stored data is damaged. They are not shown, and a call for one gets 500 until an
     operator has restored it.
     """
     total: NotRequired[int | None]
-    """Sessions that match, on all pages together; null unless `count` asks for it."""
+    """Sessions that match, over all pages; null unless `count` requests it."""
     care: NotRequired[CareCount | None]
     next: NotRequired[str | None]
-    """Give it as `after` for the next page; null on the last."""
+    """Cursor to pass as `after` for the next page; null on the last page."""
 
 
 class StepDiagnostics(TypedDict):
-    """How well a step was solved."""
+    """Diagnostics of how well a step was solved."""
 
     step: int
-    """Periods observed before it."""
+    """Periods observed before this step."""
     design_count: int
     """Design points solved."""
     all_bank_share: float
-    """Share of the design points at which the robust allocation of who holds nothing yet is zero."""
+    """Share of the design points at which the robust allocation without previous holdings is zero."""
     uncertified_share: float
     """Share of the design points whose window could not be certified: mass might want to leave it."""
     duality_gap: float
@@ -1910,20 +1991,23 @@ class StepDiagnostics(TypedDict):
 
 
 class SurrogateSpecification(TypedDict):
-    """How the surrogates are made."""
+    """Settings of the surrogates."""
 
     target: NotRequired[SurrogateTarget]
-    """What the value surrogate regresses."""
+    """The quantity that the value surrogate regresses. Default: `floor_gain`."""
     features: NotRequired[FeatureMap]
-    """What the surrogates see of a state."""
+    """The features of a state that the surrogates use. Default: `standardized`."""
     moment_count: NotRequired[int]
-    """Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more."""
+    """
+    Number of moments of the law among the features, 1 to 6. The parametric frameworks use at most two, because a
+    normal law has no more. Default 4.
+    """
     bounds: NotRequired[HyperparameterBounds]
-    """Where the hyperparameters are searched."""
+    """Bounds of the hyperparameter search."""
 
 
 class Sweep(TypedDict):
-    """Exactly one range."""
+    """The swept range, exactly one."""
 
     holding: NotRequired[SweepRange | None]
     log_return: NotRequired[SweepRange | None]
@@ -1934,23 +2018,23 @@ class Sweep(TypedDict):
 
 
 class Train(TypedDict):
-    """A training: its specification, and what its policy is to be called, which is no part of that."""
+    """A training: its specification, and the labels of its policy, which are no part of the specification."""
 
     problem: ProblemSpecification
-    """What the investor is and may do."""
+    """Decision problem of the investor."""
     fund: NotRequired[FundSpecification | None]
     design: NotRequired[DesignSpecification]
-    """Where the surrogates are trained."""
+    """States at which the surrogates are trained."""
     surrogate: NotRequired[SurrogateSpecification]
-    """How the surrogates are made."""
+    """Construction of the surrogates."""
     seed: NotRequired[int]
-    """The same specification and seed give the same policy, bit for bit."""
+    """Seed of the training: equal specifications and seeds give equal policies, bit for bit."""
     name: NotRequired[str | None]
-    """What the policy is to be called, in at most 100 letters."""
+    """Name of the policy, at most 100 letters."""
     notes: NotRequired[str | None]
-    """At most 2,000 letters."""
+    """Notes, at most 2,000 letters."""
     tags: NotRequired[list[Tag] | None]
-    """At most 20, each another, of 1 to 50 letters."""
+    """Tags: at most 20, all different, of 1 to 50 letters each."""
 
 
 class TrainAssets(TypedDict):
@@ -1959,17 +2043,17 @@ class TrainAssets(TypedDict):
     problem: AssetsProblem
     """The assets and the investor."""
     design: NotRequired[DesignSpecification]
-    """Where the surrogates are trained; laws start resampled."""
+    """States at which the surrogates are trained; the initial laws are resampled."""
     surrogate: NotRequired[SurrogateSpecification]
-    """How the surrogates are made."""
+    """Construction of the surrogates."""
     seed: NotRequired[int]
-    """The same request and seed give the same policy, bit for bit."""
+    """Seed of the training: equal requests and seeds give equal policies, bit for bit."""
     name: NotRequired[str | None]
-    """What the policy is to be called, in at most 100 letters."""
+    """Name of the policy, at most 100 letters."""
     notes: NotRequired[str | None]
-    """At most 2,000 letters."""
+    """Notes, at most 2,000 letters."""
     tags: NotRequired[list[str] | None]
-    """At most 20, each another, of 1 to 50 letters."""
+    """Tags: at most 20, all different, of 1 to 50 letters each."""
 
 
 TrainQuestion: TypeAlias = Train | TrainAssets
@@ -1977,18 +2061,18 @@ TrainQuestion: TypeAlias = Train | TrainAssets
 
 
 class Warning(TypedDict):
-    """Something in a sound request that may be a mistake."""
+    """Something in a valid request that may be a mistake."""
 
     code: WarningCode
-    """What is warned of."""
+    """Kind of the warning."""
     field: str
-    """Dotted path in the request."""
+    """Dotted path of the field in the request."""
     message: str
-    """What it holds, what that means, and what it should hold if something else was meant, in sentences."""
+    """The value, what it means, and what the field should hold if something else was meant, in sentences."""
 
 
 class WhatIf(TypedDict):
-    """What is supposed of a session. What is not given stays as it is."""
+    """A hypothesis about a session. Fields left out stay as they are."""
 
     session: str
     wealth: NotRequired[float | None]
@@ -1998,40 +2082,41 @@ class WhatIf(TypedDict):
     radius_scale: NotRequired[float | None]
     """Factor on the radius of the uncertainty set of the period advised; later periods keep their own."""
     radius: NotRequired[float | None]
-    """That radius itself, in the unit of an advice's."""
+    """The radius itself, in the unit of an advice's radius."""
     log_return: NotRequired[float | None]
-    """Return of the coming period, the advised allocation held through it; the advice is for the period after."""
+    """Return of the coming period, through which the advised allocation is held; the advice is for the period after."""
     simple_return: NotRequired[float | None]
-    """The same as `price / previous price - 1`."""
+    """The return as `price / previous price - 1` instead."""
     holdings: NotRequired[dict[str, float]]
-    """Of several assets, by their names, each of which has one: share of wealth in it now, before trading."""
+    """Share of wealth in each of several assets now, before trading, by name; each has one."""
     log_returns: NotRequired[dict[str, float]]
-    """Of several assets, returns of the coming period, in one of three ways; the advice is for the period after."""
+    """Returns of several assets in the coming period, in one of three ways; the advice is for the period after."""
     simple_returns: NotRequired[dict[str, float]]
-    """The same as `price / previous price - 1`."""
+    """The returns as `price / previous price - 1` instead."""
     prices: NotRequired[dict[str, float]]
     """Prices of several assets at the end of the coming period."""
     previous_prices: NotRequired[dict[str, float]]
-    """Their prices at its start. Default: those reported for the period before."""
+    """Prices of several assets at its start. Default: those reported for the period before."""
     explain: NotRequired[Explain | None]
     sweep: NotRequired[Sweep | None]
 
 
 class WorstCase(TypedDict):
     """
-    The law that is worst for the advised allocation: a transport of the ball's centre, or, in the parametric frameworks, a
-    normal law.
+    The law that is worst for the advised allocation: a transport of the ball's centre or, in the parametric frameworks,
+    a normal law.
     """
 
     multiplier: float
     """Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius."""
     radius_cost: float
     """
-    The same in log certainty equivalent: the slope at this radius, of this period's ball alone. A wider ball costs at most that
-    times what it is wider by, and at most all that the advice is worth above the floor.
+    Loss of log certainty equivalent per unit of extra radius: the slope at this radius, for this period's ball
+    alone. A wider ball costs at most this times the extra radius, and at most the whole worth of the advice above
+    the floor.
     """
     transport: list[TransportedMass]
-    """Empty in the parametric frameworks."""
+    """The transport of mass; empty in the parametric frameworks."""
     normal: NotRequired[WorstNormalLaw | None]
     duality_gap: float
     """Difference between primal and dual value, in log certainty equivalent; 0 in the parametric frameworks."""
@@ -2039,47 +2124,36 @@ class WorstCase(TypedDict):
     """The worst case in one plain sentence."""
 
 
-class Action(Advice):
-    """The robust allocation of one asset for the coming period."""
-
-    session: str
-    period: int
-    worst_case: NotRequired[WorstCase | None]
-    caution: list[Caution]
-    """What to know before the advice is followed."""
-    sensitivity: NotRequired[Sensitivity | None]
-
-
 class Advise(TypedDict):
-    """A question for one period."""
+    """A request for one-period advice."""
 
     problem: ProblemSpecification
-    """As in a training, for a horizon of 1, which may be left out."""
+    """The problem as in a training. Its horizon must be 1 and may be left out."""
     wealth: NotRequired[float | None]
     """Wealth now. Default: the problem's initial wealth."""
     holding: NotRequired[float | None]
     """Share of wealth in the risky asset now, before trading. Default: 0."""
     seed: NotRequired[int]
-    """Of the simulated bridges."""
+    """Seed of the simulated bridges."""
     sensitivity: NotRequired[bool]
-    """Whether to say how near the advice is to changing."""
+    """If true, say how near the advice is to changing."""
 
 
 class AdviseAssets(TypedDict):
-    """A question for one period of several assets."""
+    """A request for one-period advice on several assets."""
 
     problem: AssetsProblem
     """The assets and the investor."""
     wealth: NotRequired[float | None]
     """Wealth now. Default: the problem's initial wealth."""
     holdings: NotRequired[dict[str, float]]
-    """Share of wealth in each asset now, before trading, by its name. Default: nothing of any."""
+    """Share of wealth in each asset now, before trading, by its name. Default: 0 for each."""
     seed: NotRequired[int]
-    """Of the simulated bridges."""
+    """Seed of the simulated bridges."""
 
 
 AdviseQuestion: TypeAlias = Advise | AdviseAssets
-"""A question about one asset, or about several, which `problem.assets` names."""
+"""A request about one asset, or about several, which `problem.assets` names."""
 
 
 class Advised(Advice):
@@ -2087,62 +2161,76 @@ class Advised(Advice):
 
     worst_case: WorstCase
     caution: list[Caution]
-    """What to know before the advice is followed."""
+    """Points to know before following the advice."""
     levels: NotRequired[LevelsAdvised | None]
     why_nothing: NotRequired[WhyNothing | None]
     sensitivity: NotRequired[Sensitivity | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
-    """What in the question may be a mistake."""
+    """Parts of the request that may be a mistake."""
 
 
 class Answer(TypedDict):
     """One answer to a question."""
 
     label: str
-    """In words."""
+    """The answer in words."""
     choices: Choices
-    """What to add to `choices`."""
+    """The choices to add to `choices`."""
     sentence: NotRequired[str | None]
-    """What would be read, where that is one thing."""
+    """The record that this answer would give, in a sentence, if it gives one."""
+
+
+class AssetAction(Advice):
+    """The robust allocation of one asset for the coming period."""
+
+    session: str
+    period: int
+    worst_case: NotRequired[WorstCase | None]
+    caution: list[Caution]
+    """Points to know before you follow the advice."""
+    sensitivity: NotRequired[Sensitivity | None]
 
 
 class AssetsAdvice(TypedDict):
-    """What to hold of several assets through the coming period."""
+    """The allocation over several assets through the coming period."""
 
     allocation: dict[str, float]
     """Share of wealth in each asset; the rest is in the bank."""
     trade: dict[str, float]
-    """The allocation less the holdings: shares of wealth to buy, or where they are negative to sell."""
+    """The allocation less the holdings: shares of wealth to buy, or to sell if negative."""
     composition: dict[str, float]
-    """Share of each asset in what is held; where next to nothing is, that of inverse volatilities."""
+    """Share of each asset in the holdings advised; if these are next to nothing, the shares by inverse volatility."""
     total: float
     """Share of wealth in all assets together."""
     without_crash: NotRequired[float | None]
     """
-    The same were no log-return below the lowest seen of any asset: what it is above `total` is the part of the caution that
-    is for a crash which nobody has seen. Null where `problem.support` rules one out already.
+    `total` if no log-return could fall below the lowest seen of any asset. Its excess over `total` is the part of
+    the caution against a crash that nobody has seen. Null if `problem.support` rules one out already.
     """
     certainty_equivalent: float
-    """Wealth for certain that is worth as much as the allocation is against the worst law, less what trading costs: at least this."""
+    """
+    Lower bound on the certain wealth that is worth as much as the allocation against the worst law, less trading
+    costs.
+    """
     bound: float
     """No allocation is worth more than this."""
     floor: float
-    """Wealth of selling everything now and staying in the bank."""
+    """Wealth from selling everything now and staying in the bank."""
     radius: float
     """Radius of the ball, in log-return."""
     radius_factor: float
     """
-    Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs low: by little
-    where assets move together, by more than a tenth for a dozen that are independent.
+    Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs
+    low: by little if assets move together, by more than a tenth for a dozen that are independent.
     """
     levels: NotRequired[LevelsAdvised | None]
     sample_size: int
     """Number of dates seen."""
     worst_means: dict[str, WorstMean]
-    """What the law behind `bound` makes of each asset, which is the worst law where the two sides meet."""
+    """The mean of each asset under the law behind `bound`, which is the worst law if the two bounds meet."""
     caution: list[Caution]
-    """What to know before the advice is followed."""
+    """Warnings to read before following the advice."""
 
 
 class AssetsAdvised(AssetsAdvice):
@@ -2151,36 +2239,36 @@ class AssetsAdvised(AssetsAdvice):
     why_nothing: NotRequired[WhyNothing | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
-    """What in the question may be a mistake."""
+    """Parts of the request that may be a mistake."""
 
 
 class AssetsBacktestReport(TypedDict):
-    """Strategies that lived through a record of several assets. The same record and choices give the same report, bit for bit."""
+    """Strategies compared over a record of several assets. The same record and choices give the same report, bit for bit."""
 
     format: str
     """`ballast-backtest-assets-1`."""
     assets: list[str]
-    """Names, in the order of the columns."""
+    """Names of the assets, in the order of the columns."""
     frequency: str
     """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`."""
     periods_per_year: int
     """Periods in a year."""
     dates: list[str]
-    """Of the periods decided about."""
+    """Dates of the periods that were decided."""
     whole_years: int
-    """Whole years decided about, whose utility is taken; the last ends with the last period."""
+    """Whole years that were decided, over which mean utility is taken; the last ends with the last period."""
     uncounted_periods: int
-    """The first periods decided about, fewer than a year, which count in none of them."""
+    """Number of periods before the first whole year, fewer than a year; they count in no year."""
     choices: AssetsChoices
-    """As completed."""
+    """The completed choices."""
     intervals: BacktestIntervals
     """How the intervals were made."""
     strategies: list[AssetsFigures]
-    """One strategy in figures each."""
+    """The figures of each strategy."""
     periods: list[AssetsPeriods]
-    """What each strategy did, in their order."""
+    """The decisions and results of each strategy, in the same order."""
     sentences: list[str]
-    """What the figures say, the most important first."""
+    """The findings in sentences, the most important first."""
 
 
 class BacktestChoices(TypedDict):
@@ -2193,103 +2281,118 @@ class BacktestChoices(TypedDict):
     horizon: int
     """Periods that a policy looked ahead."""
     alpha: list[float]
-    """Levels of the adaptive strategies."""
+    """Miscoverage levels of the adaptive strategies."""
     scale: float
     """Multiple of the radius of every ball."""
     caution: CautionLevel
-    """Share of every radius that was acted on."""
+    """Share of every radius that was used."""
     support: Support
-    """What the adversary could use."""
+    """The log-returns that the adversary could use."""
     centre: CentreSpecification
-    """What the balls are centred on."""
+    """Centre of the balls."""
     risk_aversion: float
-    """Relative."""
+    """Relative risk aversion."""
     trading_cost: float
-    """Lost of what is traded, as a share of it."""
+    """Share of each trade that is lost."""
     cost_blind: bool
-    """Whether every policy was trained as if trading were free."""
+    """True if every policy was trained as if trading were free."""
     count: int
     """Design points per step."""
     seed: int
-    """Of every training, and of the resamples."""
+    """Seed of every training, and of the resamples."""
 
 
 class BacktestReport(TypedDict):
-    """Strategies that lived through a record of returns. The same request gives the same report, bit for bit."""
+    """Strategies compared over a record of returns. The same request gives the same report, bit for bit."""
 
     format: str
     """`ballast-backtest-1`."""
     frequency: NotRequired[str | None]
-    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null where the periods have no dates."""
+    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null if the periods have no dates."""
     periods_per_year: int
     """Periods in a year."""
     dates: NotRequired[list[str] | None]
-    """Of the periods decided about, those after the first window; null where the periods have none."""
+    """Dates of the periods that were decided, those after the first window; null if the periods have none."""
     whole_years: int
-    """Whole years decided about, whose utility is taken; the last ends with the last period."""
+    """Whole years that were decided, over which mean utility is taken; the last ends with the last period."""
     uncounted_periods: int
-    """The first periods decided about, fewer than a year, which count in none of them."""
+    """Number of periods before the first whole year, fewer than a year; they count in no year."""
     choices: BacktestChoices
-    """As completed."""
+    """The completed choices."""
     intervals: BacktestIntervals
     """How the intervals were made."""
     strategies: list[BacktestFigures]
-    """One strategy in figures each."""
+    """The figures of each strategy."""
     periods: list[BacktestPeriods]
-    """What each strategy did, in their order."""
+    """The decisions and results of each strategy, in the same order."""
     sentences: list[str]
-    """What the figures say, the most important first."""
+    """The findings in sentences, the most important first."""
 
 
 class BacktestRequest(TypedDict):
     """
-    A walk-forward through a record of returns: every so many periods policies are trained on the window before, and lived by
-    until the next.
+    A walk-forward through a record of returns. At regular intervals, policies are trained on the preceding window and
+    followed until the next training.
     """
 
     log_returns: NotRequired[list[LogReturn1] | None]
-    """Of the risky asset, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
+    """
+    Log-returns of the risky asset, oldest first, without gaps: 3 to 20,000 values from -5 to 5. Exactly one of this
+    and `simple_returns` is given.
+    """
     simple_returns: NotRequired[list[SimpleReturn1] | None]
-    """`price / previous price - 1`, likewise."""
+    """Simple returns of the risky asset, `price / previous price - 1`, oldest first, without gaps."""
     rate: Rates
-    """What the bank pays a period, as a fraction: one number for all, or one for each."""
+    """Return of the bank per period, as a fraction from -0.5 to 0.5: one number for all periods, or one for each."""
     dates: NotRequired[list[str] | None]
-    """One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`. They tell the periods of a year."""
+    """
+    Date of each period, evenly spaced: `2008-01-31`, `2008-01` or `2008`. The dates determine the number of periods
+    in a year.
+    """
     periods_per_year: NotRequired[int | None]
-    """Default: what `dates` tell; required without them."""
+    """Number of periods in a year, 1 to 366. Default: derived from `dates`; required without them."""
     window: NotRequired[int | None]
-    """Periods of history that each policy is trained on. Default: 20 years of them, or half of a record that has no year beside."""
+    """
+    Number of periods of history that each policy is trained on, 2 to 20,000. Default: 20 years, or half of the
+    record if 20 years would leave less than a year after them.
+    """
     every: NotRequired[int | None]
-    """Periods from one training to the next. Default: a year of them, at most `horizon`."""
+    """
+    Number of periods from one training to the next, at most `horizon`. Default: one year, or `horizon` if that is
+    shorter.
+    """
     horizon: NotRequired[int | None]
-    """Periods that a policy looks ahead. Default: `every`."""
+    """Number of periods that a policy looks ahead, 1 to 520. Default: `every`."""
     alpha: NotRequired[list[AlphaItem]]
-    """Levels of the adaptive strategies; the static one takes the second, or the only one."""
+    """
+    Miscoverages of the adaptive strategies: 1 to 3 different numbers from 0.001 to 0.999. The static strategy uses
+    the second, or the only one. Default: 0.05, 0.1 and 0.5.
+    """
     scale: NotRequired[float]
-    """Multiple of the radius of every ball."""
+    """Factor on the radius of every ball. Default 1."""
     caution: NotRequired[CautionLevel]
-    """The share of every radius that is acted on: a level is found anew for every training."""
+    """Share of every radius that is used. A named level is found again for every training. Default: `paper`."""
     support: NotRequired[Support]
-    """The log-returns that the adversary may use."""
+    """The log-returns that the adversary may use. Default: `none`, which allows all."""
     centre: NotRequired[CentreSpecification]
-    """What the balls are centred on, and what “Trusts the record” takes for the law."""
+    """Centre of the balls. The strategy “Trusts the record” takes it as the true law. Default: `empirical`."""
     risk_aversion: NotRequired[float]
-    """Relative: 1 is log utility."""
+    """Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3."""
     trading_cost: NotRequired[float]
-    """Lost of what is traded, as a share of it; policies are trained with it."""
+    """Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it. Default 0."""
     cost_blind: NotRequired[bool]
-    """Train every policy as if trading were free."""
+    """If true, every policy is trained as if trading were free. Default false."""
     count: NotRequired[int]
-    """Design points per step."""
+    """Number of design points per step, 10 to 10,000. Default 100."""
     seed: NotRequired[int]
-    """The same request and seed give the same report, bit for bit."""
+    """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
 
 
-class Composed(TypedDict):
+class Composition(TypedDict):
     """Several assets before the coming period, by their names."""
 
     composition: dict[str, float]
-    """Share of each asset in what is advised to be held; they sum to 1."""
+    """Share of each asset in the advised holdings; they sum to 1."""
     holdings: dict[str, float]
     """Share of wealth in each asset, before trading."""
     one_step: NotRequired[OneStep | None]
@@ -2301,29 +2404,29 @@ class Corrected(Uncertainty):
     session: str
     correction: int
     period: int
-    """The period put right, put in or taken out."""
+    """The period corrected, inserted or removed."""
     log_return: NotRequired[float | None]
-    """What it is now; null where it is missing or taken out."""
+    """Its log-return now; null if it is missing or removed."""
     observed: int
     """Periods observed now."""
     wealth: float
     """Wealth now."""
     holding: float
-    """Share of it in the risky asset."""
-    assets: NotRequired[Composed | None]
+    """Share of wealth in the risky asset."""
+    assets: NotRequired[Composition | None]
     wealth_change: float
-    """Change of wealth by the last period observed, as it stands now."""
+    """Change of wealth over the last observed period, after the correction."""
     date: NotRequired[str | None]
-    """The last day of the last period, where it is known."""
+    """The last day of the last period, if it is known."""
     drift: Drift
-    """Whether the returns, as they stand, come as they came."""
+    """The test of whether the corrected returns still come from the same law."""
 
 
 class Correction(Correct):
     """One correction, as it was made."""
 
     told: Corrected
-    """What was answered to it."""
+    """The answer to it."""
     corrected_ms: int
 
 
@@ -2331,11 +2434,11 @@ class Coverage(TypedDict):
     """How often the ball held the true law."""
 
     target: NotRequired[float | None]
-    """1 - alpha, under a radius rule that has one."""
+    """Target coverage `1 - alpha`, if the radius rule has an alpha."""
     by_sample_size: list[CoverageAtSize]
-    """Ascending; one entry where the ball is frozen."""
+    """Coverage by ascending sample size; one entry if the ball is frozen."""
     ever_left: Estimate
-    """Share of paths on which some period's ball did not hold it."""
+    """Share of paths on which some period's ball did not hold the true law."""
 
 
 class EvaluationRequest(TypedDict):
@@ -2343,73 +2446,85 @@ class EvaluationRequest(TypedDict):
 
     problem: ProblemSpecification
     """
-    As in a training; `framework` is left out, and `law` is the true law that returns are drawn from (default: the
-    design's sampling law).
+    The problem, as in a training, but `framework` is left out. `law` is the true law that returns are drawn from;
+    default: the design's sampling law. `caution` is `paper` and `support` is `none` by default.
     """
     design: NotRequired[DesignSpecification]
-    """As in a training."""
+    """States that the surrogates are trained on, as in a training."""
     surrogate: NotRequired[SurrogateSpecification]
-    """As in a training."""
+    """Settings of the surrogates, as in a training."""
     seed: NotRequired[int]
-    """The same request and seed give the same report, but for its costs."""
+    """Seed of all random draws. The same request and seed give the same report, except for its `costs`. Default 1."""
     frameworks: NotRequired[list[Framework]]
-    """Frameworks to compare."""
+    """Frameworks to compare. Default: all six."""
     constant_mixes: NotRequired[list[ConstantMix] | None]
-    """Constant allocations to compare; 0 is All in the bank. Default: 0 to 1 by 0.1, as far as the actions go."""
+    """
+    Constant allocations to compare, as shares of wealth, at most 101; 0 is All in the bank. Default: 0 to 1 in
+    steps of 0.1, up to the highest action.
+    """
     policies: NotRequired[dict[str, str]]
-    """A trained policy for a framework; the others are trained inside the job."""
+    """Trained policies to use, by framework. Policies for the other frameworks are trained inside the job."""
     paths: NotRequired[int]
-    """Simulated paths per initial history."""
+    """Number of simulated paths for each initial history, 100 to 100,000. Default 1000."""
     histories: NotRequired[InitialHistories]
-    """Which histories paths start from."""
+    """Histories that paths start from. Default: `given`."""
     level: NotRequired[float]
-    """Confidence of the intervals."""
+    """Confidence of the intervals, 0.5 to 0.999. Default 0.95."""
 
 
 FrontierProblem: TypeAlias = ProblemSpecification | AssetsProblem
-"""The problem of one asset, or of several, which `assets` names."""
+"""The problem of one asset, or of several assets if it has the field `assets`."""
 
 
 class FrontierRequest(TypedDict):
-    """A record, an investor, and the radii to try."""
+    """A request for a frontier of caution: a record, an investor, and the radii to try."""
 
     problem: FrontierProblem
-    """One asset as in `/advise`, or several."""
+    """The problem of one asset, as in `/advise`, or of several assets. Its history holds 12 to 5000 periods."""
     scales: NotRequired[list[Scale]]
-    """Multiples of the radius of the rule, ascending. 0 takes the record for the law."""
+    """
+    Multiples of the rule's radius to try, ascending: 1 to 20 numbers from 0 to 10. At 0 the record is taken as the
+    true law. Default: 0, 0.1, 0.25, 0.5 and 1.
+    """
     resamples: NotRequired[int | None]
-    """Resampled records of each kind. Default: 400 of one asset, 60 of several, whose steps take longer."""
+    """
+    Number of resampled records of each kind, 20 to 2000. Default: 400 for one asset, and 60 for several, whose
+    steps take longer.
+    """
     block: NotRequired[int | None]
-    """Periods in a row that are drawn together, 1 to half of the record. Default: the cube root of its length."""
+    """
+    Number of consecutive periods that are drawn together, from 1 to half of the record. Default: the cube root of
+    the record's length.
+    """
     seed: NotRequired[int]
-    """Of the resamples and of the simulated bridges."""
+    """Seed of the resampled records and of the simulated bridges. Default 1."""
 
 
-class FundAdvice(Composed):
-    """What to hold of several assets through a period, by a policy of their fund."""
+class FundAdvice(Composition):
+    """The holdings of several assets to keep through a period, by a policy of their fund."""
 
     allocation: dict[str, float]
     """Share of wealth to hold in each asset; the rest is in the bank."""
     total: float
     """Share of wealth in all assets together."""
     trade: dict[str, float]
-    """The allocation less the holdings: shares of wealth to buy, or where they are negative to sell."""
+    """The allocation minus the holdings: shares of wealth to buy, or to sell if negative."""
     band: list[float]
-    """The totals that are best kept as they are; where trading costs nothing both ends are the total."""
+    """The totals that are best kept as they are. If trading costs nothing, both ends are the total."""
     contribution: float
-    """Money added at the end of the period, withdrawn where it is negative."""
+    """Money added at the end of the period; negative if withdrawn."""
     certainty_equivalent: float
-    """Certainty equivalent, in terminal wealth, of going on with this composition: the promise that a later one never breaks."""
+    """Certainty equivalent, in terminal wealth, of keeping this composition. A later composition never promises less."""
     floor: float
-    """Terminal wealth of selling everything now and staying in the bank."""
+    """Terminal wealth from selling everything now and staying in the bank."""
     radius: float
     """Radius of the ball around the law of the fund, in log-return."""
     sample_size: int
-    """Dates seen, those of the history among them."""
+    """Dates observed, including those of the history."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
-    """Whether the state of the fund lies where the surrogates were trained."""
+    """True if the state of the fund lies in the region where the surrogates were trained."""
     source: AdviceSource
     """How the total was found."""
 
@@ -2421,14 +2536,14 @@ class Job(TypedDict):
     kind: JobKind
     state: JobState
     cancel_requested: bool
-    """A cancel was asked for; the worker stops within a second."""
+    """True if a cancel was requested; the worker stops within a second."""
     progress: JobProgress
     policy: NotRequired[str | None]
-    """The policy of a succeeded training."""
+    """Policy of a succeeded training."""
     report: NotRequired[str | None]
-    """Where the report of a succeeded evaluation or walk-forward is."""
+    """Address of the report of a succeeded evaluation, walk-forward backtest or frontier."""
     error: NotRequired[str | None]
-    """Why it failed."""
+    """Reason for the failure."""
     created_ms: int
     started_ms: NotRequired[int | None]
     finished_ms: NotRequired[int | None]
@@ -2439,38 +2554,38 @@ class JobPage(TypedDict):
 
     jobs: list[Job]
     next: NotRequired[int | None]
-    """Give it as `after` for the next page; null on the last."""
+    """Cursor to pass as `after` for the next page; null on the last page."""
 
 
-class ObservedAssets(Composed):
+class ObservedAssets(Composition):
     """A period of several assets, by their names."""
 
     log_returns: NotRequired[dict[str, float]]
-    """Null where they are missing."""
+    """Null if they are missing."""
     advised_allocations: dict[str, float]
-    """Share of wealth in each asset that was advised."""
+    """Advised share of wealth in each asset."""
     executed_allocations: dict[str, float]
-    """Share of wealth in each asset that was held."""
+    """Executed share of wealth in each asset."""
 
 
 class Question(TypedDict):
-    """What cannot be told from the text."""
+    """A question about something that the text leaves open."""
 
     asks: str
-    """The choice that is asked for, as `choices` names it."""
+    """The choice that the question asks for, by its name in `choices`."""
     question: str
-    """In words."""
+    """The question in words."""
     options: list[Answer]
-    """Each of them settles it."""
+    """The possible answers; each of them settles the question."""
 
 
 class Reading2(TypedDict):
-    """It may be several."""
+    """The text may be several records."""
 
     questions: list[Question]
-    """What would settle it."""
+    """The questions whose answers decide which record it is."""
     columns: list[ColumnFound]
-    """The columns, where they are known."""
+    """The columns, if they are known."""
     outcome: Literal["asked"]
 
 
@@ -2478,27 +2593,27 @@ class Record(TypedDict):
     """Returns of one asset or several, oldest first."""
 
     sentence: str
-    """What was read, for a person to check."""
+    """A sentence about the record, for a person to check."""
     columns: list[ColumnFound]
-    """All that the text has."""
+    """All columns of the text."""
     series: list[Series]
-    """Those that were read, all of one length."""
+    """The columns that were read, all of one length."""
     count: int
-    """Returns there are, of which `latest` may have taken fewer."""
+    """The number of returns in the text; the series hold fewer if `latest` limits them."""
     dates: NotRequired[list[str] | None]
-    """When each period ended, in ISO 8601, as fine as the frequency; absent where no dates were understood."""
+    """The end of each period in ISO 8601, to the precision of the frequency; absent if no dates were understood."""
     frequency: NotRequired[str | None]
-    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`, where the dates say so."""
+    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`, if the dates show it."""
     periods_per_year: NotRequired[int | None]
-    """How many periods make a year, where the dates say so."""
+    """Periods in a year, if the dates show it."""
     newest_first: bool
     """
-    Whether the first row was the newest, so that the rows are turned round: as their dates tell, or as it was said where
-    there are none.
+    True if the first row was the newest, so that the rows were reversed. The dates decide this, or the choice
+    `newest_first` if there are no dates.
     """
     rate: NotRequired[BankRate | None]
     remarks: list[str]
-    """What was changed or passed over, in sentences; the last of `sentence`."""
+    """Sentences about anything that was changed or left out; `sentence` ends with them."""
 
 
 class Renewed(Uncertainty):
@@ -2510,10 +2625,10 @@ class Renewed(Uncertainty):
     period: int
     """The coming period, the first that the policy advises."""
     horizon: int
-    """The last period that it advises."""
+    """The last period that the policy advises."""
     terms: Terms
-    """Rate, cost and flows of its periods, where none other are reported."""
-    assets: NotRequired[Composed | None]
+    """Rate, cost and flows of its periods, unless a report gives others."""
+    assets: NotRequired[Composition | None]
 
 
 class Session(Labels):
@@ -2521,53 +2636,56 @@ class Session(Labels):
 
     session: str
     policy: str
-    """The one that advises the coming period."""
+    """The policy that advises the coming period."""
     period: int
     """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
     """The last period that the policy advises."""
-    state: SessionState
+    state: SessionStatus
     date: NotRequired[str | None]
-    """The last day of the last period: as reported, else the next one due after those before it. Null where no day is known."""
+    """
+    Last day of the last period: as reported, and otherwise the next one due after the periods before it. Null if no
+    day is known.
+    """
     next: NotRequired[str | None]
     """
-    The last day of the coming period, by the policy's periods a year, else by the days reported; a report without a day
-    takes it. Null where that is not known, or it is completed.
+    Last day of the coming period, by the policy's periods a year, and otherwise by the days reported. A report
+    without a day gets this day. Null if this is not known, or the session is completed.
     """
     wealth: float
     holding: float
-    """Share of wealth in the risky asset, before trading; of several assets in all of them."""
-    assets: NotRequired[Composed | None]
+    """Share of wealth in the risky asset, before trading; for several assets, the share in all of them."""
+    assets: NotRequired[Composition | None]
     sample_size: int
     corrections: int
-    """Corrections of what periods reported; the next one is this and one more."""
+    """Number of corrections; the next one has this number plus one."""
     renewals: int
-    """Policies that followed the first; the next renewal is this and one more."""
+    """Number of policies that followed the first; the next renewal has this number plus one."""
     renew: NotRequired[Renewing | None]
     rolling: bool
-    """Whether the first step of the policy advises every period."""
+    """True if the first step of the policy advises every period."""
     renewal: NotRequired[RenewalDue | None]
     drift: Drift
-    """Whether the returns still come as they came."""
+    """Evidence that the returns have changed."""
     created_ms: int
 
 
 class Specification(TypedDict):
-    """A whole training job."""
+    """A complete training job."""
 
     problem: ProblemSpecification
-    """What the investor is and may do; of several assets, with their fund in the place of one."""
+    """The investor, the asset and the history. For several assets, the asset is their fund."""
     fund: NotRequired[FundSpecification | None]
     design: NotRequired[DesignSpecification]
-    """Where the surrogates are trained."""
+    """States that the surrogates are trained on."""
     surrogate: NotRequired[SurrogateSpecification]
-    """How the surrogates are made."""
+    """Settings of the surrogates."""
     seed: NotRequired[int]
-    """The same specification and seed give the same policy, bit for bit."""
+    """Seed of all random draws. The same specification and seed give the same policy, bit for bit. Default 1."""
 
 
 class StrategyReport(TypedDict):
-    """One strategy."""
+    """The results of one strategy."""
 
     strategy: str
     """Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like."""
@@ -2575,25 +2693,25 @@ class StrategyReport(TypedDict):
     constant_mix: NotRequired[float | None]
     """The allocation of a constant mix."""
     policy: NotRequired[str | None]
-    """The policy followed; null for constant mixes and where each history had its own."""
+    """The policy followed; null for constant mixes, and if each history had its own."""
     utility: UtilityReport
     """
-    Utility of terminal wealth, counted from `floor`: `(U(x) - U(floor)) / (floor U'(floor))`, so that no digits are lost at high risk
-    aversion or wealth.
+    Utility of terminal wealth, measured from `floor`: `(U(x) - U(floor)) / (floor U'(floor))`. This form loses no
+    digits at high risk aversion or wealth.
     """
     certainty_equivalent: Estimate
-    """Terminal wealth that is worth as much for certain."""
+    """Certainty equivalent of terminal wealth."""
     wealth: WealthReport
-    """Terminal, in units of the initial wealth's currency, and what it went through."""
+    """Terminal wealth in the currency of the initial wealth, and its course on the way."""
     difference: NotRequired[Difference | None]
     own_mix: NotRequired[OwnMix | None]
     histogram: list[int]
     """Counts of the bins between `histogram_edges`."""
     periods: NotRequired[list[PeriodReport] | None]
-    """Period by period; null for constant mixes."""
+    """Results period by period; null for constant mixes."""
     coverage: NotRequired[Coverage | None]
     resolved_share: NotRequired[float | None]
-    """Share of steps advised by solving the step anew."""
+    """Share of steps whose advice was solved anew."""
 
 
 class WhatIfPoint(Advice):
@@ -2604,11 +2722,11 @@ class WhatIfPoint(Advice):
     wealth: float
     """Wealth at its start."""
     log_return: NotRequired[float | None]
-    """The return supposed, if one was."""
+    """The return of the hypothesis, if it has one."""
     radius_scale: NotRequired[float | None]
-    """The factor on the radius supposed, if one was."""
+    """The factor on the radius in the hypothesis, if it has one."""
     gamma: NotRequired[float | None]
-    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
+    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Present if the step was solved."""
     worst_law: NotRequired[WorstLawSummary | None]
     worst_case: NotRequired[WorstCase | None]
 
@@ -2617,11 +2735,11 @@ class AcceptedJob(Job):
     """A job that was accepted."""
 
     warnings: list[Warning]
-    """What in the request may be a mistake."""
+    """Valid entries of the request that may be mistakes."""
 
 
 AdviseAnswer: TypeAlias = Advised | AssetsAdvised
-"""The answer to a question about one asset or several."""
+"""The answer to a request about one asset or several."""
 
 
 class AssetsAction(FundAdvice):
@@ -2631,7 +2749,7 @@ class AssetsAction(FundAdvice):
     period: int
     worst_case: NotRequired[WorstCase | None]
     caution: list[Caution]
-    """What to know before the advice is followed."""
+    """Points to know before you follow the advice."""
 
 
 class AssetsWhatIfPoint(FundAdvice):
@@ -2642,72 +2760,78 @@ class AssetsWhatIfPoint(FundAdvice):
     wealth: float
     """Wealth at its start."""
     log_returns: NotRequired[dict[str, float]]
-    """The returns supposed, by asset, if any were."""
+    """The returns of the hypothesis by asset, if it has any."""
     radius_scale: NotRequired[float | None]
-    """The factor on the radius supposed, if one was."""
+    """The factor on the radius in the hypothesis, if it has one."""
     gamma: NotRequired[float | None]
-    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
+    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Present if the step was solved."""
     worst_law: NotRequired[WorstLawSummary | None]
     worst_case: NotRequired[WorstCase | None]
 
 
 BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
-"""A walk-forward of one asset, or of several, which `assets` names."""
+"""A walk-forward of one asset, or of several assets if the request has the field `assets`."""
 
 
 class EvaluationReport(TypedDict):
-    """Strategies compared on common returns. `docs/evaluation.md` says where the intervals come from."""
+    """Strategies compared on common returns. `docs/evaluation.md` explains the intervals."""
 
     format: str
     """`ballast-evaluation-1`."""
     request: EvaluationRequest
     """The completed request."""
     reference: str
-    """The strategy that differences are taken against."""
+    """The strategy from which differences are taken."""
     strategies: list[StrategyReport]
-    """Frameworks first, then constant mixes, in the order of the request."""
+    """Strategies: frameworks first, then constant mixes, in the order of the request."""
     floor: float
-    """Terminal wealth of All in the bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does."""
+    """
+    Terminal wealth of All in the bank, the origin of utility: utility is 0 there, and grows as the logarithm of
+    wealth does.
+    """
     histogram_edges: list[float]
     """Common bin edges of terminal utility, ascending."""
     wealth_edges: list[float]
-    """Common bin edges of terminal wealth, ascending and evenly apart."""
+    """Common bin edges of terminal wealth, ascending and evenly spaced."""
     histories: list[HistoryReport]
-    """In the order they were drawn."""
+    """Histories in the order they were drawn."""
     sentences: list[str]
-    """What the figures say of each framework that changes its allocation."""
+    """Sentences about each framework that changes its allocation."""
     costs: Costs
-    """What it took."""
+    """Run times."""
 
 
 class FrontierReport(TypedDict):
     """
-    What following the advice at multiples of the radius loses on records like the one at hand. The same request gives the same
-    report, bit for bit.
+    The loss from following the advice at multiples of the radius, on records like the given one. The same request gives
+    the same report, bit for bit.
     """
 
     format: str
     """`ballast-frontier-1`."""
     request: FrontierRequest
-    """As completed."""
+    """The completed request."""
     level: float
-    """Of the intervals, which tell how exactly the resamples tell a figure, not how like the true law they are."""
+    """
+    Confidence level of the intervals. They show how exactly the resamples determine a figure, not how close the
+    resampled laws are to the true law.
+    """
     per_year: bool
-    """Whether losses are a year's: where `problem.periods_per_year` is given. Else they are a period's."""
+    """True if losses are per year, because `problem.periods_per_year` is given; otherwise they are per period."""
     radius: float
-    """Of the rule at the record itself, in log-return; scales are multiples of it."""
+    """Radius of the rule at the record itself, in log-return; scales are multiples of it."""
     evidence: float
-    """Standard errors that the record's mean return lies above the bank's, in the fund of inverse volatilities."""
+    """By how many standard errors the record's mean return exceeds the bank's, in the inverse-volatility fund."""
     own: list[list[float]]
-    """What is advised at the record itself, scale by scale: the share of wealth in each asset, in the order of the request."""
-    resampled: list[Resampled]
-    """By the law that records were drawn from."""
+    """Advice at the record itself, scale by scale: the share of wealth in each asset, in the order of the request."""
+    resampled: list[ResampledFrontier]
+    """Results for each law that records were drawn from."""
     sentences: list[str]
-    """What the figures say, and what they cannot."""
+    """Sentences on what the figures show, and what they cannot show."""
 
 
 JobReport: TypeAlias = EvaluationReport | BacktestReport | AssetsBacktestReport | FrontierReport
-"""The report of a job: of an evaluation, of a walk-forward or of a frontier."""
+"""The report of a job: of an evaluation, of a walk-forward backtest or of a frontier."""
 
 
 class Observed(Uncertainty):
@@ -2716,27 +2840,30 @@ class Observed(Uncertainty):
     session: str
     period: int
     log_return: NotRequired[float | None]
-    """Null where it is missing."""
+    """Null if it is missing."""
     band: list[float]
     """
-    The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
+    The holdings that are best kept at the start of the period. If trading costs nothing, both ends are the advised
     allocation.
     """
     advised_allocation: float
     executed_allocation: float
     wealth: float
-    """Wealth at the end of the period, with what was added to it."""
+    """Wealth at the end of the period, including what was added to it."""
     holding: float
-    """Share of it in the risky asset, as the return left it."""
+    """Share of wealth in the risky asset after the return."""
     assets: NotRequired[ObservedAssets | None]
     wealth_change: float
-    """Change of wealth by the period, what was added or reached otherwise included."""
+    """Change of wealth over the period, including flows and wealth reported otherwise."""
     date: NotRequired[str | None]
-    """The last day of the period: as reported, else the next one due, or where that is not known of a period before."""
+    """
+    The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
+    period.
+    """
     completed: bool
-    """Whether the horizon is reached, and no policy is to follow."""
+    """True if the horizon is reached and no policy is to follow."""
     drift: Drift
-    """Whether the returns still come as they came."""
+    """The test of whether returns still come from the same law."""
 
 
 class PolicyDetail(Labels):
@@ -2749,25 +2876,25 @@ class PolicyDetail(Labels):
     specification: Specification
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
-    """What in the specification may be a mistake."""
+    """Valid entries of the specification that may be mistakes."""
     diagnostics: list[StepDiagnostics]
 
 
 class Reading1(Record):
-    """It is this record."""
+    """The text is this record."""
 
     outcome: Literal["read"]
 
 
 Reading: TypeAlias = Reading1 | Reading2 | Reading3
-"""What is made of a text."""
+"""The outcome of reading a text."""
 
 
 class Renewal(Renewed):
     """One renewal, as it was made."""
 
     window: NotRequired[int | None]
-    """Returns that the law was made of, the last ones; null where those were all."""
+    """Number of last returns that the law was made of; null if it used all."""
     renewed_ms: int
 
 
@@ -2785,7 +2912,7 @@ class WhatIfAnswer2(TypedDict):
 
 
 class WhatIfAnswer3(AssetsWhatIfPoint):
-    """Of several assets."""
+    """One point for several assets."""
 
     session: str
 
@@ -2801,7 +2928,7 @@ WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2 | WhatIfAnswer3 | WhatIf
 """One point, or the points of a sweep in its order."""
 
 
-ActionAnswer: TypeAlias = Action | AssetsAction
+ActionAnswer: TypeAlias = AssetAction | AssetsAction
 """The robust allocation for the coming period."""
 
 
@@ -2811,43 +2938,43 @@ class ElementAnswered(TypedDict):
     session: str
     period: int
     status: int
-    """What a call with this report alone would be answered with."""
+    """HTTP status that a call with this report alone would get."""
     answer: NotRequired[Observed | None]
-    problem: NotRequired[Problem | None]
+    problem: NotRequired[ProblemDocument | None]
 
 
 class Observation(Observed):
-    """One period, observed or put in later."""
+    """One period, observed or inserted later."""
 
     reported: Report
-    """What was reported first."""
+    """The first report of it."""
     observed_ms: int
     corrections: NotRequired[list[int]]
-    """Numbers of the corrections that put it in or reported it anew."""
+    """Numbers of the corrections that inserted it or reported it again."""
     now: NotRequired[Now | None]
 
 
 ReportsAnswered: TypeAlias = Observed | list[ElementAnswered]
-"""The answer to one report, or to each of a list in its order."""
+"""The answer to one report, or the answers to a list in its order."""
 
 
 class History(TypedDict):
-    """Where a session started, and everything recorded of it."""
+    """The start of a session, and everything recorded since."""
 
     session: str
     policy: str
     """The first policy."""
     terms: Terms
-    """Rate, cost and flows of its periods, where none other are reported."""
+    """Rate, cost and flows of its periods, unless a report gives others."""
     initial_wealth: float
     initial_holding: float
-    """Share of it in the risky asset."""
+    """Share of wealth in the risky asset."""
     initial_radius: float
-    """Radius of the uncertainty set before the first period, in the unit of an advice's."""
+    """Radius of the uncertainty set before the first period, in the unit of an advice's radius."""
     assets: NotRequired[list[str] | None]
-    """Names of the assets, where there are several."""
-    composed: NotRequired[Composed | None]
-    history: KnownReturns
+    """Names of the assets, if there are several."""
+    composed: NotRequired[Composition | None]
+    history: InitialHistory
     """Log-returns known at the start."""
     observations: list[Observation]
     corrections: list[Correction]
