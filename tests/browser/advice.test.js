@@ -47,7 +47,7 @@ const big = async () => plain(await page.locator(".big").innerText());
 const quant = async () => {
   const fold = page.locator("details", { hasText: "For the quant" }).first();
   if (!(await fold.evaluate(({ open }) => open))) await fold.getByText("For the quant").click();
-  await page.locator("#check").filter({ hasNotText: "being solved anew" }).waitFor();
+  await page.locator("#check").filter({ hasNotText: "Solving the step again" }).waitFor();
   return plain(await fold.innerText());
 };
 const main = async () => plain(await page.locator("main").innerText());
@@ -57,8 +57,8 @@ const atOne = async () =>
 test("a step solved anew that says the same is the check of the advice", async () => {
   await shown(0.336, 0.3352);
   assert.match(await big(), /Hold\s+33\.6 %\s+in stocks/);
-  assert.doesNotMatch(await main(), /33\.5 %|solved anew/);
-  assert.match(await quant(), /Checked: the step solved anew is within 0\.1 points of it\./);
+  assert.doesNotMatch(await main(), /33\.5 %|solved again/);
+  assert.match(await quant(), /Checked: the step solved again is within 0\.1 points of it\./);
   assert.match(await atOne(), /× 1: +33\.6 %/);
 });
 
@@ -66,7 +66,7 @@ test("a step solved anew that is apart is told behind the fold, and the advice s
   await shown(0.336, 0.302);
   assert.match(await big(), /Hold\s+33\.6 %/);
   assert.doesNotMatch(await main(), /30\.2 %/);
-  assert.match(await quant(), /The step solved anew holds 30\.2 %, 3\.4 points away from it\./);
+  assert.match(await quant(), /The step solved again holds 30\.2 %, 3\.4 points away from it\./);
   assert.match(await atOne(), /× 1: +33\.6 %/);
   const reported = page.waitForRequest((request) => request.url().endsWith("/observe"));
   await page.getByLabel("Return in period 2").fill("0,4");
@@ -102,13 +102,13 @@ test("the advice is told in shares by a price that is typed, and nothing of it i
   assert.doesNotMatch(await order(), /shares/);
   const asked = [];
   page.on("request", (request) => asked.push(request.url()));
-  await page.getByText("In shares, at a price of today").click();
+  await page.getByText("In shares, at today\u2019s price").click();
   await page.getByLabel("Price of one share").fill("2,5");
   const [, held] = /, ([\d.,]+) shares\./.exec(await order());
   // To three digits.
   assert.ok(Math.abs(Number(held) - (0.5 * wealth) / 2.5) <= 0.05, `${held} of ${wealth}`);
   await page.getByLabel("Price of one share").fill("nothing");
-  await page.getByText("\u201cnothing\u201d is no price.").waitFor();
+  await page.getByText("\u201cnothing\u201d is not a price.").waitFor();
   assert.doesNotMatch(await order(), /shares/);
   assert.deepEqual(asked, []);
   page.removeAllListeners("request");
@@ -122,7 +122,7 @@ test("a return that cannot be read is refused in its own words", async () => {
   await page.getByText("The return is blank.").waitFor();
   await field.fill("2,5 or so");
   await page.getByRole("button", { name: "Report period 3" }).click();
-  await page.getByText("\u201c2,5 or so\u201d is not a number of percent.").waitFor();
+  await page.getByText("\u201c2,5 or so\u201d is not a percentage.").waitFor();
   await field.fill("-100");
   await page.getByRole("button", { name: "Report period 3" }).click();
   await page

@@ -37,12 +37,12 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByLabel("Returns or prices").fill("0.01 0.02 -0.03 0.04 0.01 -0.02");
   await page.getByText("6 simple returns").waitFor();
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.getByText("What the bank paid is needed").waitFor();
+  await page.getByText("The bank return is missing").waitFor();
   await page.getByLabel("Periods a year").waitFor();
   await page.getByLabel("Returns or prices").fill(TEXT);
-  await page.getByText("Blank: what rf says, quarter by quarter.").waitFor();
+  await page.getByText("Blank: the rates in the column rf, quarter by quarter.").waitFor();
   await page.getByLabel("Periods a year").waitFor({ state: "hidden" });
-  await page.getByText("How it walks, and for the quant").click();
+  await page.getByText("How the backtest works, and for the quant").click();
   await page.getByLabel("Trained on").fill("600");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   // The refusal stands at the field, and opens the fold it is in.
@@ -54,11 +54,11 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await refused.waitFor();
   assert.equal(await fold.evaluate((details) => details.open), true);
   await page.getByLabel("Trained on").fill(String(WINDOW));
-  await page.getByLabel("Trained anew every").fill("9");
+  await page.getByLabel("Retrained every").fill("9");
   await page.getByLabel("Looking ahead").fill("4");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.locator(".error").getByText("Trained anew every is 9; it must be at least 1 and at most \u201cLooking ahead\u201d: each policy is used until the next is trained.").waitFor();
-  for (const label of ["Trained anew every", "Looking ahead"]) await page.getByLabel(label).fill("");
+  await page.locator(".error").getByText("Retrained every is 9; it must be at least 1 and at most \u201cLooking ahead\u201d: each policy is used until the next is trained.").waitFor();
+  for (const label of ["Retrained every", "Looking ahead"]) await page.getByLabel(label).fill("");
   await page.getByLabel("Confidence, %").fill("90; 50");
   await page.getByLabel("Design points").fill("10");
   const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));
@@ -70,22 +70,22 @@ test("what is asked for is the record as it was read, and few choices", async ()
 });
 
 test("it is followed to its end, and what it says comes first", async () => {
-  await page.getByRole("heading", { name: "What each came to" }).waitFor();
+  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
   const job = page.url().split("/").at(-1);
   assert.equal(await page.locator("h1").textContent(), "Backtest of stocks, March 2006 to December 2017");
-  await page.locator(`header.page [title="${job}"]`).getByText(/^Asked for on \d+ \w+ \d{4}/).waitFor();
+  await page.locator(`header.page [title="${job}"]`).getByText(/^Requested on \d+ \w+ \d{4}/).waitFor();
   report = await call(ballast.url, `/jobs/${job}/report`);
   const words = await main();
   assert.match(words, /8 ways to hold stocks, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
-  assert.match(words, /Every 4 quarters policies are trained on the 8 quarters before, and lived by until the next/);
-  assert.match(words, /Each of them rests on 8 returns: with fewer than 24, most of what the asset can do is yet unseen\./);
+  assert.match(words, /Every 4 quarters policies are trained on the 8 quarters before, and followed until the next training/);
+  assert.match(words, /Each of them rests on 8 returns: with fewer than 24, the record has not yet shown most of what the asset can do\./);
   const [, second] = report.strategies;
   assert.ok(words.includes(`was all in the bank in ${(100 * second.all_bank_share).toFixed(0)} % of the quarters`), words);
   const shown = await cells("Strategies, by what a year of each is worth");
   const worths = shown.slice(1).map(([, worth]) => Number(worth));
   assert.equal(worths.length, report.strategies.length);
   assert.equal(worths.length, 9);
-  assert.match(words, /which nobody knew beforehand: it is given no place among the others\./);
+  assert.match(words, /Nobody knew that share beforehand, so it is not ranked with the others\./);
   assert.deepEqual(worths, [...worths].sort((one, other) => other - one));
   // Each has one name and one place, here as in the report.
   assert.deepEqual(shown.slice(1).map(([name]) => name).sort(), report.strategies.map(({ strategy }) => plain(strategy)).sort());
@@ -169,7 +169,7 @@ test("on paper the months of a year stand beside each other in its width", async
   const log_returns = dates.map((_, k) => 0.008 + 0.25 * Math.sin(1.7 * k));
   const { job } = await call(ballast.url, "/backtest", { log_returns, dates, rate: 0.002, window: 24, alpha: [0.5], count: 10 });
   await visitQuiet(page, `${ballast.url}/#/backtests/${job}`);
-  await page.getByRole("heading", { name: "What each came to" }).waitFor();
+  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
   assert.doesNotMatch(await main(), /most of what the asset can do|false/);
   await page.getByLabel("Strategy", { exact: true }).selectOption("All in stocks");
   await page.emulateMedia({ media: "print" });
@@ -189,21 +189,21 @@ test("a record of several assets is asked for, and its report shows what was hel
   await visitQuiet(page, `${ballast.url}/#/backtests/new`);
   const table = RETURNS.map((back, k) => `${date(k)},${back},${OTHER[k]},${RATES[k]}`);
   await page.getByLabel("Returns or prices").fill(`quarter,fund,bonds,rf\n${table.join("\n")}\n`);
-  const question = page.getByRole("group", { name: /Several columns are several assets/ });
+  const question = page.getByRole("group", { name: /Several columns mean several assets/ });
   for (const name of ["fund", "bonds"]) await question.getByLabel(name, { exact: false }).first().check();
-  await page.getByRole("button", { name: "Read it so" }).click();
-  await page.getByText("How it walks, and for the quant").click();
-  await page.getByLabel("Known of the past").waitFor();
+  await page.getByRole("button", { name: "Read it this way" }).click();
+  await page.getByText("How the backtest works, and for the quant").click();
+  await page.getByLabel("History used").waitFor();
   assert.equal(await page.getByLabel("Design points").isVisible(), false);
-  await page.getByLabel("Known of the past").fill("1; all");
+  await page.getByLabel("History used").fill("1; all");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.getByText("Known of the past is 1; it must be from 2 to 2000.").waitFor();
-  await page.getByLabel("Known of the past").fill("8; all");
+  await page.getByText("History used is 1; it must be from 2 to 2000.").waitFor();
+  await page.getByLabel("History used").fill("8; all");
   const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   const request = (await asked).postDataJSON();
   assert.deepEqual([request.assets, request.windows, request.alpha, request.log_returns.length], [["fund", "bonds"], [8, null], 0.1, QUARTERS]);
-  await page.getByRole("heading", { name: "What each came to" }).waitFor();
+  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
   const told = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
   assert.equal(await page.locator("h1").textContent(), "Backtest of fund and bonds, March 2006 to December 2017");
   const words = await main();

@@ -41,7 +41,7 @@ test("two sessions ticked are told side by side", async () => {
   // Of the second the first period alone: the first has lived no more.
   assert.deepEqual(told["100 has become since the start"].slice(0, 2), ["100.20", (100 * (1 - 0.003) * 1.02).toFixed(2)]);
   // The money of one less that of the other means nothing.
-  assert.deepEqual(told["Money added, less taken"], ["0.00", "50.00", "differs"]);
+  assert.deepEqual(told["Money added, less withdrawn"], ["0.00", "50.00", "differs"]);
   assert.deepEqual(told.Wealth[2], "differs");
   assert.deepEqual(told["Worst fall"], ["0.0 %", "-10.0 %", "differs"]);
   assert.deepEqual(told["Last period"].slice(0, 2), ["28 Jan 2008", "February 2008"]);
@@ -93,7 +93,7 @@ test("of several assets, of their distance, of what may be held and of money add
   const policies = {};
   for (const [name, problem] of Object.entries(asked)) policies[name] = await trained(ballast.url, { problem, design });
   const cases = [
-    ["one", "pair", /differ in assets, mix of assets, distance of markets,.* and record; other details differ too\./, { Assets: ["One", "Stocks, Bonds"], "Distance of markets": ["Of one asset", "Each asset by its own volatility"] }],
+    ["one", "pair", /differ in assets, mix of assets, distance of markets,.* and record; other details also differ\./, { Assets: ["One", "Stocks, Bonds"], "Distance of markets": ["One asset only", "Each asset by its own volatility"] }],
     ["pair", "other", /differ in assets; everything else is the same\./, { Assets: ["Stocks, Bonds", "Stocks, Gold"] }],
     ["pair", "sup", /differ in distance of markets/, { "Distance of markets": ["Each asset by its own volatility", "All assets at once"] }],
     ["one", "half", /differ in share allowed outside the bank; everything else is the same\./, { "Share allowed outside the bank": ["0 % to 100 %", "0 % to 50 %"] }],

@@ -24,20 +24,20 @@ before(async () => {
 });
 
 const main = async () => plain(await page.locator("main").innerText());
-const form = () => page.locator("form", { has: page.getByRole("button", { name: "Put it right" }) });
+const form = () => page.locator("form", { has: page.getByRole("button", { name: "Correct it" }) });
 
 test("the last period comes first, and the fields are those of their own form", async () => {
   await page.goto(`${ballast.url}/#/sessions/${session}`);
-  await page.getByText("Put a period right").click();
+  await page.getByText("Correct a period").click();
   const periods = form().getByLabel("Period").locator("option");
   await periods.first().waitFor({ state: "attached" });
   assert.deepEqual(await periods.allInnerTexts(), ["February 2008", "January 2008"]);
   await form().getByText("Return, %").click();
-  assert.equal(await page.evaluate(() => document.activeElement.form.textContent.includes("Put it right")), true);
+  assert.equal(await page.evaluate(() => document.activeElement.form.textContent.includes("Correct it")), true);
 });
 
 test("the link below the last report opens the form at the first press, by mouse and by keyboard", async () => {
-  const link = page.getByRole("button", { name: "Put it right" }).first();
+  const link = page.getByRole("button", { name: "Correct it" }).first();
   for (const press of [() => link.click(), () => link.press("Enter")]) {
     await page.goto("about:blank");
     await page.goto(`${ballast.url}/#/sessions/${session}`);
@@ -53,14 +53,14 @@ test("the link below the last report opens the form at the first press, by mouse
 test("a return most likely mistyped is asked about, and a right one stands beside the wrong one", async () => {
   await form().getByLabel("Return, %").fill("110");
   await form().getByLabel("Why").fill("the index was revised");
-  await form().getByRole("button", { name: "Put it right" }).click();
+  await form().getByRole("button", { name: "Correct it" }).click();
   await form().getByText(/^A return of 110\.00 % lies [\d.]+ standard deviations from the record\.$/).waitFor();
-  await form().getByRole("button", { name: "It is meant: record it" }).waitFor();
+  await form().getByRole("button", { name: "It is right: record it" }).waitFor();
   await form().getByLabel("Return, %").fill("-2");
   await form().getByText("I held another share").click();
   assert.equal(await form().getByLabel("Share held, %").inputValue(), "50");
-  await form().getByRole("button", { name: "Put it right" }).click();
-  await page.getByText(/February 2008 was put right on .*: the index was revised/).waitFor();
+  await form().getByRole("button", { name: "Correct it" }).click();
+  await page.getByText(/February 2008 was corrected on .*: the index was revised/).waitFor();
   const row = plain(await page.getByRole("row", { name: /^February 2008/ }).innerText());
   assert.match(row, /-2\.00 %\s+-3\.00 %/);
   const { corrections, wealth } = await call(ballast.url, `/sessions/${session}`);

@@ -109,7 +109,7 @@ test("a policy is told in words, drawn, and read by keyboard", async () => {
   assert.notEqual(await read.textContent(), before);
   assert.match(before, /Wealth .* average return .*: hold \d+/);
   assert.equal(await page.getByRole("table", { name: "Diagnostics of every step" }).count(), 0);
-  await page.getByText(/^Every step was solved to (less than )?[\d.]+.% of what it is worth/).waitFor();
+  await page.getByText(/^Every step was solved with an error of (less than )?[\d.]+.% of its worth/).waitFor();
   await page.getByText("For the quant").click();
   await page.getByRole("table", { name: "Diagnostics of every step" }).waitFor();
 });
@@ -275,7 +275,7 @@ test("every view fits, at 390 and 1600 pixels", async () => {
 test("a policy in use is not deleted, a session is", async () => {
   await go(`#/policies/${policy}`);
   await page.getByRole("button", { name: "Delete" }).click();
-  await page.getByText("Sessions live by this policy. Delete those first.", { exact: false }).first().waitFor();
+  await page.getByText("Sessions use this policy. Delete those first.", { exact: false }).first().waitFor();
   await page.getByRole("link", { name: "Show them" }).click();
   await page.locator(`main a[href="#/sessions/${session}"]`).first().waitFor();
   await go(`#/sessions/${session}`);

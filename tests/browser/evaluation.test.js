@@ -36,11 +36,11 @@ test("what was compared, on which policy and for whom, comes first, and then wha
   assert.match(first, /the bank pays 0\.20 % a month\. .Cautious, learns. is policy [0-9a-f]{10}; the other policies were trained for this\./);
   await page.locator(`a[href="#/policies/${policy}"]`).waitFor();
   const best = report.strategies.reduce((best, one) => (one.certainty_equivalent.value > best.certainty_equivalent.value ? one : best));
-  assert.ok(words.includes(`came to the most over these futures: as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
-  assert.match(words, /ends with less than was put in in \d+ % of the futures; the worst 5 % of them end with [\d.]+ on average\./);
+  assert.ok(words.includes(`did best over these futures: it is worth as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
+  assert.match(words, /In \d+ % of the futures .Cautious, learns. ends with less than the money put in; the worst 5 % of all futures end with [\d.]+ on average\./);
   const main = report.strategies.find(({ strategy }) => strategy === report.reference);
   assert.notEqual(main, best);
-  assert.match(words, /Here the record is the truth, so caution can only cost\. What it may save shows where the histories are drawn from the market\./);
+  assert.match(words, /Here the record is the true market, so caution can only cost\. To see what it may save, draw the histories from the market\./);
   assert.deepEqual(await page.locator("tbody th b").allInnerTexts(), ["Cautious, learns"]);
   assert.doesNotMatch(words, /utility|Variance|Less adaptive|undefined|NaN/);
 });

@@ -42,7 +42,7 @@ test("a session says what is added at the end of the period, reckons with it, an
   const { session } = await call(ballast.url, "/sessions", { policy, holding: 0.2 });
   await page.goto(`${ballast.url}/#/sessions/${session}`);
   await page.getByText("At the end of the period 5.00 is added.").first().waitFor();
-  assert.match(await main(), /Best kept, low end/);
+  assert.match(await main(), /No-trade range, low end/);
   await page.getByLabel("Return in period 1").fill("2");
   const foretold = /Wealth 100\.00 \u2192 ([\d.]+) at/.exec(await main())[1];
   await page.getByRole("button", { name: "Report period 1" }).click();
@@ -98,12 +98,12 @@ test("a policy that forgets is asked for by the form, and sessions by it renew t
   while (now.finished_ms === null);
   assert.equal(now.state, "succeeded", JSON.stringify(now));
   for (const [choice, told] of [
-    ["Renewed by itself", { renew: { every: 1, window: null }, rolling: false }],
+    ["Renewed automatically", { renew: { every: 1, window: null }, rolling: false }],
     ["Rolling", { renew: null, rolling: true }],
   ]) {
     await page.goto(`${ballast.url}/#/sessions/new?policy=${now.policy}`);
-    await page.getByLabel("How it goes on").selectOption(choice);
-    if (choice === "Renewed by itself") await page.getByLabel("Periods by each policy").fill("1");
+    await page.getByLabel("How it continues").selectOption(choice);
+    if (choice === "Renewed automatically") await page.getByLabel("Periods with each policy").fill("1");
     await page.getByRole("button", { name: "Open" }).click();
     await page.getByRole("heading", { name: /^Period 1/ }).waitFor();
     const session = page.url().split("/").at(-1);

@@ -16,7 +16,7 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     const { session } = await call(ballast.url, "/sessions", { policy });
     await page.goto(`${ballast.url}/#/sessions/${session}`);
     await page.getByRole("button", { name: "How much caution?" }).click();
-    await page.getByText("Who knows this market holds").first().waitFor();
+    await page.getByText("The best allocation for this market is").first().waitFor();
     const asked = page.url().split("/").at(-1);
     const report = await call(ballast.url, `/jobs/${asked}/report`);
     assert.equal(report.request.problem.history.length, 24);
@@ -56,7 +56,7 @@ test("a session of several assets asks of all of them, with the returns it obser
     await call(ballast.url, "/observe", { session, period: 1, log_returns: { Stocks: 0.02, Bonds: -0.01 } });
     await page.goto(`${ballast.url}/#/sessions/${session}`);
     await page.getByRole("button", { name: "How much caution?" }).click();
-    await page.getByText("Who knows this market holds").first().waitFor();
+    await page.getByText("The best allocation for this market is").first().waitFor();
     const { request } = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
     assert.deepEqual([request.problem.assets, request.problem.ground_norm, request.resamples], [assets, "sup", 60]);
     assert.deepEqual([request.problem.history.length, request.problem.history.at(-1)], [25, [0.02, -0.01]]);

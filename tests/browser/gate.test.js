@@ -29,7 +29,7 @@ test("a skipped month is asked about, and reported as missing in one click", asy
   await page.getByLabel("Return in June 2019, %").fill("2");
   await page.getByLabel("Last day").first().fill("2019-11-30");
   await page.getByRole("button", { name: "Report June 2019" }).click();
-  await page.getByText("5 periods are missing before 30 Nov 2019: those to 30 Jun 2019 up to 31 Oct 2019.").waitFor();
+  await page.getByText("5 periods are missing before 30 Nov 2019: the first ends on 30 Jun 2019, the last on 31 Oct 2019.").waitFor();
   assert.equal((await observed(session)).length, 1);
   await page.getByRole("button", { name: "Report 5 periods as missing, then this one" }).click();
   await page.getByRole("heading", { name: "December 2019, period 8 of 12" }).waitFor();
@@ -50,7 +50,7 @@ test("a report that somebody else was faster with stays on the page, beside what
   await alert.waitFor();
   assert.match(plain(await alert.innerText()), /^Not recorded: June 2019 was reported as 1\.70 % a moment ago\. You typed -5\.00 %\./);
   await alert.getByRole("button", { name: "Correct it" }).click();
-  await other.getByText("The period is put right.", { exact: false }).first().waitFor();
+  await other.getByText("The period is corrected.", { exact: false }).first().waitFor();
   const [, june] = await observed(session);
   assert.ok(Math.abs(june.now.log_return - Math.log(0.95)) < 1e-12);
   await other.close();
@@ -61,16 +61,16 @@ test("a period is put in by the form for corrections, and the last one is taken 
   await report(session, 1, { simple_return: 0.01, date: "2019-05-31" });
   await report(session, 2, { simple_return: 0.02, date: "2019-07-31", confirm: true });
   await go(`#/sessions/${session}`);
-  const fold = page.getByText("Put a period right");
+  const fold = page.getByText("Correct a period");
   await fold.click();
   const form = page.locator("form", { has: page.getByLabel("What is wrong") });
   await form.getByLabel("What is wrong").selectOption("A period before it was skipped");
   await form.getByLabel("Why").fill("June was skipped");
-  await form.getByRole("button", { name: "Put it right" }).click();
-  await page.getByText(/June 2019 was put in on .*: June was skipped/).waitFor();
+  await form.getByRole("button", { name: "Correct it" }).click();
+  await page.getByText(/June 2019 was inserted on .*: June was skipped/).waitFor();
   assert.deepEqual((await observed(session)).map(({ date }) => date), ["2019-05-31", "2019-06-30", "2019-07-31"]);
   page.once("dialog", (dialog) => dialog.accept());
-  await page.getByRole("button", { name: "take the period out" }).click();
+  await page.getByRole("button", { name: "remove the period" }).click();
   await page.getByRole("heading", { name: "July 2019, period 3 of 12" }).waitFor();
   assert.equal((await observed(session)).length, 2);
 });
@@ -87,14 +87,14 @@ test("a batch proposes the day, asks about what differs, fills gaps and says wha
   await page.getByRole("button", { name: "Report for 4" }).click();
   const outcomes = page.getByRole("table", { name: "Outcomes" });
   await outcomes.getByText(/3 of the 4 reports for this policy and day give 2\.13 %, but this one gives 5\.00 %/).waitFor();
-  await outcomes.getByText("The period to 31 May 2019 is missing before 30 Jun 2019.", { exact: false }).waitFor();
+  await outcomes.getByText("The period that ends on 31 May 2019 is missing before 30 Jun 2019.", { exact: false }).waitFor();
   await outcomes.getByText(/^(Buy|Sell) [\d.]+$|^Nothing$/).first().waitFor();
-  await page.getByRole("button", { name: "Report the 1 missing period of 1 session as missing, and then what is left" }).click();
-  await page.getByText("1 return is recorded, and 1 left above for another try.").first().waitFor();
+  await page.getByRole("button", { name: "Report the 1 missing period of 1 session as missing, then the rest" }).click();
+  await page.getByText("1 return is recorded, and 1 left above to try again.").first().waitFor();
   assert.deepEqual((await observed(sessions[3])).map(({ log_return }) => log_return === null), [false, true, false]);
   // Neither a press nor a list without the others makes it pass.
   assert.equal(await page.getByRole("button", { name: "Report", exact: true }).isDisabled(), true);
-  await page.getByLabel("What is doubted is meant").check();
+  await page.getByLabel("The doubted returns are right").check();
   await page.getByRole("button", { name: "Report for 1" }).click();
   await page.getByText("1 return is recorded.").first().waitFor();
   assert.equal((await observed(sessions[2])).length, 2);

@@ -29,7 +29,7 @@ test("a key is asked for, and a wrong one is refused", async () => {
   await page.getByRole("heading", { level: 1, name: "A key is needed" }).waitFor();
   await page.getByLabel("Key", { exact: true }).fill("ballast_wrong");
   await page.getByRole("button", { name: "Use this key" }).click();
-  await page.getByText("The key is not one in force here").waitFor();
+  await page.getByText("The key is not valid here").waitFor();
 });
 
 test("with the key the page works, and its streams and files show it too", async () => {
@@ -57,7 +57,7 @@ test("the page says who the key is, and what it may do", async () => {
   const words = page.getByText("You are the tenant default");
   await words.waitFor();
   const { key: name } = await (await fetch(`${ballast.url}/key`, { headers: { authorization: `Bearer ${key}` } })).json();
-  assert.match(await words.innerText(), new RegExp(`by the key ${name.split("_")[1].slice(0, 10)} \\(read, operate and train\\)\\. You may see what there is, open sessions and report their returns and train policies`));
+  assert.match(await words.innerText(), new RegExp(`with the key ${name.split("_")[1].slice(0, 10)} \\(read, operate and train\\)\\. You may see policies, sessions and jobs, open sessions and report their returns and train policies`));
   assert.doesNotMatch(await words.innerText(), /audit/);
   const reader = await ballast.key("read");
   await page.getByLabel("Key", { exact: true }).fill(reader);
@@ -93,7 +93,7 @@ test("what a key may not do is not there to be pressed, and the page says why", 
     const pressed = await page.locator("main").locator("button, a.button, label.button").filter({ visible: true }).allInnerTexts();
     return { reports: text.includes(reports), trains: text.includes(trains), pressed: pressed.map((name) => name.trim()) };
   };
-  const WRITES = /Delete|Report|Put it right|take it back|Open a session|Give it a name|Train|Import|Evaluate|How much caution|Backtest|Compare out of sample/;
+  const WRITES = /Delete|Report|Correct it|take it back|Open a session|Give it a name|Train|Import|Evaluate|How much caution|Backtest|Compare out of sample/;
   const pages = { "#/": [true, false], [`#/sessions/${session}`]: [true, true], [`#/policies/${policy}`]: [true, true], "#/policies": [false, true], "#/jobs": [false, true], "#/evaluations": [false, true], "#/key": [false, false] };
   // With all that it takes every page has something that a reader lacks, and says nothing.
   await withKey("read", "operate", "train");
@@ -108,7 +108,7 @@ test("what a key may not do is not there to be pressed, and the page says why", 
   }
   for (const [hash, words] of [["#/train", trains], ["#/sessions/new", reports], ["#/report", reports], ["#/evaluations/new", trains], ["#/backtests/new", trains]]) {
     await visitQuiet(page, `${ballast.url}/${hash}`);
-    await page.getByRole("heading", { level: 1, name: "Not with this key" }).waitFor();
+    await page.getByRole("heading", { level: 1, name: "Not allowed with this key" }).waitFor();
     await page.getByText(words).waitFor();
     assert.equal(await page.locator("main form").count(), 0);
   }
@@ -120,7 +120,7 @@ test("what a key may not do is not there to be pressed, and the page says why", 
 
 test("a key that is given up is gone", async () => {
   await page.getByRole("link", { name: "Key", exact: true }).click();
-  await page.getByRole("button", { name: "Forget the key held" }).click();
+  await page.getByRole("button", { name: "Forget the current key" }).click();
   await page.getByRole("heading", { level: 1, name: "A key is needed" }).waitFor();
   assert.equal(await page.evaluate(() => sessionStorage.length), 0);
   assert.deepEqual(faults, []);

@@ -97,7 +97,7 @@ test("whoever opens a session from a policy stands before the form", async () =>
   assert.equal(await field.inputValue(), policy);
   const open = await page.getByRole("button", { name: "Open", exact: true }).boundingBox();
   assert.ok(open.y + open.height < 900, `the button stands at ${open.y} pixels`);
-  await page.getByText("Other returns are known").click();
+  await page.getByText("Use other known returns").click();
   await page.getByLabel("Returns or prices known").fill("3.2 -1.4 2.1 0.4 -5");
   await page.getByText("5 simple returns in percent").waitFor();
   await page.getByRole("button", { name: "Open", exact: true }).click();

@@ -72,7 +72,7 @@ test("so many periods of several assets are drawn as areas without gaps, of no m
 });
 
 test("of a long record too it is said what leaving one return out would change", async () => {
-  await page.getByText(/^(No return of the record by itself makes a difference: |Without its return of )/).first().waitFor();
+  await page.getByText(/^(No single return of the record matters: |Without its return of )/).first().waitFor();
 });
 
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {

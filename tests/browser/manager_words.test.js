@@ -46,7 +46,7 @@ test("the first sentence of a policy says what it holds now, as a session of it 
   const { allocation } = await advised(one);
   assert.ok(allocation > 0.1 && Math.abs(Number(told[1]) - 100 * allocation) <= 0.05, `${told} for ${allocation}`);
   const costly = await trained(ballast.url, { problem: { ...problem, trading_cost: 0.002 }, design: { count: 40 } });
-  const [, low, high] = /^Now it holds ([\d.]+) % in stocks if all is in the bank, and keeps up to ([\d.]+) %\./.exec(await first(costly));
+  const [, low, high] = /^Now it holds ([\d.]+) % in stocks if everything is in the bank now, and keeps up to ([\d.]+) %\./.exec(await first(costly));
   const { band } = await advised(costly);
   for (const [index, share] of [low, high].entries()) assert.ok(Math.abs(Number(share) - 100 * band[index]) <= 0.05, `${share} for ${band}`);
   const many = await trained(ballast.url, { problem, design: { count: 80, initial_laws: "resampled" } });
@@ -61,7 +61,7 @@ test("where every session knows the same record, what is held is said, and nothi
     await go(`#/policies/${await trained(ballast.url, { problem: { ...problem, rate_per_step }, design: { count: 10 } })}`);
     return plain(await page.locator(".single").innerText());
   };
-  assert.equal(await one(0.1), "Here every session of this policy knows the same record: hold nothing in stocks, for in its worst market nothing beats the bank.");
+  assert.equal(await one(0.1), "Here every session of this policy knows the same record: hold nothing in stocks, because in the worst market nothing beats the bank.");
   assert.match(await one(0.002), /: hold (\d+\.\d|100) % in stocks, worth [\d.]+ % more than the bank even in the worst market/);
 });
 
@@ -99,18 +99,18 @@ test("the form takes percent and presets, and sends what the service counts in",
 test("what may be a mistake is asked about in percent", async () => {
   await askFor({ rate: "3", cost: "5" });
   await page.getByRole("button", { name: "Train", exact: true }).click();
-  await page.getByText("The training is queued. Is this meant?").waitFor();
+  await page.getByText("The training is queued. Is this right?").waitFor();
   const words = plain(await page.locator("main").innerText());
-  assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than banks do\. Is that what it pays in one month, or in a year\?/);
-  assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than the record returned on average\./);
-  assert.match(words, /Trading costs 5\.00 % of all that is traded\. Is that meant\?/);
+  assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than banks usually do\. Is that what it pays in one month, or in a year\?/);
+  assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than the average return of the record\./);
+  assert.match(words, /Trading costs 5\.00 % of what is traded\. Is that right\?/);
   assert.doesNotMatch(words, /problem\./);
 });
 
 test("a refusal is the page's own sentence, in the unit of its field and beside it", async () => {
   await go("#/train");
-  await page.getByRole("button", { name: "Start anew" }).click();
-  await page.getByText("This is what you had typed here before.").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Start again" }).click();
+  await page.getByText("This is what you typed here before.").waitFor({ state: "detached" });
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByLabel("Periods a year").selectOption("none");
   const bank = page.getByLabel("Bank return per period");
@@ -159,7 +159,7 @@ test("a service that stopped answering is said to have, and heard again", async 
   await page.route("**/jobs/**", (route) => route.abort());
   await page.goto("about:blank");
   await page.goto(`${ballast.url}/#/jobs`);
-  await page.getByText(/The service did not answer\..*What stands here is what it said last, on \d/).waitFor();
+  await page.getByText(/The service did not answer\..*This page shows its last answer, of \d/).waitFor();
   await page.unrouteAll();
   await page.getByText("The service did not answer.", { exact: false }).waitFor({ state: "hidden" });
   const { jobs } = await call(ballast.url, "/jobs");

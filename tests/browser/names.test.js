@@ -96,7 +96,7 @@ test("a name is taken away, and what was typed is left", async () => {
   await go(`#/sessions/${session}`);
   await page.getByRole("button", { name: "Edit" }).click();
   await page.getByLabel("Name", { exact: true }).fill("Nobody");
-  await page.getByRole("button", { name: "Leave as it was" }).click();
+  await page.getByRole("button", { name: "Cancel" }).click();
   await page.getByRole("button", { name: "Edit" }).click();
   assert.equal(await page.getByLabel("Name", { exact: true }).inputValue(), "Ada");
   await page.getByLabel("Name", { exact: true }).fill("");

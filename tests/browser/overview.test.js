@@ -141,10 +141,10 @@ test("what needs care is told where it is so", async () => {
   });
   await go("");
   const told = await Promise.all(NAMES.map(async (name) => (await cells(name))[6]));
-  assert.match(told[0], /Returns have changed$/);
-  assert.match(told[1], /Returns may have changed$/);
+  assert.match(told[0], /Market has changed$/);
+  assert.match(told[1], /Market may have changed$/);
   assert.match(told[2], /waiting\s+\d+ of \d+\s+for its next policy$/);
-  await page.getByText("2 of 3 sessions need care: 1 is overdue, 1 waits for its next policy, 1 has returns that have changed.").waitFor();
+  await page.getByText("2 of 3 sessions need care: 1 is overdue, 1 waits for its next policy, 1 is in a market that has changed.").waitFor();
   await page.unrouteAll();
   await go("");
   await page.getByText("1 of 3 sessions needs care: 1 is overdue.").waitFor();
@@ -157,7 +157,7 @@ test("what needs care is told where it is so", async () => {
   await page.getByLabel("Search").fill("");
   await page.getByLabel("State").selectOption("Overdue");
   await shown("1 of 1");
-  await page.getByLabel("State").selectOption("Returns have changed");
+  await page.getByLabel("State").selectOption("Market has changed");
   await page.getByText("No session matches.").waitFor();
   await go("");
   for (const name of NAMES) assert.doesNotMatch((await cells(name))[6], /changed|Due/);
@@ -169,7 +169,7 @@ test("a session where its policy was not trained for says so, and how many do", 
     await route.fulfill({ response, json: { ...(await response.json()), in_design: !route.request().url().endsWith(sessions[1]) } });
   });
   await go("");
-  await page.getByText("Of those shown, 1 lies outside what its policy was trained for.").waitFor();
+  await page.getByText("Of the sessions shown, 1 is in a situation that the policy was not trained for.").waitFor();
   assert.match((await cells("Grace"))[4], /Outside its training$/);
   assert.doesNotMatch((await cells("Ada"))[4], /Outside/);
   await page.unrouteAll();
@@ -193,7 +193,7 @@ test("those ticked are deleted at once after one question, and what stays is nam
   const button = page.getByRole("button", { name: "Delete the 3" });
   answer("dismiss");
   await button.click();
-  assert.equal(asked[0], "Delete 3 sessions and all that was observed?\n\nsession Old 1, session Old 2, session Old 3");
+  assert.equal(asked[0], "Delete 3 sessions and all their reports?\n\nsession Old 1, session Old 2, session Old 3");
   assert.equal((await call(ballast.url, "/sessions?count=total")).total, 6);
   await page.route(`**/sessions/${ids[1]}`, (route) => route.abort());
   answer("accept");

@@ -61,7 +61,7 @@ test("a line is a name and a number however they stand apart", async () => {
   assert.deepEqual(read("Fund 60"), ["Fund 60", null, "has no return"]);
   assert.deepEqual(read("Fund 60", 0.01), ["Fund 60", 0.01, null]);
   assert.deepEqual(read("ffaa11bb22 3"), ["Ada Lovelace", 0.03, null]);
-  assert.deepEqual(read("Ada Lovelace much"), ["Ada Lovelace", null, "\u201cmuch\u201d is not a number of percent"]);
+  assert.deepEqual(read("Ada Lovelace much"), ["Ada Lovelace", null, "\u201cmuch\u201d is not a percentage"]);
   assert.equal(read("Nobody 1")[2], "no session is called \u201cNobody\u201d");
 });
 
@@ -78,13 +78,13 @@ test("a header puts the columns in any order, and a column that means nothing is
   assert.deepEqual(two.rows[0].report, { simple_returns: { "Bonds A/B": 0.002, World: 0.015 }, executed_allocations: { World: 0.4, "Bonds A/B": 0.1 } });
   assert.deepEqual([two.rows[0].trouble, two.unread], [null, ["adviser"]]);
   const wrong = (text) => read(text).rows.map(({ trouble }) => trouble);
-  assert.deepEqual(wrong("client;return;world\nAda;1;2\nTrust;;1"), ["has no asset called \u201cworld\u201d", "holds several assets: it needs a header, and a return in each of the columns \u201cWorld\u201d, \u201cBonds A/B\u201d"]);
-  assert.deepEqual(wrong("client;return;date\nAda;much;\nSmith, John;1;31/10/2026"), ["\u201cmuch\u201d in the column \u201creturn\u201d is not a number of percent", "\u201c31/10/2026\u201d in the column \u201cdate\u201d is not a day such as 2008-09-30"]);
+  assert.deepEqual(wrong("client;return;world\nAda;1;2\nTrust;;1"), ["has no asset called \u201cworld\u201d", "holds several assets: give a header, and a return in each of the columns \u201cWorld\u201d, \u201cBonds A/B\u201d"]);
+  assert.deepEqual(wrong("client;return;date\nAda;much;\nSmith, John;1;31/10/2026"), ["\u201cmuch\u201d in the column \u201creturn\u201d is not a percentage", "\u201c31/10/2026\u201d in the column \u201cdate\u201d is not a date such as 2008-09-30"]);
   const dates = read("client;return;date\nAda;1;31.01.2020\nSmith, John;1;1.2.2020").rows.map(({ report }) => report.date);
   assert.deepEqual(dates, ["2020-01-31", "2020-02-01"]);
-  assert.deepEqual(wrong("client;return;date\nAda;1;31.02.2020"), ["\u201c31.02.2020\u201d in the column \u201cdate\u201d is not a day such as 2008-09-30"]);
-  assert.deepEqual(wrong("client,return\nAda,1,2"), ["has 3 cells, and the header 2"]);
-  assert.deepEqual(wrong("client;world;bonds a/b;world held\nTrust;1;1;30"), ["says what is held of some assets, and not of Bonds A/B"]);
+  assert.deepEqual(wrong("client;return;date\nAda;1;31.02.2020"), ["\u201c31.02.2020\u201d in the column \u201cdate\u201d is not a date such as 2008-09-30"]);
+  assert.deepEqual(wrong("client,return\nAda,1,2"), ["has 3 cells, but the header has 2"]);
+  assert.deepEqual(wrong("client;world;bonds a/b;world held\nTrust;1;1;30"), ["gives the share held of some assets, but not of Bonds A/B"]);
   // Of two columns of one meaning the second is not read.
   assert.deepEqual(read("client,return,return\nAda,1,2").unread, ["return"]);
 });
@@ -116,9 +116,9 @@ test("what is reported up to a day already, or was within the hour, is not repor
   const known = [{ session: "session_00aa11bb22cc33", name: "Ada", state: "active", period: 2, date: "2026-10-31", last_report_ms: 1 }];
   const read = await readBy(known, { lately: () => true });
   const trouble = (text) => read(text).rows[0].trouble;
-  assert.equal(trouble("client,return,date\nAda,1,2026-10-31"), "is reported up to 31 Oct 2026 already");
+  assert.equal(trouble("client,return,date\nAda,1,2026-10-31"), "is already reported up to 31 Oct 2026");
   assert.equal(trouble("client,return,date\nAda,1,2026-11-30"), null);
-  assert.match(trouble("Ada 1"), /^was reported within the hour/);
+  assert.match(trouble("Ada 1"), /^was reported within the last hour/);
   // Whoever says the period cannot count it twice.
   assert.equal(trouble("client,return,period\nAda,1,1"), null);
 });
@@ -137,20 +137,20 @@ test("who gets what is shown before, and what came of it after", async () => {
   await page.getByLabel("Last day").fill("31.10.2020");
   const before = await rows("Returns to report");
   // Lines that cannot be sent stand first, with the reason below the name; who has no line is told.
-  assert.match(before[0], /^Twin 1 Line 3: 2 sessions are called so: write the identifier – 1\.00 % to 2020-10-31$/);
+  assert.match(before[0], /^Twin 1 Line 3: 2 sessions have this name: use the identifier – 1\.00 % to 2020-10-31$/);
   assert.match(before[1], /Line 4: no session is called “Nobody”/);
   assert.match(before[2], /^Ada \w+ 1 1\.20 % to 2020-10-31$/);
   assert.match(before[4], new RegExp(`^${short(sessions[4])} 1 -0\\.50 % to 2020-10-31$`));
   await page.getByText("2 active sessions have no line").click();
   assert.equal(await page.locator("details[open] a").count(), 2);
   await page.getByRole("button", { name: "Report for 3" }).click();
-  await page.getByRole("heading", { name: "What came of it" }).waitFor();
+  await page.getByRole("heading", { name: "Results" }).waitFor();
   const told = await rows("Outcomes");
   assert.match(told[1], /^Ada \w+ 1\.20 % recorded as period 1 /);
   // What is to be done now stands beside each name.
   await page.getByRole("table", { name: "Outcomes" }).getByText(/^(Buy|Sell) [\d.]+$|^Nothing$/).first().waitFor();
   assert.match(told[0], /^Grace Hopper \w+ 90\.00 % Line 2: A return of 90\.00 % lies [\d.]+ standard deviations from the record\. – –$/);
-  await page.getByText("2 returns are recorded, and 3 left above for another try.").first().waitFor();
+  await page.getByText("2 returns are recorded, and 3 left above to try again.").first().waitFor();
   assert.equal(await lines().inputValue(), "Grace Hopper 90\nTwin 1\nNobody 2");
   const [ada] = await observed(0);
   assert.deepEqual([ada.reported.simple_return, ada.date], [0.012, "2020-10-31"]);
@@ -160,12 +160,12 @@ test("who gets what is shown before, and what came of it after", async () => {
 
 test("an unusual return is recorded once it is said to be meant, and no other with it", async () => {
   // As it is it is not sent again by a press alone.
-  await page.getByText("Line 1: is doubted: change it, or say above that it is meant").waitFor();
+  await page.getByText("Line 1: is doubted: change it, or tick above that it is right").waitFor();
   // Another that is as unusual was not asked about yet.
   await lines().fill(`client,return,date\nGrace Hopper,90,2020-10-31\n${short(sessions[4])},120,2020-11-30`);
-  await page.getByLabel("What is doubted is meant").check();
+  await page.getByLabel("The doubted returns are right").check();
   await page.getByRole("button", { name: "Report for 2" }).click();
-  await page.getByText("1 return is recorded, and 1 left above for another try.").first().waitFor();
+  await page.getByText("1 return is recorded, and 1 left above to try again.").first().waitFor();
   assert.equal((await observed(1))[0].reported.simple_return, 0.9);
   assert.equal((await observed(4)).length, 1);
   assert.equal(await lines().inputValue(), `client,return,date\n${short(sessions[4])},120,2020-11-30`);
@@ -176,17 +176,17 @@ test("a return that cannot be is refused in percent", async () => {
   await lines().fill("Ada 50000");
   // What is typed is looked over a moment later.
   await page.getByRole("button", { name: "Report", exact: true, disabled: true }).waitFor();
-  await page.getByLabel("the next period is meant", { exact: false }).check();
+  await page.getByLabel("the next period", { exact: false }).check();
   await page.getByRole("button", { name: "Report for 1" }).click();
-  await page.getByText("1 left above for another try", { exact: false }).first().waitFor();
+  await page.getByText("1 left above to try again", { exact: false }).first().waitFor();
   await page.getByText("Line 1: The return is 50,000", { exact: false }).waitFor();
   const [told] = await rows("Outcomes");
   assert.match(told, /Line 1: The return is 50,000 %; it must be from -99\.32 % to 14,741\.31 %\. – –$/);
   await page.getByLabel("Last day").fill("2020-10-31");
   await lines().fill("Ada 1");
-  await page.getByText("Line 1: is reported up to 31 Oct 2020 already").waitFor();
+  await page.getByText("Line 1: is already reported up to 31 Oct 2020").waitFor();
   await page.getByLabel("Last day").fill("");
-  await page.getByText("Line 1: was reported within the hour", { exact: false }).waitFor();
+  await page.getByText("Line 1: was reported within the last hour", { exact: false }).waitFor();
 });
 
 test("those ticked get one return, and an answer that is lost is asked for again without harm", async () => {
@@ -219,7 +219,7 @@ test("forty clients are reported by one file, a bad row is named by its line, an
   // The button stays in view above a table of forty rows.
   assert.equal(await page.getByRole("button", { name: "Report for 39" }).evaluate((button) => button.getBoundingClientRect().bottom <= innerHeight), true);
   assert.match((await rows("Returns to report"))[39], /^Client 40 \w+ 1 World 1\.90 % Gold 0\.50 % ?$/);
-  await sendTwice(39, "39 returns are recorded, and 1 left above for another try.");
+  await sendTwice(39, "39 returns are recorded, and 1 left above to try again.");
   assert.equal((await lines().inputValue()).split("\n").length, 2);
   // The whole file again, on a page that has forgotten the first: the one row that was bad is all that is ready.
   await go("#/report");
@@ -230,7 +230,7 @@ test("forty clients are reported by one file, a bad row is named by its line, an
   }, csv((k) => `Client ${k + 1}`)) });
   await page.getByText("1 return is ready, and 39 lines are not.").waitFor();
   await page.getByRole("button", { name: "Report for 1" }).click();
-  await page.getByText("1 return is recorded, and 39 left above for another try.").first().waitFor();
+  await page.getByText("1 return is recorded, and 39 left above to try again.").first().waitFor();
   for (const [k, session] of clients.entries()) {
     const { observations } = await call(ballast.url, `/sessions/${session}/history`);
     assert.equal(observations.length, 1, `client ${k + 1}`);
@@ -268,14 +268,14 @@ test("returns that seem to be fractions are not recorded before it is said what 
 
 test("a column that is not understood is named, with those that are", async () => {
   await lines().fill("client,return,colour\nAda,1,red");
-  await page.getByText(/^Nothing is read from the column “colour”\. A column is called client, return, held, rate, flow, wealth, date, period or like an asset/).waitFor();
+  await page.getByText(/^Nothing is read from the column “colour”\. Use the names client, return, held, rate, flow, wealth, date, period or the name of an asset/).waitFor();
 });
 
 test("of a long list the first hundred lines are drawn, those that cannot be sent before the others, and all where that is wanted", async () => {
   await go("#/report");
   const drawn = page.getByRole("table", { name: "Returns to report" }).locator("tbody tr");
   await lines().fill(["Ada 1.2", ...Array.from({ length: 499 }, (_, k) => `Nobody${k} 1`)].join("\n"));
-  await page.getByLabel("the next period is meant", { exact: false }).check();
+  await page.getByLabel("the next period", { exact: false }).check();
   await page.getByRole("button", { name: "Report for 1" }).waitFor();
   assert.equal(await drawn.count(), 100);
   assert.match(await drawn.first().innerText(), /^Nobody0/);
@@ -289,8 +289,8 @@ test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and noth
   await usable(page, async () => {
     await go("#/report");
     await lines().fill("Ada 500\nNobody 2");
-    await page.getByLabel("the next period is meant", { exact: false }).check();
+    await page.getByLabel("the next period", { exact: false }).check();
     await page.getByRole("button", { name: "Report for 1" }).click();
-    await page.getByRole("heading", { name: "What came of it" }).waitFor();
+    await page.getByRole("heading", { name: "Results" }).waitFor();
   });
 });

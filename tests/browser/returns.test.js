@@ -96,7 +96,7 @@ test("questions are answered by the keyboard alone, and nothing is trained befor
   await note().getByText("Are the returns fractions or percent?").waitFor();
   assert.deepEqual(await history(), []);
   await page.getByRole("button", { name: "Train", exact: true }).click();
-  await page.getByText(/^To be answered first: Which day is 01\/02\/2020/).waitFor();
+  await page.getByText(/^Answer this first: Which day is 01\/02\/2020/).waitFor();
   assert.deepEqual((await call(ballast.url, "/jobs")).jobs, []);
   await page.getByRole("radio", { name: /^1 February 2020/ }).focus();
   await page.keyboard.press("Space");
@@ -116,7 +116,7 @@ test("questions are answered by the keyboard alone, and nothing is trained befor
 test("two columns of numbers are asked about, and another answer reads the file anew", async () => {
   await chosen("two.csv", "month,fund,bonds\n2020-01,1.5,-0.4\n2020-02,-2.5,1.9\n2020-03,3,-1.2\n");
   await page.getByRole("checkbox", { name: /^fund / }).check();
-  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByRole("button", { name: "Read it this way" }).click();
   await note().getByText("3 monthly simple returns in percent, January 2020 to March 2020, as in column fund.").waitFor();
   const column = (name) => page.getByRole("group", { name: "Columns" }).getByLabel(name).click();
   await column("bonds");
@@ -151,7 +151,7 @@ test("a deviation above 30 % a period is not taken without a word", async () => 
   await note().getByText("give a standard deviation of 258.26 % a period").waitFor();
   assert.deepEqual(await history(), []);
   await page.getByRole("radio", { name: /^Yes, that is right/ }).check();
-  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByRole("button", { name: "Read it this way" }).click();
   await note().getByText("4 simple returns in percent").waitFor();
   assert.equal((await history()).length, 4);
 });

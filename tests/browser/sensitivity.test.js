@@ -24,14 +24,14 @@ test("the sentences say what differs, in percent", () => {
     said(near),
     "Without its return of -8.6 % the advice would be 100 %. " +
       "After a return of -7.0 % the advice would be 0 %; after one of 6.0 % it would be 61.2 %. " +
-      "A coming return of -6.2 % would take the advice to the bank. " +
-      "The record has paid 0.51 % a period beyond what the bank pays now; the advice leaves the bank at 0.44 %.",
+      "A return of -6.2 % next period would move the advice fully into the bank. " +
+      "The record has paid 0.51 % a period more than the bank pays now; the advice leaves the bank at 0.44 %.",
   );
 });
 
 test("a premium has the digits that decide", () => {
   const premium = { present: 0.00021, needed: 0.000198, periods_more: 0 };
-  assert.match(said({ ...near, sensitivity: { ...near.sensitivity, premium } }), /paid 0\.0210 % a period beyond what the bank pays now; the advice leaves the bank at 0\.0198 %\.$/);
+  assert.match(said({ ...near, sensitivity: { ...near.sensitivity, premium } }), /paid 0\.0210 % a period more than the bank pays now; the advice leaves the bank at 0\.0198 %\.$/);
 });
 
 test("who is in the bank is told what it would take, and what never would", () => {
@@ -45,20 +45,20 @@ test("who is in the bank is told what it would take, and what never would", () =
         premium: { present: 0.0051, needed, periods_more },
       },
     });
-  assert.match(banked(37), /leaves the bank at 0.61 %. About 37 more periods like those seen would do as well.$/);
+  assert.match(banked(37), /leaves the bank at 0.61 %. About 37 more periods like those seen would also be enough.$/);
   assert.match(banked(1), /About 1 more period like/);
-  assert.match(banked(null), /No number of periods like those seen, up to 10,000, would do.$/);
-  assert.match(banked(null, null), /no other mean near it/);
-  assert.match(banked(37), /^No return of the record by itself makes a difference/);
+  assert.match(banked(null), /No number of periods like those seen, up to 10,000, would be enough.$/);
+  assert.match(banked(null, null), /at no similar average/);
+  assert.match(banked(37), /^No single return of the record matters/);
   const held = (allocation, next) => said({ allocation, sensitivity: { ...near.sensitivity, next_return: { ...next_return, ...next } } });
-  assert.match(held(0, { to_bank: at(0.103) }), /The next period must return more than 10\.3 % before it leaves the bank\. The record/);
+  assert.match(held(0, { to_bank: at(0.103) }), /The advice leaves the bank only if the next period returns more than 10\.3 %\. The record/);
   assert.match(held(1, { to_bank: null, to_highest: at(-0.02) }), /It stays there unless the next period returns less than -2\.0 %\./);
-  assert.match(banked(37), /After a return of -7\.0 %, and after one of 6\.0 % too, it would stay at 0 %\./);
+  assert.match(banked(37), /After a return of -7\.0 % or of 6\.0 % it would stay at 0 %\./);
 });
 
 test("how near is said first, by what an unusual period would do", () => {
   const moved = (low, high) => plain(headline({ allocation: 0.43, sensitivity: { next_return: { low: at(-0.07, low), high: at(0.06, high) } } }, "month"));
-  assert.equal(moved(0, 0.612), "It is near to changing: an unusual month would move it by 43 points.");
+  assert.equal(moved(0, 0.612), "It is close to changing: an unusual month would move it by 43 points.");
   assert.equal(moved(0.4, 0.48), "It moves a little: an unusual month would move it by up to 5.0 points.");
   assert.equal(moved(0.425, 0.44), "It is steady: nine in ten months would move it by less than 2 points.");
 });

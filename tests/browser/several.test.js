@@ -62,7 +62,7 @@ test("each asset is told in shares where its price is typed, and the others are 
   const all = 250_000 * (1 - COST * action.total);
   const most = ASSETS.reduce((one, other) => (action.allocation[other] > action.allocation[one] ? other : one));
   assert.ok(action.allocation[most] > 0.01);
-  await page.getByText("In shares, at a price of today").click();
+  await page.getByText("In shares, at today\u2019s price").click();
   await page.getByLabel(`Price of ${most}`).fill("80");
   const shares = (/about ([\d,.]+) shares/g);
   const row = plain(await page.getByRole("table", { name: "What to hold of each asset" }).getByRole("row", { name: most }).innerText());
@@ -107,7 +107,7 @@ test("a return is reported for each asset, and other shares where they were held
   await page.getByLabel("Bonds A/B held, %").fill("10");
   await page.getByLabel("Gold held, %").fill("60");
   for (const name of ASSETS) await page.getByLabel(`Return of ${name}, %`).fill("1");
-  await page.getByText("This will be refused: 110.0\u202f% in all cannot be held.").waitFor();
+  await page.getByText("This will be refused: the shares held add up to 110.0\u202f%, more than 100\u202f%.").waitFor();
   await page.getByLabel("Gold held, %").fill("20");
   await page.getByLabel("Money added at the end").fill("-1000000");
   await page.getByText(/^This will be refused\. Money added at the end is \u22121,000,000; it must leave an allowed wealth: .* give a wealth of \u2212\d{3},\d{3}, and/).waitFor();
@@ -133,8 +133,8 @@ test("what was held stands one above the other, read by keyboard and as a table"
 test("a period that passed is put right by name, and what was reported stays on record", async () => {
   await go();
   await page.getByText("Last report, November 2020: 1.00\u202f% of the assets together").waitFor();
-  await page.getByText("Put a period right").click();
-  const form = page.locator("form", { has: page.getByRole("button", { name: "Put it right" }) });
+  await page.getByText("Correct a period").click();
+  const form = page.locator("form", { has: page.getByRole("button", { name: "Correct it" }) });
   assert.equal(await form.getByLabel("Return of World, %").inputValue(), "1");
   await form.getByText("I held other shares").click();
   assert.equal(await form.getByLabel("World held, %").inputValue(), "40");
@@ -143,13 +143,13 @@ test("a period that passed is put right by name, and what was reported stays on 
   assert.equal(await form.getByLabel("World held, %").inputValue(), "");
   await form.getByLabel("World held, %").fill("30");
   await form.getByLabel("Why").fill("a slip");
-  await form.getByRole("button", { name: "Put it right" }).click();
-  await form.getByText("Where one share is said, all are.").waitFor();
+  await form.getByRole("button", { name: "Correct it" }).click();
+  await form.getByText("Give the share of every asset, or of none.").waitFor();
   await form.getByLabel("Bonds A/B held, %").fill("10");
   await form.getByLabel("Gold held, %").fill("5");
   await form.getByLabel("Return of World, %").fill("0.5");
-  await form.getByRole("button", { name: "Put it right" }).click();
-  await page.getByText(/October 2020 was put right on .*: a slip/).waitFor();
+  await form.getByRole("button", { name: "Correct it" }).click();
+  await page.getByText(/October 2020 was corrected on .*: a slip/).waitFor();
   const history = await call(ballast.url, `/sessions/${session}/history`);
   assert.deepEqual(history.observations[0].now.reported.simple_returns, { World: 0.005, "Bonds A/B": 0.002, Gold: -0.01 });
   assert.deepEqual(history.observations[0].now.reported.executed_allocations, { World: 0.3, "Bonds A/B": 0.1, Gold: 0.05 });
@@ -202,7 +202,7 @@ test("it stands beside another session by what it holds in all", async () => {
   assert.match(told["To trade"][1], /^buy [\d.]+$/);
   assert.doesNotMatch(plain(await page.locator("main").innerText()), /NaN|undefined|in stocks/);
   await page.goto(`${ballast.url}/#/policies/${policy}`);
-  await page.getByText("It is for World, Bonds A/B and Gold;", { exact: false }).waitFor();
+  await page.getByText("It is for World, Bonds A/B and Gold.", { exact: false }).waitFor();
 });
 
 test("a session of several that has ended says so, and what it held", async () => {
@@ -218,11 +218,11 @@ const TABLE = ["month\tWorld\tBonds A/B\tGold\trf", ...HISTORY.map((row, k) => [
 test("a policy of several is trained from a table that is pasted, and its columns are the assets", async () => {
   await visitQuiet(page, `${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(TABLE);
-  const columns = page.getByRole("group", { name: "Which column holds the returns or prices? Several columns are several assets." });
+  const columns = page.getByRole("group", { name: "Which column holds the returns or prices? Several columns mean several assets." });
   for (const name of ["World", "Bonds A/B", "Gold"]) await columns.getByLabel(name, { exact: false }).first().check();
-  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByRole("button", { name: "Read it this way" }).click();
   await page.getByLabel(/^Percent/).check();
-  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByRole("button", { name: "Read it this way" }).click();
   await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
   await page.getByLabel("Kind of policy").waitFor({ state: "hidden" });
   await page.getByLabel("How the assets are mixed").selectOption("Less of what varies more");
@@ -240,7 +240,7 @@ test("a policy of several is trained from a table that is pasted, and its column
   assert.deepEqual([problem.assets, problem.composition, problem.rate_per_step], [ASSETS, "inverse_volatility", 0.001]);
   for (const [date, row] of HISTORY.entries()) for (const [asset, value] of row.entries()) near(problem.history[date][asset], value, 1e-6);
   await page.getByRole("link", { name: "See the policy" }).first().click();
-  await page.getByText("It is for World, Bonds A/B and Gold;", { exact: false }).waitFor();
+  await page.getByText("It is for World, Bonds A/B and Gold.", { exact: false }).waitFor();
 });
 
 test("a session of it is opened with what is held of each", async () => {
@@ -248,11 +248,11 @@ test("a session of it is opened with what is held of each", async () => {
   await page.getByLabel("World held already, %").fill("30");
   await page.getByLabel("Gold held already, %").fill("12,5");
   await page.getByLabel("Share of it held already, %").waitFor({ state: "hidden" });
-  await page.getByText("Other returns are known").click();
+  await page.getByText("Use other known returns").click();
   await page.getByLabel("Returns or prices known").fill(["Gold,World,Bonds A/B", ...HISTORY.slice(0, 8).map(([world, bonds, gold]) => [gold, world, bonds].join())].join("\n"));
   const columns = page.getByRole("group", { name: /^Which column/ });
   for (const name of ["Gold", "World", "Bonds A/B"]) await columns.getByLabel(name, { exact: false }).first().check();
-  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByRole("button", { name: "Read it this way" }).click();
   await page.getByLabel("They are").selectOption("log");
   await page.getByText(/8 log-returns as fractions/).waitFor();
   await page.getByRole("button", { name: "Open", exact: true }).click();

@@ -99,7 +99,7 @@ test("two tenants in two tabs of one browser see nothing of each other", async (
         assert.doesNotMatch(words.replace(/search=\w+/, ""), new RegExp(`of ${other.tenant}`), hash);
       }
       await text(`#/sessions/${other.session}`);
-      await page.getByRole("heading", { level: 1, name: "It is not here" }).waitFor();
+      await page.getByRole("heading", { level: 1, name: "Not found" }).waitFor();
     }
   } finally {
     await context.close();

@@ -35,7 +35,7 @@ test("the dates of a record tell the periods a year, and without dates they are 
   assert.equal(await yearly().inputValue(), "");
   await page.getByLabel("Bank return per period, %").fill("0.2");
   await train().click();
-  await page.getByText("The record has no dates that tell it: choose how many periods make a year.").waitFor();
+  await page.getByText("The record has no dates that show it: choose how many periods make a year.").waitFor();
   assert.equal(await yearly().evaluate((control) => control === document.activeElement), true);
   await yearly().selectOption("52: weeks");
   assert.equal((await sent()).problem.periods_per_year, 52);
@@ -47,7 +47,7 @@ test("what the bank pays in a year is taken, by the unit chosen or typed", async
   await page.getByLabel("Months ahead").fill("2");
   await small();
   await page.getByLabel("Bank return per month, %").fill("2 % a year");
-  assert.equal(await page.getByLabel("The bank return is told").inputValue(), "year");
+  assert.equal(await page.getByLabel("The bank return is").inputValue(), "year");
   assert.ok(Math.abs((await sent()).problem.rate_per_step - (1.02 ** (1 / 12) - 1)) < 1e-12);
   await page.getByRole("heading", { level: 1, name: "Jobs" }).waitFor();
 });
@@ -60,16 +60,16 @@ test("what may be a mistake is asked before the form is left, and the form stays
   await small();
   await rate.fill("2");
   await train().click();
-  const question = page.getByRole("group", { name: "Is this meant?" });
+  const question = page.getByRole("group", { name: "Is this right?" });
   await question.getByText(/The bank pays 2\.00.% a month/).first().waitFor();
   assert.equal(await rate.inputValue(), "2");
-  await question.getByRole("button", { name: "No, I change it" }).click();
+  await question.getByRole("button", { name: "No, change it" }).click();
   await question.waitFor({ state: "detached" });
   const { jobs } = await call(ballast.url, "/jobs?limit=1");
   assert.ok(jobs[0].state === "cancelled" || jobs[0].cancel_requested || jobs[0].state === "succeeded", JSON.stringify(jobs[0]));
   assert.equal(await record().inputValue(), DATED);
   await train().click();
-  await question.getByRole("button", { name: "Yes, go on" }).click();
+  await question.getByRole("button", { name: "Yes, continue" }).click();
   await page.getByRole("heading", { level: 1, name: "Jobs" }).waitFor();
 });
 
@@ -80,7 +80,7 @@ test("a form half filled survives a reload, Back and the navigation, says so, an
   await page.getByLabel("Months ahead").fill("7");
   await page.getByLabel("Name").fill("Half done");
   const stands = async () => {
-    await page.getByText("This is what you had typed here before.").waitFor();
+    await page.getByText("This is what you typed here before.").waitFor();
     await page.getByText(/^12 monthly/).first().waitFor();
     assert.deepEqual([await record().inputValue(), await page.getByLabel("Months ahead").inputValue(), await page.getByLabel("Name").inputValue()], [DATED, "7", "Half done"]);
   };
@@ -91,11 +91,11 @@ test("a form half filled survives a reload, Back and the navigation, says so, an
   await page.goBack();
   await stands();
   await usable(page, () => {});
-  await page.getByRole("button", { name: "Start anew" }).click();
-  await page.getByText("This is what you had typed here before.").waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Start again" }).click();
+  await page.getByText("This is what you typed here before.").waitFor({ state: "detached" });
   assert.equal(await record().inputValue(), "");
   await go("#/train");
-  assert.equal(await page.getByText("This is what you had typed here before.").count(), 0);
+  assert.equal(await page.getByText("This is what you typed here before.").count(), 0);
 });
 
 test("a key that expires is told so over the page, and what was typed is kept while another is pasted", async () => {

@@ -91,7 +91,7 @@ test("every warning of the service has words here, and names the record it is ab
   assert.deepEqual(Object.keys(WARNED).sort(), (codes.enum ?? codes.oneOf.flatMap((one) => one.enum)).sort());
   assert.match(WARNED.record_in_percent({}, "problem.history"), /^The returns vary/);
   assert.match(WARNED.record_in_percent({}, "problem.centre.history"), /^The assumed returns vary/);
-  assert.equal(WARNED.rate_high({ rate_per_step: [0.03, 0.04], periods_per_year: 12 }), "The bank pays more than banks do. Is that what it pays in one month, or in a year?");
+  assert.equal(WARNED.rate_high({ rate_per_step: [0.03, 0.04], periods_per_year: 12 }), "The bank pays more than banks usually do. Is that what it pays in one month, or in a year?");
 });
 
 test("a doubt is told in a sentence, with its asset where there are several, and its periods where they are missing", () => {
@@ -100,31 +100,31 @@ test("a doubt is told in a sentence, with its asset where there are several, and
   assert.equal(one({ reason: "unusual_return", field: "simple_return", sentence }), "A return of 90.00 % lies 24.8 standard deviations from the record.");
   assert.equal(one({ reason: "unusual_return", field: "simple_returns.Bonds A/B", sentence }), "Bonds A/B: a return of 90.00 % lies 24.8 standard deviations from the record.");
   const gap = (missing) => one({ reason: "missing_periods", field: "date", value: "2026-11-30", sentence, missing });
-  assert.equal(gap(["2026-10-31"]), "The period to 31 Oct 2026 is missing before 30 Nov 2026.");
-  assert.equal(gap(["2026-09-30", "2026-10-31"]), "2 periods are missing before 30 Nov 2026: those to 30 Sept 2026 up to 31 Oct 2026.");
+  assert.equal(gap(["2026-10-31"]), "The period that ends on 31 Oct 2026 is missing before 30 Nov 2026.");
+  assert.equal(gap(["2026-09-30", "2026-10-31"]), "2 periods are missing before 30 Nov 2026: the first ends on 30 Sept 2026, the last on 31 Oct 2026.");
 });
 
 test("a refusal names the field, the value and the rule in the unit of the field", () => {
   const cases = [
     [{ value: 0, rule: "must lie in [1, 520]" }, "Decisions", null, "Decisions is 0; it must be from 1 to 520."],
     [{ value: 0.5, rule: "must lie in (1, 100]; at 1 use the log utility" }, "Risk aversion", null, "Risk aversion is 0.5; it must be above 1 and at most 100; at 1 use the log utility."],
-    [{ value: "100,000", rule: 'invalid type: string "100,000", expected f64' }, "Initial wealth", null, "Initial wealth is \u201c100,000\u201d; it must be a number, with nothing between its thousands."],
-    [{ value: null, rule: "invalid type: null, expected f64" }, "Initial wealth", null, "Initial wealth is blank; it must be a number, with nothing between its thousands."],
+    [{ value: "100,000", rule: 'invalid type: string "100,000", expected f64' }, "Initial wealth", null, "Initial wealth is \u201c100,000\u201d; it must be a number without thousands separators."],
+    [{ value: null, rule: "invalid type: null, expected f64" }, "Initial wealth", null, "Initial wealth is blank; it must be a number without thousands separators."],
     [{ value: 1.5, rule: "invalid type: floating point `1.5`, expected u64" }, "Seed", null, "Seed is 1.5; it must be a whole number, zero or more."],
     [{ value: 1, rule: "must lie in [0.001, 0.999]" }, "Confidence, %", "confidence", "Confidence is 0 %; it must be from 0.1 % to 99.9 %."],
     [{ value: 0.6, rule: "must lie in [-0.5, 0.5]" }, "Bank return per month, %", "percent", "Bank return per month is 60 %; it must be from -50 % to 50 %."],
     [{ value: 7, rule: "must lie in [-5, 5]" }, "Returns or prices, number 4,", null, "Returns or prices, number 4, is 7; it must be from -5 to 5."],
     [{ value: "x", rule: "unknown variant `x`, expected one of `log`, `power`" }, "Kind", null, "Kind is \u201cx\u201d; it must be one of log, power."],
     [{ value: -1000, rule: "must leave a wealth that lies in [0.000001, 1000000]" }, "Money added", null, "Money added is -1000; it must leave a wealth that lies from 0.000001 to 1,000,000."],
-    [{ value: "31.01.2020", rule: "failed to parse four digit integer as year: invalid digit, expected 0-9 but got ." }, "Last day", null, "Last day is \u201c31.01.2020\u201d; it must be a day such as 2008-09-30."],
-    [{ value: true, rule: "a rolling session needs a policy that learns" }, "How it goes on", null, "How it goes on: a rolling session needs a policy that learns."],
-    [{ value: [1], rule: "must hold problem.horizon = 12 numbers" }, "Money added", null, "Money added is not as it must be; it must hold 12 numbers."],
+    [{ value: "31.01.2020", rule: "failed to parse four digit integer as year: invalid digit, expected 0-9 but got ." }, "Last day", null, "Last day is \u201c31.01.2020\u201d; it must be a date such as 2008-09-30."],
+    [{ value: true, rule: "a rolling session needs a policy that learns" }, "How it continues", null, "How it continues: a rolling session needs a policy that learns."],
+    [{ value: [1], rule: "must hold problem.horizon = 12 numbers" }, "Money added", null, "Money added has the wrong form; it must hold 12 numbers."],
     [{ value: 40, rule: "must be at most horizon" }, "Window", null, "Window is 40; it must be at most the number of periods ahead."],
     [{ value: -1, rule: "must be a number in [-0.9932620530009145, 147.4131591025766]" }, "Return in period 2, %", "percent", "Return in period 2 is -100 %; it must be from -99.32 % to 14,741.31 %."],
   ];
   for (const [problem, label, unit, words] of cases) assert.equal(plain(problemWords(problem, label, unit)), words);
   const every = { value: 40, rule: "must be at most the horizon" };
-  assert.equal(problemWords(every, "Trained anew every", null, "Looking ahead"), "Trained anew every is 40; it must be at most \u201cLooking ahead\u201d.");
+  assert.equal(problemWords(every, "Retrained every", null, "Looking ahead"), "Retrained every is 40; it must be at most \u201cLooking ahead\u201d.");
 });
 
 test("numbers of a column have the digits of each other, and a sentence has minus signs", () => {

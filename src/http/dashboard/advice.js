@@ -11,11 +11,11 @@ const TOLERANCE = 0.001;
 /** Where an advice comes from, in words: every source that the service names. */
 export const SOURCES = {
   policy_surrogate: "read off the policy",
-  resolved: "solved anew on request",
-  resolved_other_radius: "solved anew for another radius",
-  resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
+  resolved: "solved again on request",
+  resolved_other_radius: "solved again for another radius",
+  resolved_outside_design: "solved again, because this state lies outside the policy\u2019s design",
   unsolved:
-    "because the step has no finite solution here, or wealth does not last for what is withdrawn: all stays in the bank, which no market can hurt",
+    "everything stays in the bank, because the step has no finite solution here or wealth cannot cover the planned withdrawals",
 };
 
 /** Whether two allocations are the same advice. */
@@ -27,7 +27,7 @@ const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
  * `checked` takes what `/action` says of the same state with the step solved anew, `unchecked` why it could not be.
  */
 export function adviceView(action, place, rest) {
-  const note = h("p", { class: "note", id: "check" }, `${exactly(action)}. The step is being solved anew, as a check\u2026`);
+  const note = h("p", { class: "note", id: "check" }, `${exactly(action)}. Solving the step again as a check\u2026`);
   const sentence = h("p", { class: "sentence order" });
   const tell = (price) => sentence.replaceChildren(...order(action, { ...place, price }));
   tell(place.price);
@@ -47,9 +47,9 @@ export function adviceView(action, place, rest) {
   );
   const checked = (anew) => {
     const apart = points(Math.abs(anew.allocation - action.allocation));
-    const found = anew.source === "unsolved" ? exactly(anew) : `The step solved anew holds ${percent(anew.allocation)}`;
+    const found = anew.source === "unsolved" ? exactly(anew) : `The step solved again holds ${percent(anew.allocation)}`;
     note.textContent = agrees(anew.allocation, action.allocation)
-      ? `${exactly(action)}. Checked: the step solved anew is within ${points(TOLERANCE)} of it.`
+      ? `${exactly(action)}. Checked: the step solved again is within ${points(TOLERANCE)} of it.`
       : `${exactly(action)}. ${found}, ${apart} away from it.`;
   };
   const unchecked = (words) => (note.textContent = `${exactly(action)}. It could not be checked: ${words}`);
@@ -75,16 +75,16 @@ function order(action, place) {
   const sized = traded === undefined ? "" : ` (about ${shareCount(Math.abs(traded))} shares at ${wealth(place.price)})`;
   const paid = cost > 0 && !still ? `, which costs ${wealth(cost)}` : "";
   const act = still
-    ? [h("b", {}, "Nothing to trade"), `: ${wealth(now)} is held now.`]
-    : [h("b", {}, `${trade > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(trade))}`), `${sized}${paid}: ${wealth(now)} is held now, ${allocation(action.holding)}.`];
-  const kept = low < high ? ` Anything from ${allocation(low)} to ${allocation(high)} is best kept as it is.` : "";
+    ? [h("b", {}, "Nothing to trade"), `: you hold ${wealth(now)} now.`]
+    : [h("b", {}, `${trade > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(trade))}`), `${sized}${paid}: you hold ${wealth(now)} now, ${allocation(action.holding)}.`];
+  const kept = low < high ? ` The no-trade range is ${allocation(low)} to ${allocation(high)}: do not trade inside it.` : "";
   return [`${stocks}${shares === undefined || shares === 0 ? "" : `, ${shareCount(shares)} shares`}. `, ...act, kept];
 }
 
 /** What the advice is worth even then, as the parts of a sentence. */
 export function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
   const worst = "n the worst market it guards against";
-  const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy takes it for");
+  const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy assumes");
   if (allocation === 0) return [`${market}, nothing beats the bank, which reaches `, h("b", {}, wealth(floor)), ` ${end}.`];
   return [
     `${even}, this is worth as much as a sure `,

@@ -79,14 +79,14 @@ function walked({ choices, lines, unit, times }) {
   const { every, window, horizon, trading_cost, risk_aversion } = choices;
   const length = lines[0].wealth.length - 1;
   const investor = investorWords(risk_aversion === 1 ? { kind: "log" } : { kind: "power", risk_aversion });
-  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded.` : "Trading is free, so who trades much looks better than he would be.";
+  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded.` : "Trading is free here, so strategies that trade often look better than they would in reality.";
   const ahead = horizon === every ? "" : `, looking ${counted(horizon, unit)} ahead`;
-  const few = `Each of them rests on ${counted(window, "return")}: with fewer than ${SHORT_RECORD}, most of what the asset can do is yet unseen.`;
+  const few = `Each of them rests on ${counted(window, "return")}: with fewer than ${SHORT_RECORD}, the record has not yet shown most of what the asset can do.`;
   return h(
     "div",
     { class: "words" },
     h("p", {}, `${count(lines.filter(({ hindsight }) => !hindsight).length)} ways to hold stocks, through ${counted(length, unit)}, ${times.name(1)} to ${times.name(length)}, for ${investor}.`),
-    h("p", {}, `Every ${counted(every, unit)} policies are trained on the ${counted(window, unit)} before${ahead}, and lived by until the next: nothing later is used for what is held. ${cost}`),
+    h("p", {}, `Every ${counted(every, unit)} policies are trained on the ${counted(window, unit)} before${ahead}, and followed until the next training. No holding uses later returns. ${cost}`),
     window < SHORT_RECORD && h("p", { class: "note wrong" }, few),
   );
 }
@@ -101,11 +101,11 @@ function conclusions(told) {
   const best = main.place === 1 ? main : real.find(({ place }) => place === 1);
   const quoted = `\u201c${main.name}\u201d`;
   const said = [
-    `${best === main || !KNOWN.includes(best.kind) ? `\u201c${best.name}\u201d` : best.name} came to the most for this investor in this record: a year from ${START} counts as a sure ${wealth(worth(best))}${best === bank ? "" : `, where all in the bank comes to ${wealth(worth(bank))}`}.`,
+    `${best === main || !KNOWN.includes(best.kind) ? `\u201c${best.name}\u201d` : best.name} did best for this investor in this record: a year from ${START} is worth as much as a sure ${wealth(worth(best))}${best === bank ? "" : `; all in the bank is worth ${wealth(worth(bank))}`}.`,
   ];
   if (best !== main) said.push(`${quoted} comes ${ordinal(main.place)} of ${real.length}, with ${wealth(worth(main))}.`);
-  if (uncounted_periods > 0) said.push(`The first ${uncounted_periods === 1 ? `${told.unit} counts` : `${counted(uncounted_periods, told.unit)} count`} in no year: years end with the last ${told.unit}.`);
-  if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} to decide about, fewer than ${FEWEST_YEARS}: it does not tell the strategies apart. A crash that comes once in ten years is missing from many records so short.`);
+  if (uncounted_periods > 0) said.push(`The first ${uncounted_periods === 1 ? `${told.unit} is` : `${counted(uncounted_periods, told.unit)} are`} left out of the years, because the years are counted back from the last ${told.unit}.`);
+  if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} of decisions, fewer than ${FEWEST_YEARS}, so it cannot rank the strategies. A crash that comes once in ten years is missing from many records this short.`);
   else said.push(apart(told, main, quoted));
   said.push(`The worst fall of ${quoted} was ${percent(main.max_drawdown)}, that of all in stocks ${percent(stocks.max_drawdown)}; from ${START} it came to ${wealth(main.final_wealth)}, all in stocks to ${wealth(stocks.final_wealth)}.`);
   if (whole_years >= FEWEST_YEARS && main.beyond_own_mix) said.push(changing({ name: quoted, allocation: main.mean_allocation, beyond: estimate(main.beyond_own_mix), shown: "the record does" }));
@@ -128,7 +128,7 @@ function apart({ lines, intervals }, main, quoted) {
 
 /** What is said of them, and what each came to. */
 function resultsOfOne(told) {
-  const more = ` \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand: it is given no place among the others.`;
+  const more = ` \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average. Nobody knew that share beforehand, so it is not ranked with the others.`;
   return results(told, conclusions(told), more);
 }
 
@@ -155,7 +155,7 @@ function course(told, line) {
   const drawn = (one, values) => ({ name: one.name, colour: one.colour, kind: "line", bare: true, values });
   const gutter = 64;
   return [
-    lineChart({ title: `Wealth from ${START}, equal ratios alike`, gutter, height: 250, x, y: { format: wealth, tick, log: true }, series: beside(told, line).map((one) => drawn(one, one.wealth)) }),
+    lineChart({ title: `Wealth from ${START}, log scale`, gutter, height: 250, x, y: { format: wealth, tick, log: true }, series: beside(told, line).map((one) => drawn(one, one.wealth)) }),
     lineChart({
       title: "Below the highest so far",
       gutter,
@@ -208,7 +208,7 @@ function falls(told, line) {
   const columns = [
     { name: "Highest before", cell: ({ from }) => times.after(from) },
     { name: "Lowest", cell: ({ to }) => times.after(to) },
-    { name: "Made good", cell: ({ back }) => (back === null ? "Not yet" : times.after(back)) },
+    { name: "Recovered", cell: ({ back }) => (back === null ? "Not yet" : times.after(back)) },
     number("Fall", ({ depth }) => percent(depth)),
     ...(line === market ? [] : [number(`${market.name} meanwhile`, (fall) => percent(back(fall, market.wealth)))]),
     number("Lasted", ({ from, back }) => counted((back ?? line.wealth.length - 1) - from, unit)),

@@ -19,7 +19,7 @@ const EXAMPLE = { latest: 360 };
 
 export async function view() {
   const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
-  const lead = "Policies are trained on the years before and lived by, again and again, through a record of returns: nothing later is used for what is held.";
+  const lead = "A backtest goes through a record of returns: again and again, policies are trained on the years before and then followed. No holding uses later returns.";
   return { title: "Backtest a record", trail, body: [h("p", { class: "lead" }, lead), asking()] };
 }
 
@@ -36,10 +36,10 @@ function asking() {
     },
   });
   const percentField = (name, label, note, value) => input({ name, label, note, value, unit: "percent" });
-  const bank = bankRate({ name: "rate", note: "The same in all." });
+  const bank = bankRate({ name: "rate", note: "The same in every period." });
   const { rate } = bank;
-  const yearly = input({ name: "periods_per_year", label: "Periods a year", note: "12 of months; the record has no dates that tell." });
-  const cost = percentField("trading_cost", "Trading cost, %", "Of what is traded; 0 is free.", "0.1");
+  const yearly = input({ name: "periods_per_year", label: "Periods a year", note: "12 for monthly returns. The record has no dates that show it." });
+  const cost = percentField("trading_cost", "Trading cost, %", "Share of what is traded; 0 is free.", "0.1");
   const investor = select({
     name: "investor",
     label: "Investor",
@@ -48,21 +48,21 @@ function asking() {
     changed: () => (aversion.element.hidden = investor.control.value !== OWN),
   });
   investor.control.value = "balanced";
-  const aversion = input({ name: "risk_aversion", label: "Risk aversion", note: "Relative, 1 to 100.", value: "3" });
+  const aversion = input({ name: "risk_aversion", label: "Risk aversion", note: "Relative risk aversion, 1 to 100.", value: "3" });
   aversion.element.hidden = true;
-  const window = input({ name: "window", label: "Trained on", note: "Periods before. Blank: 20 years, or half of a record too short for them." });
-  const every = input({ name: "every", label: "Trained anew every", note: "Periods. Blank: a year." });
-  const horizon = input({ name: "horizon", label: "Looking ahead", note: "Periods. Blank: until the next training." });
-  const levels = input({ name: "alpha", label: "Confidence, %", note: "One to three, apart by semicolons; most is said of the second.", value: LEVELS.false, unit: "confidence" });
-  const points = input({ name: "count", label: "Design points", note: "More is finer and slower, 10 to 10,000.", value: "100" });
+  const window = input({ name: "window", label: "Trained on", note: "Number of periods before. Blank: 20 years, or half of a shorter record." });
+  const every = input({ name: "every", label: "Retrained every", note: "Number of periods. Blank: a year." });
+  const horizon = input({ name: "horizon", label: "Looking ahead", note: "Number of periods. Blank: until the next training." });
+  const levels = input({ name: "alpha", label: "Confidence, %", note: "One to three, separated by semicolons. The report says most about the second.", value: LEVELS.false, unit: "confidence" });
+  const points = input({ name: "count", label: "Design points", note: "10 to 10,000. More is more precise and slower.", value: "100" });
   const seed = input({ name: "seed", label: "Seed", value: "1" });
-  const blind = select({ name: "cost_blind", label: "Policies know of the trading cost", choices: { false: "Yes", true: "No" } });
+  const blind = select({ name: "cost_blind", label: "Policies take the trading cost into account", choices: { false: "Yes", true: "No" } });
   const isSeveral = () => (record?.series.length ?? 0) > 1;
   const shown = () => {
     for (const { element } of [horizon, points, blind]) element.hidden = isSeveral();
     const asked = isSeveral()
-      ? { window: ["Known of the past", "Periods, or all; several apart by semicolons. Blank: 10 years, 20 years, as far as the record allows, and all."], alpha: ["Confidence, %", "One level."] }
-      : { window: ["Trained on", "Periods before. Blank: 20 years, or half of a record too short for them."], alpha: ["Confidence, %", "One to three, apart by semicolons; most is said of the second."] };
+      ? { window: ["History used", "Number of periods, or \u201call\u201d; separate several by semicolons. Blank: 10 years, 20 years and all, as far as the record allows."], alpha: ["Confidence, %", "One level."] }
+      : { window: ["Trained on", "Number of periods before. Blank: 20 years, or half of a shorter record."], alpha: ["Confidence, %", "One to three, separated by semicolons. The report says most about the second."] };
     for (const field of [window, levels]) {
       const [label, note] = asked[field.name];
       field.element.querySelector("label").textContent = label;
@@ -71,12 +71,12 @@ function asking() {
     if (Object.values(LEVELS).includes(levels.control.value)) levels.control.value = LEVELS[isSeveral()];
     const unit = unitOf(record?.periods_per_year);
     bank.named(unit);
-    rate.element.querySelector(".note").textContent = record?.rate ? `Blank: what ${record.rate.column} says, ${unit} by ${unit}.` : "The same in all, such as 0.25, or \u201c3 % a year\u201d.";
+    rate.element.querySelector(".note").textContent = record?.rate ? `Blank: the rates in the column ${record.rate.column}, ${unit} by ${unit}.` : "The same in every period, such as 0.25, or \u201c3 % a year\u201d.";
     yearly.element.hidden = record === null || Boolean(record.periods_per_year);
   };
   shown();
   const send = h("button", { type: "submit" }, "Backtest");
-  const more = h("details", {}, h("summary", {}, "How it walks, and for the quant"), fieldset("How it walks", [window, every, horizon, levels, blind, points, seed]));
+  const more = h("details", {}, h("summary", {}, "How the backtest works, and for the quant"), fieldset("How the backtest works", [window, every, horizon, levels, blind, points, seed]));
   const form = h(
     "form",
     { novalidate: true },
@@ -84,7 +84,7 @@ function asking() {
     fieldset("The investor", [investor, aversion, yearly, ...bank.parts, cost]),
     more,
     refusal(),
-    h("p", { class: "send" }, send, h("span", { class: "note" }, "Runs in the background. Ten years of months take a minute or two.")),
+    h("p", { class: "send" }, send, h("span", { class: "note" }, "Runs in the background. Ten years of monthly returns take a minute or two.")),
   );
   const text = ({ control }) => control.value.trim();
   const a_year = () => record.periods_per_year ?? typed(text(yearly));
@@ -108,8 +108,8 @@ function asking() {
   const ask = async () => {
     const trouble = await source.trouble();
     if (trouble) throw { field: "log_returns", message: trouble };
-    if (text(rate) === "" && !record.rate) throw { field: "rate", message: "What the bank paid is needed: a number here, or a column of the record." };
-    if (bank.read(a_year()) === undefined) throw { field: yearly.name, message: "What the bank pays in a year needs the periods a year." };
+    if (text(rate) === "" && !record.rate) throw { field: "rate", message: "The bank return is missing: type a number here, or give a column of the record." };
+    if (bank.read(a_year()) === undefined) throw { field: yearly.name, message: "A bank return per year needs the periods a year: type how many." };
     const request = compose();
     const { job, warnings } = await post("/backtest", request);
     announce("The backtest is queued.");

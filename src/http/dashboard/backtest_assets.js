@@ -34,12 +34,12 @@ export function walkedAssets({ assets, choices, lines, unit, times }) {
   const { every, trading_cost, risk_aversion } = choices;
   const length = lines[0].wealth.length - 1;
   const investor = investorWords(risk_aversion === 1 ? { kind: "log" } : { kind: "power", risk_aversion });
-  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded, and no strategy knows of it.` : "Trading is free, so who trades much looks better than he would be.";
+  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded, and no strategy takes that into account.` : "Trading is free here, so strategies that trade often look better than they would in reality.";
   return h(
     "div",
     { class: "words" },
     h("p", {}, `${count(lines.length)} ways to hold ${count(assets.length)} assets, through ${counted(length, unit)}, ${times.name(1)} to ${times.name(length)}, for ${investor}.`),
-    h("p", {}, `Each ${unit} a strategy chooses from the returns that it knows, and nothing later is used. Caution is measured every ${counted(every, unit)}. ${cost}`),
+    h("p", {}, `Each ${unit} a strategy decides from the returns that it knows, and never from later ones. The caution is set again every ${counted(every, unit)}. ${cost}`),
   );
 }
 

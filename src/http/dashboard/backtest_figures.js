@@ -22,11 +22,11 @@ export function results({ lines, intervals, assets, unit }, sentences, more = ""
     ["worst_twentieth", "Worst 5\u202f% of years", estimated(percent)],
     ["max_drawdown", "Worst fall", percent],
     ["mean_allocation", "Held on average", allocation],
-    assets && ["effective_assets", "Assets held in effect", (number) => (number === null ? "\u2013" : tick(number, 0.1))],
+    assets && ["effective_assets", "Effective number of assets", (number) => (number === null ? "\u2013" : tick(number, 0.1))],
     ["annual_turnover", "Traded a year", estimated(percent)],
   ].filter(Boolean);
   return section(
-    "What each came to",
+    "Results of each strategy",
     h("div", { class: "words" }, sentences.map((sentence) => h("p", {}, sentence))),
     intervalChart({
       title: `A year from ${START} is worth as much as a sure`,
@@ -39,7 +39,7 @@ export function results({ lines, intervals, assets, unit }, sentences, more = ""
       [{ name: "Strategy", cell: ({ name }) => name }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: (row) => format(row[key]) }))],
       rows,
     ),
-    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence, each by itself, as far as coming years are like those seen.${more} A loss is a year that ends with less than it began with, and the worst 5\u202f% are what the worst of them returned on average: years that begin with every ${unit} count, so that they overlap.`),
+    h("p", { class: "note" }, `Each range in the chart holds by itself with ${percent(intervals.confidence, 0)} confidence, if coming years are like those seen.${more} A loss is a year that ends with less than it began with. The worst 5\u202f% of years are given by their average return. A year starts with every ${unit}, so years overlap.`),
   );
 }
 
@@ -58,7 +58,7 @@ export function ranges({ lines, intervals }, names, more) {
   ];
   const cell = (key, format) => (row) => (row[key] ? interval(estimate(row[key]), format) : "\u2013");
   return [
-    h("p", { class: "note" }, `Ranges hold with ${percent(intervals.confidence, 0)} confidence. Those of certainty equivalents rest on what each year adds, where ${counted(intervals.year_block, "year")} in a row may depend on each other; those of the differences hold all at once, ${count(intervals.comparisons)} of them from one strategy. A chance of loss counts whole years. The others come from ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies, in blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for the worst years. ${more}`),
+    h("p", { class: "note" }, `Ranges hold with ${percent(intervals.confidence, 0)} confidence. The ranges of certainty equivalents rest on what each year adds, and allow ${counted(intervals.year_block, "year")} in a row to depend on each other. The ranges of differences hold all at once: ${count(intervals.comparisons)} comparisons with one strategy. A chance of loss counts whole years. The other ranges come from ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies. Blocks have ${counted(intervals.period_block, "period")}, and ${counted(intervals.year_block, "year")} for the worst years. ${more}`),
     table(
       "Estimates with their ranges",
       [{ name: "Strategy", cell: ({ strategy }) => strategy }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: cell(key, format) }))],

@@ -26,7 +26,7 @@ export function bankRate({ name, note, changed = () => {} }) {
   });
   const per = select({
     name: `${name}.told`,
-    label: "The bank return is told",
+    label: "The bank return is",
     choices: { period: "for a period", year: "for a year" },
     changed: () => {
       named(unit);

@@ -13,7 +13,7 @@ export const care = ({ next, care }) => ({
 const REASONS = {
   overdue: ["is overdue", "are overdue"],
   renewal: ["waits for its next policy", "wait for their next policies"],
-  alarm: ["has returns that have changed", "have returns that have changed"],
+  alarm: ["is in a market that has changed", "are in markets that have changed"],
   ending: ["is completed or in its last period", "are completed or in their last period"],
 };
 

@@ -27,11 +27,11 @@ export function differences([one, other], subject) {
   const all = rows([one, other]);
   const apart = all.filter(({ cells: [left, right] }) => left !== right).map(({ name }) => name.toLowerCase());
   const alike = JSON.stringify(one) === JSON.stringify(other);
-  if (apart.length === 0) return alike ? "The two were asked the same." : `${subject} differ in details that no row below tells; each policy's own page has them.`;
+  if (apart.length === 0) return alike ? "The two requests are the same." : `${subject} differ in details that the table below does not show. See each policy's own page.`;
   const [left, right] = [one, other].map(({ problem, fund, design: { count, ...design }, surrogate, seed }) => ({ ...problem, ...fund, count, design, surrogate, seed }));
   const fields = new Set([...Object.keys(left), ...Object.keys(right)]);
   const untold = [...fields].filter((field) => !apart.includes(ROW_OF[field]) && JSON.stringify(left[field]) !== JSON.stringify(right[field]));
-  const rest = untold.length === 0 ? "everything else is the same" : "other details differ too";
+  const rest = untold.length === 0 ? "everything else is the same" : "other details also differ";
   return `${subject} differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
 }
 
@@ -65,7 +65,7 @@ const moves = (support) => {
   const end = (log) => percent(Math.expm1(log), 1);
   const said = {
     worst_seen: ({ factor }) => `${factor} times the worst seen`,
-    between: ({ min, max }) => `down to ${end(min)}, up to ${end(max)}`,
+    between: ({ min, max }) => `from ${end(min)} to ${end(max)}`,
   };
   return said[support?.rule]?.(support) ?? "Any";
 };
@@ -92,7 +92,7 @@ export function rows(asked) {
     row("Kind", ({ framework }) => FRAMEWORKS[framework]),
     row("Assets", (_, { fund }) => (fund ? fund.assets.join(", ") : "One")),
     row("Mix of assets", (_, { fund }) => (fund ? mix(fund.composition) : "None")),
-    row("Distance of markets", (_, { fund }) => (fund ? NORMS[fund.ground_norm] : "Of one asset")),
+    row("Distance of markets", (_, { fund }) => (fund ? NORMS[fund.ground_norm] : "One asset only")),
     row("Investor", (problem) => utility(problem.utility)),
     row("Caution", (problem) => caution(problem)),
     row("Periods ahead", ({ horizon, periods_per_year }) => counted(horizon, unitOf(periods_per_year)), less(({ horizon }) => horizon, (value) => signed(value, count))),
@@ -102,7 +102,7 @@ export function rows(asked) {
     { name: "Money added", cells: [added[0], added[1] === added[0] && changed("contributions") ? `${added[1]} (other amounts or periods)` : added[1]] },
     row("Share allowed outside the bank", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
     row("Moves assumed possible", ({ support }) => moves(support)),
-    row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
+    row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count as much as new ones")),
     row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
     { name: "Record", cells: [record(one), `${record(other)}${changed("history") && record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },
     row("Precision", (_, { design, seed }) => `${counted(design.count, "situation")}, seed ${count(seed)}`),
@@ -127,7 +127,7 @@ function curves(ids, both, leaving) {
   );
   return section(
     "What they hold",
-    h("p", { class: "note" }, "After the first period, each with its own record moved to that average (of log-returns), at the middle of the caution, the wealth and the deviation it was trained for."),
+    h("p", { class: "note" }, "After the first period. Each policy\u2019s own record is shifted to that average log-return. Caution, wealth and deviation are in the middle of what the policy was trained for."),
     holder,
   );
 }

@@ -74,12 +74,12 @@ function levels(one, line, from) {
 function sentence(both, line, span) {
   const [one, other] = both;
   const held = both.every(({ action }) => action)
-    ? ` A is to hold ${allocation(heldInAll(one.action))} in ${besideBank(both)} now, B ${allocation(heldInAll(other.action))}.`
+    ? ` The advice now is to hold ${allocation(heldInAll(one.action))} in ${besideBank(both)} in A, and ${allocation(heldInAll(other.action))} in B.`
     : "";
-  if (span === null) return `They have no period in common, so what became of their money cannot be compared.${held}`;
+  if (span === null) return `They have no period in common, so their growth cannot be compared.${held}`;
   const [first, second] = both.map((one) => levels(one, line, span[0])[span[1]]);
   const periods = span[1] - span[0];
-  const when = line.isDated ? `From the end of ${line.places[span[0]].name} to that of ${line.places[span[1]].name}, which both have lived,` : `In their first ${periods === 1 ? "period" : `${count(periods)} periods`}`;
+  const when = line.isDated ? `From the end of ${line.places[span[0]].name} to the end of ${line.places[span[1]].name}, which both sessions cover,` : `In their first ${periods === 1 ? "period" : `${count(periods)} periods`}`;
   return `${when} 100 in A has become ${wealth(first)}, and in B ${wealth(second)}.${held}`;
 }
 
@@ -107,7 +107,7 @@ function rows(both, line, span) {
     row("All in the bank", active(({ action }) => money(action.floor))),
     row("Wealth", ({ session }) => money(session.wealth)),
     ...(span ? [row(`100 has become${since}`, (one) => money(levels(one, line, span[0])[span[1]]), signed(wealth))] : []),
-    row("Money added, less taken", ({ history }) => money(netAdded(history))),
+    row("Money added, less withdrawn", ({ history }) => money(netAdded(history))),
     row("Worst fall", (one) => ({ size: deepest(one), words: percent(deepest(one)) })),
     row("Last period", last),
     row("Returns seen", ({ session }) => ({ size: session.sample_size, words: count(session.sample_size) }), signed(count)),
@@ -134,7 +134,7 @@ function courses(both, line, span) {
   const at = (one, of) => line.of(one).map((k) => (k === null ? null : (of[k] ?? null)));
   const held = ({ history }) => [null, ...history.observations.map((row) => (row.now ?? row).executed_allocation)];
   const from = span ? span[0] : 0;
-  const note = span ? [] : [h("p", { class: "note" }, "They have no period in common: each line starts from 100 of its own.")];
+  const note = span ? [] : [h("p", { class: "note" }, "They have no period in common, so each line starts from its own 100.")];
   return section(
     "How they went",
     note,

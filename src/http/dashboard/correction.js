@@ -7,7 +7,7 @@ import { input, refusal, select } from "./form.js";
 import { reportFields, sendReports } from "./report_fields.js";
 import { severalFields } from "./several_fields.js";
 
-const CHANGES = { replace: "It was reported wrongly", insert: "A period before it was skipped", remove: "It is to be taken out" };
+const CHANGES = { replace: "The report is wrong", insert: "A period before it was skipped", remove: "The period should be removed" };
 
 /** The form for a session with observed periods. */
 export function correctionForm({ id, session, history, policy, calendar, refresh }) {
@@ -35,21 +35,21 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     },
   });
   const isReplaced = () => change.control.value === "replace";
-  const skipped = h("p", { class: "note", hidden: true }, "The period that was skipped is put in with no return known. Put that right once you know it.");
+  const skipped = h("p", { class: "note", hidden: true }, "The skipped period is inserted without a return. Correct it once you know the return.");
   const reason = input({
     within,
     name: "reason",
     label: "Why",
-    note: "Such as: the index was revised.",
+    note: "For example: the index was revised.",
     inputmode: "text",
     maxlength: 200,
   });
   const message = refusal();
-  const button = h("button", { type: "submit" }, "Put it right");
+  const button = h("button", { type: "submit" }, "Correct it");
   const form = h(
     "form",
     { class: "observe", novalidate: true },
-    h("p", { class: "note" }, "The fields hold what stands now. What was reported before stays on record beside it."),
+    h("p", { class: "note" }, "The fields show the current values. The original report stays on record."),
     h("div", { class: "fields" }, period.element, change.element, reason.element),
     skipped,
     fields.element,
@@ -64,7 +64,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const trouble = () => (isReplaced() ? fields.trouble() : null);
   const once = "a correction counts once.";
   const path = `/sessions/${id}/corrections`;
-  const done = "The period is put right.";
+  const done = "The period is corrected.";
   sendReports(form, { button, message, fields: { trouble }, path, compose, once, done, session, calendar, refresh });
   return form;
 }

@@ -65,7 +65,7 @@ export function wealthCourse(shown) {
 /** The session's wealth beside the others', a sentence. */
 function comparison({ history }, own) {
   const worth = (share) => wealth(mixed(history, share).at(-1));
-  return `It stands at ${wealth(own.at(-1))}. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in ${risky(history)}.`;
+  return `It is worth ${wealth(own.at(-1))} now. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in ${risky(history)}.`;
 }
 
 /** The worst fall as a fact: `[name, value, note]`. */
@@ -85,7 +85,7 @@ export function holdings(shown, action) {
   const stands = (period, name) => (row(period) ? (row(period).now ?? row(period))[name] : null);
   const told = (now, then) => values.map((k) => (action && k === action.period ? now(action) : row(k) && then(row(k))));
   const ends = ["low", "high"].map((name, end) => ({
-    name: `Best kept, ${name} end`,
+    name: `No-trade range, ${name} end`,
     kind: "levels",
     colour: [9, 6][end],
     values: told(
@@ -115,7 +115,7 @@ export function holdings(shown, action) {
   const radii = values.map((k) => (k === session.period - 1 && action ? action.radius : k === 0 ? history.initial_radius : stands(k, "radius")));
   const perPoint = shown.cautionScale;
   const caution = lineChart({
-    title: `Caution: the average return may be lower by so much a ${calendar.unit}`,
+    title: `Caution: how much lower the average return a ${calendar.unit} may really be`,
     gutter: GUTTER,
     height: 130,
     x,

@@ -12,8 +12,8 @@ export const UNCONFIRMED = "/problems/unconfirmed";
 export const doubtWords = ({ doubts }) => doubts.map(inWords);
 
 function inWords({ reason, field, value, sentence, missing = [] }) {
-  if (missing.length === 1) return `The period to ${day(missing[0])} is missing before ${day(value)}.`;
-  if (missing.length > 1) return `${missing.length} periods are missing before ${day(value)}: those to ${day(missing[0])} up to ${day(missing.at(-1))}.`;
+  if (missing.length === 1) return `The period that ends on ${day(missing[0])} is missing before ${day(value)}.`;
+  if (missing.length > 1) return `${missing.length} periods are missing before ${day(value)}: the first ends on ${day(missing[0])}, the last on ${day(missing.at(-1))}.`;
   const asset = reason === "unusual_return" || reason === "differs_from_peers" ? field.slice(field.indexOf(".") + 1) : field;
   return asset === field ? `${sentence[0].toUpperCase()}${sentence.slice(1)}.` : `${asset}: ${sentence}.`;
 }
@@ -34,7 +34,7 @@ export function question(problem, { meant, filled }) {
       "p",
       { class: "send" },
       days.length > 0 ? button(`Report ${counted(days.length, "period")} as missing, then this one`, () => filled(days)) : null,
-      button("It is meant: record it", meant),
+      button("It is right: record it", meant),
     ),
   );
   return element;

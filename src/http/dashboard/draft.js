@@ -23,6 +23,6 @@ export function draft(place) {
   };
   /** That what stands here was typed before; `again()` shows the form as it is without. */
   const note = (again) =>
-    h("p", { class: "note", role: "status" }, "This is what you had typed here before. ", h("button", { type: "button", class: "link", onclick: () => (drop(), again()) }, "Start anew"));
+    h("p", { class: "note", role: "status" }, "This is what you typed here before. ", h("button", { type: "button", class: "link", onclick: () => (drop(), again()) }, "Start again"));
   return { read, keep, drop, note };
 }

@@ -67,8 +67,8 @@ function compared({ request, histories, strategies }, policyLink) {
   );
 }
 
-const LAWS = { bootstrap: "the record itself, smoothed", gaussian_mixture: "a mixture of bell curves", student_t: "a Student law, of heavier tails than a bell curve" };
-const drawnFrom = (law) => LAWS[law?.kind] ?? "the market it was asked for";
+const LAWS = { bootstrap: "the record itself, smoothed", gaussian_mixture: "a mixture of bell curves", student_t: "a Student distribution, whose tails are heavier than those of a bell curve" };
+const drawnFrom = (law) => LAWS[law?.kind] ?? "the market in the request";
 
 /** Tells whether futures are drawn from the very record that the policies know. */
 const isTrue = ({ histories, problem: { law } }) => histories.kind !== "drawn" && law?.kind === "bootstrap";
@@ -84,18 +84,18 @@ function conclusions({ reference, request }, ended) {
   const sure = ({ certainty_equivalent: { value } }) => `as much as a sure ${wealth(value)}`;
   const main = ended.find(({ strategy }) => strategy === reference);
   const said = [
-    `${called(best)} came to the most over these futures: ${sure(best)}${bank && bank !== best ? `, where all in the bank comes to ${wealth(bank.certainty_equivalent.value)}` : ""}.`,
+    `${called(best)} did best over these futures: it is worth ${sure(best)}${bank && bank !== best ? `; all in the bank is worth ${wealth(bank.certainty_equivalent.value)}` : ""}.`,
   ];
   const place = ended.indexOf(main) + 1;
   if (main && main !== best) {
     const { low, high } = best.difference?.certainty_equivalent ?? { low: -1, high: 1 };
-    const far = low > 0 || high < 0 ? "" : ", by so little that these futures cannot tell the two apart";
+    const far = low > 0 || high < 0 ? "" : ", but the difference is too small for these futures to show";
     said.push(`${called(main)} comes ${ordinal(place)} of ${ended.length}, worth ${sure(main)}${far}.`);
-    if (isTrue(request)) said.push("Here the record is the truth, so caution can only cost. What it may save shows where the histories are drawn from the market.");
+    if (isTrue(request)) said.push("Here the record is the true market, so caution can only cost. To see what it may save, draw the histories from the market.");
   }
   if (main) {
-    const beside = stocks && stocks !== main ? ` All in stocks does so in ${percent(stocks.wealth.chance_of_loss.value, 0)}, with ${wealth(stocks.wealth.worst_twentieth.value)}.` : "";
-    said.push(`${called(main)} ends with less than was put in in ${percent(main.wealth.chance_of_loss.value, 0)} of the futures; the worst 5\u202f% of them end with ${wealth(main.wealth.worst_twentieth.value)} on average.${beside}`);
+    const beside = stocks && stocks !== main ? ` For all in stocks these are ${percent(stocks.wealth.chance_of_loss.value, 0)} and ${wealth(stocks.wealth.worst_twentieth.value)}.` : "";
+    said.push(`In ${percent(main.wealth.chance_of_loss.value, 0)} of the futures ${called(main)} ends with less than the money put in; the worst 5\u202f% of all futures end with ${wealth(main.wealth.worst_twentieth.value)} on average.${beside}`);
   }
   return main?.own_mix ? [...said, changing({ name: called(main), ...main.own_mix, shown: "these futures do" })] : said;
 }
@@ -128,7 +128,7 @@ function results(report, ended) {
       ],
       ended,
     ),
-    h("p", { class: "note" }, `A loss is to end with less than the ${wealth(putIn(report.request.problem))} put in; a worst fall is the largest on the way below the highest so far. Ranges in the chart hold with ${percent(report.request.level, 0)} confidence.`),
+    h("p", { class: "note" }, `A loss means ending with less than the ${wealth(putIn(report.request.problem))} put in. A worst fall is the largest fall below the highest wealth so far. Ranges in the chart hold with ${percent(report.request.level, 0)} confidence.`),
   );
 }
 
@@ -151,12 +151,12 @@ function spreads({ request, reference, wealth_edges: edges, floor }, ended) {
   const top = highest(shown);
   const marks = [{ name: "All in the bank", at: floor }];
   const drawn = (some, top) =>
-    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: one.shares, point: { at: floor, share: one.banked, name: "as all in the bank" }, domain, top, colour: one.colour, marks })));
-  const dashed = ` The dashed line is all in the bank, ${wealth(floor)}; futures that end there are a bar of their own.`;
+    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: one.shares, point: { at: floor, share: one.banked, name: "same as all in the bank" }, domain, top, colour: one.colour, marks })));
+  const dashed = ` The dashed line is all in the bank, ${wealth(floor)}; futures that end there have a bar of their own.`;
   const others = () => drawn(rest, Math.max(top, highest(rest)));
   return section(
     "How wealth spreads at the end",
-    h("p", { class: "note" }, `How often wealth ends where, after ${counted(request.problem.horizon, unitOf(request.problem.periods_per_year))}: one scale for all.${dashed}`),
+    h("p", { class: "note" }, `How often each final wealth occurs after ${counted(request.problem.horizon, unitOf(request.problem.periods_per_year))}. All charts share one scale.${dashed}`),
     drawn(shown, top),
     rest.length > 0 ? disclosure(`The other ${count(rest.length)}`, others) : "",
   );

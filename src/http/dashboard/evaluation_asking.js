@@ -21,7 +21,7 @@ function asking(policies, asked) {
   const policy = select({
     name: "policy",
     label: "Policy",
-    note: "Its investor, record and precision are those of all that is compared.",
+    note: "All strategies are compared with its investor, record and precision.",
     choices,
   });
   policy.element.classList.add("broad");
@@ -30,7 +30,7 @@ function asking(policies, asked) {
   const histories = select({
     name: "histories.kind",
     label: "Records",
-    note: "Drawn ones say how much the result depends on the record.",
+    note: "Drawn records show how much the result depends on the record.",
     choices: { given: "The policy\u2019s own", drawn: "Drawn from the market" },
   });
   const count = input({ name: "histories.count", label: "How many records", note: "2 to 1,000.", value: "50" });
@@ -57,7 +57,7 @@ function asking(policies, asked) {
       h(
         "span",
         { class: "note" },
-        "Other kinds than the policy\u2019s are trained first; all in the bank and constant mixes take part by themselves.",
+        "The other kinds of policy are trained first. All in the bank and constant mixes are always included.",
       ),
     ),
   );

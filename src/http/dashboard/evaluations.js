@@ -16,7 +16,7 @@ export async function view(_, leaving) {
     h("a", { class: "button", href: "#/evaluations/new" }, "Compare out of sample"),
   );
   const lead =
-    "No evaluation yet. One sends every kind of policy, and simple constant mixes, through the same futures, and says what each of them ended with. A backtest walks them through a record of returns.";
+    "No evaluation yet. An evaluation runs every kind of policy, and simple constant mixes, through the same futures and shows the wealth that each ends with. A backtest runs them through a record of returns.";
   if (entries.length === 0) return { title: "Evaluations", actions, body: h("p", { class: "lead" }, lead) };
   const jobs = jobList(entries, leaving);
   return {

@@ -18,13 +18,13 @@ export function body(report) {
 
 const TITLES = {
   smoothed: () => "Records drawn from the returns seen, smoothed",
-  block: ({ length }) => `Records of blocks of ${length} periods in a row`,
+  block: ({ length }) => `Records drawn in blocks of ${length} periods in a row`,
   without_premium: () => "Records of a market that pays no more than the bank",
 };
 
 /** What is lost comes in basis points, and is told in percent. */
 const inPercent = (value) => tick(value / 100, 0.001);
-const scaled = (scale) => ({ 0: "No caution", 1: "This caution" })[scale] ?? `${scale} times it`;
+const scaled = (scale) => ({ 0: "No caution", 1: "This caution" })[scale] ?? `${scale} times this`;
 
 /** One law: what each scale loses, and how much that varies. */
 function drawn({ own, per_year }, { bootstrap, best, points: scales }, domain) {
@@ -35,15 +35,15 @@ function drawn({ own, per_year }, { bootstrap, best, points: scales }, domain) {
   const number = (name, cell) => ({ name, numeric: true, cell });
   return section(
     title,
-    h("p", { class: "note" }, `Who knows this market holds ${percent(total(best))}.`),
+    h("p", { class: "note" }, `The best allocation for this market is ${percent(total(best))}.`),
     intervalChart({ title: lost, noun: "Caution", rows: rows.map(({ name, lost }) => ({ name, ...lost })), domain, format: inPercent, tick: (value, step) => tick(value / 100, step / 100) }),
     table(
       `${title}: ${lost.toLowerCase()}, at each multiple of the caution`,
       [
         { name: "Caution", cell: ({ name }) => name },
         number("Lost on average", ({ lost }) => inPercent(lost.value)),
-        number("Varies from record to record by", ({ deviation }) => inPercent(deviation.value)),
-        number("Beyond the best", ({ beyond_least }) => (beyond_least ? inPercent(beyond_least.value) : "\u2013")),
+        number("Varies between records by", ({ deviation }) => inPercent(deviation.value)),
+        number("Above the least loss", ({ beyond_least }) => (beyond_least ? inPercent(beyond_least.value) : "\u2013")),
         number("Beyond its own mix", ({ beyond_own_mix }) => inPercent(beyond_own_mix.value)),
         number("Held on average", ({ total }) => percent(total)),
         number("Held on this record", ({ own }) => percent(own)),

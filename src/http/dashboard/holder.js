@@ -7,7 +7,7 @@ import { held } from "./key.js";
 
 /** What each role may do; an admin all of it. */
 const ROLES = {
-  read: "see what there is",
+  read: "see policies, sessions and jobs",
   operate: "open sessions and report their returns",
   train: "train policies and compare strategies",
   admin: "see the audit, and the service\u2019s figures over all tenants",
@@ -36,7 +36,7 @@ export async function holderWords(signal) {
   const { key, tenant, roles, expires_ms } = holder;
   const whose = h("b", {}, tenant);
   if (key === null)
-    return h("p", { class: "note" }, "This service asks for no key: whoever reaches it may do everything, as the tenant ", whose, ".");
+    return h("p", { class: "note" }, "This service asks for no key: anyone who can reach it may do everything, as the tenant ", whose, ".");
   const may = Object.keys(ROLES).filter((role) => roles.includes(role));
   const missing = Object.keys(ROLES).filter((role) => role !== "admin" && !roles.includes(role));
   return h(
@@ -44,8 +44,8 @@ export async function holderWords(signal) {
     { class: "note" },
     "You are the tenant ",
     whose,
-    `, by the key ${short(key)} (${listed(may)}). You may ${listed(may.map((role) => ROLES[role]))}${missing.length > 0 ? `, and not ${missing.map((role) => ROLES[role]).join(", nor ")}` : ""}.`,
-    expires_ms === null ? "" : ` The key ends on ${moment(expires_ms)}.`,
-    " What other tenants have does not show.",
+    `, with the key ${short(key)} (${listed(may)}). You may ${listed(may.map((role) => ROLES[role]))}${missing.length > 0 ? `, and not ${missing.map((role) => ROLES[role]).join(", nor ")}` : ""}.`,
+    expires_ms === null ? "" : ` The key expires on ${moment(expires_ms)}.`,
+    " You cannot see what other tenants have.",
   );
 }

@@ -18,7 +18,7 @@ const EVALUATIONS = ["Evaluations", "#/evaluations"];
 const reported = (kind, [above, href], drawn) => async (id, leaving) => {
   const job = await get(`/jobs/${id}`, leaving);
   const trail = h("p", { class: "trail" }, h("a", { href }, above));
-  const under = h("p", { class: "note", title: id }, `Asked for on ${moment(job.created_ms)}`);
+  const under = h("p", { class: "note", title: id }, `Requested on ${moment(job.created_ms)}`);
   if (job.state !== "succeeded") return { title: KINDS[kind], trail, under, body: until(job, leaving) };
   const report = await get(job.report, leaving);
   const title = `${KINDS[kind]}${await about(kind, report, leaving)}`;

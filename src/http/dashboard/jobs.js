@@ -42,7 +42,7 @@ function silence() {
     if (error === null) since = null;
     else since ??= Date.now();
     element.hidden = since === null;
-    if (since !== null) element.textContent = `${error.message} What stands here is what it said last, on ${moment(since)}.`;
+    if (since !== null) element.textContent = `${error.message} This page shows its last answer, of ${moment(since)}.`;
   };
   return { element, hear };
 }
@@ -140,15 +140,15 @@ function contents(card) {
 /** How far a job is, in a sentence. */
 export function summary({ state, progress, error, kind }) {
   if (state === "failed") return error ?? "No reason was recorded.";
-  if (state === "queued") return "Waits for the jobs before it.";
+  if (state === "queued") return "Waiting for the jobs before it.";
   if (state === "cancelled") return `Stopped after ${progress.steps_done} of ${progress.steps_total} steps.`;
   if (state === "succeeded")
     return kind === "train"
-      ? `${counted(progress.steps_total, "period")} solved, the last first.`
+      ? `${counted(progress.steps_total, "period")} solved, from the last to the first.`
       : `${counted(progress.steps_total, "step")} done.`;
   const left = timeLeft(kind, progress);
-  if (kind === "backtest") return `Trains policies and lives by them${left}`;
-  if (kind === "frontier") return `${count(progress.points_done ?? 0)} records are advised${left}`;
+  if (kind === "backtest") return `Training policies and following them${left}`;
+  if (kind === "frontier") return `${count(progress.points_done ?? 0)} records advised${left}`;
   const { steps_done, step, phase, points_done, points_total } = progress;
   const idle = steps_done > 0 ? "Between two steps" : "Starting";
   // Counted as they are done, beside how many are: the periods are solved from the last to the first.
@@ -204,7 +204,7 @@ function links(card) {
   );
   const act = async () => {
     card.update(await post(`/jobs/${job.job}/cancel`));
-    announce("Asked it to stop.");
+    announce("Requested it to stop.");
   };
   stop.addEventListener("click", () => pressed(stop, act));
   return h("span", {}, stop);

@@ -14,7 +14,7 @@ export const shown = () => (held() ? { authorization: `Bearer ${held()}` } : {})
 /** Why the key held was refused, and what to do: it expired, or it is none in force. */
 export function refusedWords({ value }, isKept) {
   const [, at] = /^a key that expired at (\S+)$/.exec(value ?? "") ?? [];
-  const why = at ? `Your key expired at ${moment(Date.parse(at))}.` : "The key is not one in force here: it may have been revoked, or pasted in part.";
+  const why = at ? `Your key expired at ${moment(Date.parse(at))}.` : "The key is not valid here: it may have been revoked, or pasted in part.";
   return `${why} Paste a new one${isKept ? ": what you typed is kept" : ""}.`;
 }
 
@@ -49,7 +49,7 @@ export function keyForm(done) {
       "div",
       { class: "actions" },
       h("button", {}, "Use this key"),
-      held() ? h("button", { type: "button", class: "quiet", onclick: forget }, "Forget the key held") : null,
+      held() ? h("button", { type: "button", class: "quiet", onclick: forget }, "Forget the current key") : null,
     ),
   );
 }

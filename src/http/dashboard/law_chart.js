@@ -52,7 +52,7 @@ export function lawChart({ transport }) {
     here,
     h("span", {}, seen.key, "Seen ", seen.value),
     h("span", {}, worst.key, "Worst market ", worst.value),
-    h("span", {}, moved.key, "of it moved here ", moved.value),
+    h("span", {}, moved.key, "of that, moved here ", moved.value),
   );
   let x = scale(domain, [0, 1]),
     cursor,
@@ -111,7 +111,7 @@ export function lawChart({ transport }) {
       (mass) => percent(mass),
     );
     mark();
-    return `${here.textContent}: seen ${seen.value.textContent}, worst market ${worst.value.textContent}, of it moved here ${moved.value.textContent}`;
+    return `${here.textContent}: seen ${seen.value.textContent}, worst market ${worst.value.textContent}, of that, moved here ${moved.value.textContent}`;
   };
   const start = bins.reduce((best, bin, at) => (bin.moved > bins[best].moved ? at : best), 0);
   walkable(holder, {
@@ -122,7 +122,7 @@ export function lawChart({ transport }) {
     at: (pixel) => Math.floor((BINS * (x.inverse(pixel) - domain[0])) / (domain[1] - domain[0])),
   });
   return figure({
-    title: "How often each return comes: as seen above the line, in the worst market below it",
+    title: "How often each return occurs: as seen above the line, in the worst market below it",
     legend,
     holder,
     rows: () => movesTable(transport),

@@ -58,7 +58,7 @@ async function show() {
     lacks = await lacking();
     // What hides by style alone stays hidden wherever a view puts it later.
     document.documentElement.dataset.lacks = lacks.join(" ");
-    if (lacks.includes(route?.[3])) page = { title: "Not with this key", body: "" };
+    if (lacks.includes(route?.[3])) page = { title: "Not allowed with this key", body: "" };
     else page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
   } catch (error) {
     if (signal.aborted) return;
@@ -86,7 +86,7 @@ async function show() {
 
 /** Where a key is typed in, or given up. */
 async function key(_, signal) {
-  const note = "A service that asks for keys shows nothing without one. This tab alone keeps it, until it is closed.";
+  const note = "If the service asks for keys, it shows nothing without one. Only this tab keeps the key, until you close it.";
   return { title: "Key", body: [await holderWords(signal), h("p", {}, note), keyForm(() => location.assign("#/"))] };
 }
 
@@ -94,8 +94,8 @@ const capital = (sentence) => `${sentence[0].toUpperCase()}${sentence.slice(1)}`
 
 function missing(hash) {
   return {
-    title: "There is nothing here",
-    body: h("p", {}, `No view stands at ${hash}. `, h("a", { href: "#/" }, "Start anew"), "."),
+    title: "Page not found",
+    body: h("p", {}, `There is no page at ${hash}. `, h("a", { href: "#/" }, "Go to the overview"), "."),
   };
 }
 
@@ -106,9 +106,9 @@ function failed(error, view) {
   const again = h("button", { onclick: show }, "Try again");
   if (error.status === 404 && view) {
     const list = h("a", { href: `#/${view}` }, `See the ${view}`);
-    return { title: "It is not here", body: [h("p", { role: "alert" }, `${capital(error.message).replace(/\.?$/, ".")} It may have been deleted. `, list, ".")] };
+    return { title: "Not found", body: [h("p", { role: "alert" }, `${capital(error.message).replace(/\.?$/, ".")} It may have been deleted. `, list, ".")] };
   }
-  return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, capital(error.message)), again] };
+  return { title: error.title ?? "This page failed", body: [h("p", { role: "alert" }, capital(error.message)), again] };
 }
 
 document.querySelector(".skip").addEventListener("click", (event) => {

@@ -42,8 +42,8 @@ const CLEARED = { name: "", notes: "", tags: [] };
  * of them. `changed()` at every edit. */
 export function labelFields({ within, changed } = {}) {
   const text = { within, inputmode: "text", changed };
-  const name = input({ ...text, name: "name", label: "Name", note: "What it is called. May be blank." });
-  const tags = input({ ...text, name: "tags", label: "Tags", note: "To find it by, apart by commas; one that has a comma in quotes. May be blank." });
+  const name = input({ ...text, name: "name", label: "Name", note: "May be blank." });
+  const tags = input({ ...text, name: "tags", label: "Tags", note: "For searching. Separate tags by commas; quote a tag that contains a comma. May be blank." });
   const notes = area({ within, changed, name: "notes", label: "Notes", note: "May be blank." });
   const read = ({ all = false } = {}) => {
     const said = {
@@ -78,8 +78,8 @@ export function labelled(noun, path, id, labels) {
     fields.show(labels);
     const before = fields.read({ all: true });
     const save = h("button", { type: "submit" }, "Save");
-    const leave = h("button", { type: "button", class: "quiet", onclick: () => rest().focus() }, "Leave as it was");
-    const form = h("form", { novalidate: true, "aria-label": `What this ${noun.toLowerCase()} is called` }, h("div", { class: "fields" }, fields.parts.map((part) => part.element)), refusal(), h("p", { class: "send" }, save, leave));
+    const leave = h("button", { type: "button", class: "quiet", onclick: () => rest().focus() }, "Cancel");
+    const form = h("form", { novalidate: true, "aria-label": `Labels of this ${noun.toLowerCase()}` }, h("div", { class: "fields" }, fields.parts.map((part) => part.element)), refusal(), h("p", { class: "send" }, save, leave));
     sending(form, save, async () => {
       const edited = Object.entries(fields.read({ all: true })).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(before[name]));
       if (edited.length > 0) labels = await patch(path, Object.fromEntries(edited));
@@ -87,7 +87,7 @@ export function labelled(noun, path, id, labels) {
       document.querySelector("h1").textContent = title;
       document.title = `${title} \u00b7 Ballast`;
       rest().focus();
-      announce(`It is called ${title}.`);
+      announce(`It is now called ${title}.`);
     });
     element.replaceChildren(form);
     fields.name.control.focus();

@@ -26,7 +26,7 @@ export function observed(shown) {
   /** What stands, and beside it what was told where that was something else. */
   const now = (name, words) => (row) => {
     const [stands, told] = [(row.now ?? row)[name], row[name]].map((value) => (value === null ? "missing" : words(value)));
-    return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As it was told then" }, told));
+    return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As first reported" }, told));
   };
   const period = { name: "Period", cell: (row) => calendar.name(row.period).replace(/^Period /, "") };
   const number = (name, cell) => ({ name, numeric: true, cell });
@@ -48,7 +48,7 @@ export function observed(shown) {
   const { holder, all } = firstOf(rows, NEWEST, told);
   const quant = () =>
     table(
-      "Observed periods in the words of the paper",
+      "Observed periods in the paper\u2019s terms",
       [
         period,
         number("Log-return", now("log_return", (value) => figures(value, 4))),
@@ -137,14 +137,14 @@ export function lastReport(shown) {
   const name = calendar.inText(row.period);
   const { date } = standing(row);
   const undo = ({ target }) => {
-    const words = `Take back the return of ${name}?\n\nThe period stays, without a return, until you put one in. What was reported stays on record.`;
+    const words = `Take back the return of ${name}?\n\nThe period stays without a return until you enter one. The original report stays on record.`;
     if (!confirm(words)) return;
     const report = { missing: true, ...held, ...(date ? { date } : {}) };
     correct(target, shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
   };
   const takeOut = ({ target }) => {
-    const words = `Take ${name} out?\n\nIt counts as never reported, and can be reported again. What was reported stays on record.`;
-    if (confirm(words)) correct(target, shown, row.period, { change: "remove" }, "The period was taken out", `${calendar.name(row.period)} is taken out.`);
+    const words = `Remove ${name}?\n\nIt then counts as never reported, and you can report it again. The original report stays on record.`;
+    if (confirm(words)) correct(target, shown, row.period, { change: "remove" }, "The period was removed", `${calendar.name(row.period)} is removed.`);
   };
   const mend = () => reveal(shown.right);
   const back = log_return === null ? "no return is known" : percent(Math.expm1(log_return), 2);
@@ -153,13 +153,13 @@ export function lastReport(shown) {
     "p",
     { class: "note last" },
     `Last report, ${name}: ${said}. `,
-    h("span", { "data-needs": "operate" }, h("button", { class: "link", onclick: mend }, "Put it right"), log_return === null ? "" : [", ", h("button", { class: "link", onclick: undo }, "take it back")], " or ", h("button", { class: "link", onclick: takeOut }, "take the period out")),
+    h("span", { "data-needs": "operate" }, h("button", { class: "link", onclick: mend }, "Correct it"), log_return === null ? "" : [", ", h("button", { class: "link", onclick: undo }, "take it back")], " or ", h("button", { class: "link", onclick: takeOut }, "remove the period")),
   );
 }
 
 /** The form for a period put right, in a fold. */
 export function righting(shown) {
-  const fold = disclosure("Put a period right", () => correctionForm(shown));
+  const fold = disclosure("Correct a period", () => correctionForm(shown));
   fold.dataset.needs = "operate";
   return fold;
 }
@@ -168,7 +168,7 @@ export function righting(shown) {
 function corrections(shown) {
   const { history, calendar } = shown;
   if (history.corrections.length === 0) return "";
-  const done = { replace: "put right", insert: "put in", remove: "taken out" };
+  const done = { replace: "corrected", insert: "inserted", remove: "removed" };
   /** The period as it is numbered now; one that was taken out as it was then. */
   const now = ({ correction, period }) => history.observations.find(({ corrections }) => corrections?.includes(correction))?.period ?? period;
   const words = (made) => {
@@ -177,11 +177,11 @@ function corrections(shown) {
     return `${name} was ${done[change]} on ${moment(made.corrected_ms)}: ${made.reason}`;
   };
   const undo = (button, made) => {
-    if (made.change === "insert") return correct(button, shown, made.period, { change: "remove" }, `Correction ${made.correction} was undone`, `Period ${made.period} is taken out again.`);
+    if (made.change === "insert") return correct(button, shown, made.period, { change: "remove" }, `Correction ${made.correction} was undone`, `Period ${made.period} is removed again.`);
     const row = history.observations[made.period - 1];
     const earlier = history.corrections.filter(({ correction }) => row.corrections.includes(correction) && correction < made.correction).at(-1);
     const said = earlier ?? row.reported;
-    const news = `${calendar.name(made.period)} is as it was before.`;
+    const news = `${calendar.name(made.period)} is back to its earlier report.`;
     return correct(button, shown, made.period, reportOf(said), `Correction ${made.correction} was undone`, news);
   };
   const made = [...history.corrections].reverse();
@@ -196,7 +196,7 @@ function corrections(shown) {
 function renewals({ history: { renewals }, calendar }) {
   if (renewals.length === 0) return "";
   const words = ({ period, policy, renewed_ms }, index) => [
-    `From ${calendar.inText(period)} on by `,
+    `From ${calendar.inText(period)} on with `,
     policyLink(policy, index < NEWEST),
     `, since ${moment(renewed_ms)}`,
   ];

@@ -45,9 +45,9 @@ function empty() {
     h(
       "p",
       { class: "lead" },
-      "No policy yet. A policy says how much to hold at every wealth and after every history; training gives one.",
+      "No policy yet. A policy says how much to hold at every wealth and after every history. Train one to start.",
     ),
-    h("p", { "data-needs": "train" }, h("a", { href: "#/train" }, "Train one"), ", or import the document another Ballast exported."),
+    h("p", { "data-needs": "train" }, h("a", { href: "#/train" }, "Train one"), ", or import a document that another Ballast exported."),
   );
 }
 

@@ -70,7 +70,7 @@ function deletion(id) {
     await remove(`/policies/${id}`);
     location.hash = "#/policies";
   };
-  const used = () => ["Sessions live by this policy. Delete those first. ", h("a", { href: `#/?search=${id}` }, "Show them")];
+  const used = () => ["Sessions use this policy. Delete those first. ", h("a", { href: `#/?search=${id}` }, "Show them")];
   const words = (error) => (error.type === "/problems/in-use" ? used() : error.message);
   button.addEventListener("click", () => confirm("Delete this policy for good?") && pressed(button, act, words));
   return button;
@@ -79,7 +79,7 @@ function deletion(id) {
 /** That it is for several assets, where it is. */
 function ofSeveral({ fund }) {
   if (!fund) return null;
-  return h("p", {}, `It is for ${fund.assets.slice(0, -1).join(", ")} and ${fund.assets.at(-1)}; what is said of stocks below is of all of them together.`);
+  return h("p", {}, `It is for ${fund.assets.slice(0, -1).join(", ")} and ${fund.assets.at(-1)}. Below, \u201cstocks\u201d means all of them together.`);
 }
 
 /** `{element, told(now)}`: what it holds now, to the share once its document is read, and how often it holds nothing. */
@@ -87,10 +87,10 @@ function answer({ problem: { horizon, periods_per_year }, fund }, diagnostics) {
   const unit = unitOf(periods_per_year);
   const assets = fund ? "the assets" : "stocks";
   const isKnown = diagnostics[0].design_count === 1;
-  const nothing = "Now it holds nothing: all is in the bank.";
+  const nothing = "Now it holds nothing: everything is in the bank.";
   const now = h("span", {}, !isKnown ? "" : diagnostics[0].all_bank_share === 0 ? `Now it holds ${assets}.` : nothing);
   const told = ({ band: [low, high], isExact }) => {
-    const kept = low < high ? ` if all is in the bank, and keeps up to ${percent(high)}` : "";
+    const kept = low < high ? ` if everything is in the bank now, and keeps up to ${percent(high)}` : "";
     now.replaceChildren(...(high === 0 ? [nothing] : [`Now it holds${isExact ? "" : " about"} `, h("b", {}, percent(low)), ` in ${assets}${kept}.`]));
   };
   const share = (step) => percent(diagnostics[step].all_bank_share, 0);
@@ -119,7 +119,7 @@ function surface({ policy: id, specification, diagnostics }, told, leaving) {
   const holder = h("div", {});
   const load = () => holder.replaceChildren(surfaceView({ id, problem: specification.problem, leaving, told }));
   if (size <= READY_BYTES) load();
-  else holder.append(h("button", { onclick: load }, `Read the policy (about ${count(size / 1e6)} MB) and draw it`));
+  else holder.append(h("button", { onclick: load }, `Load the policy (about ${count(size / 1e6)} MB) and draw it`));
   return section("What it holds", holder);
 }
 
@@ -129,7 +129,7 @@ function solved(specification, diagnostics) {
   const error = ({ expected_error, value }) => (expected_error ? 1e-4 * expected_error.total : (value?.leave_one_out_error ?? 0));
   const rough = Math.max(0, ...diagnostics.map(error));
   const within = (value) => (value < 5e-7 ? "less than 0.0001\u202f%" : percent(value, 4));
-  const words = `Every step was solved to ${within(widest)} of what it is worth, and is read between the situations solved to ${within(rough)}.`;
+  const words = `Every step was solved with an error of ${within(widest)} of its worth. Between the situations solved, the policy is interpolated with an error of ${within(rough)}.`;
   return section(
     "How well it was solved",
     h("p", { class: "sentence" }, words),
@@ -197,7 +197,7 @@ function steps(diagnostics) {
     h(
       "p",
       { class: "note" },
-      "Errors are root mean squares of leave-one-out predictions; those of the value and the gap are in basis points (1/100 %) of the certainty equivalent, that of the policy is in allocation. Noise is a share of the target\u2019s variance.",
+      "Errors are root mean squares of leave-one-out predictions. Those of the value and the gap are in basis points (1/100 %) of the certainty equivalent. That of the policy is in points of allocation. Noise is a share of the target\u2019s variance.",
     ),
     table("Diagnostics of every step", quality, diagnostics),
     lengthscales("value"),

@@ -7,7 +7,7 @@ const MINUS = "\u2212";
 const WANTED = [
   [/expected (u8|u16|u32|u64|usize)/, "a whole number, zero or more"],
   [/expected (i32|i64)/, "a whole number"],
-  [/expected (f32|f64)/, "a number, with nothing between its thousands"],
+  [/expected (f32|f64)/, "a number without thousands separators"],
 ];
 /** What else the parser says before what it wants. */
 const PARSER = /^(?:invalid (?:type|value|length)|unknown (?:variant|field)|missing field)[^]*?, expected /;
@@ -34,7 +34,7 @@ export function problemWords({ value, rule }, label, unit, ahead) {
 
 function given(value, unit) {
   if (value === null || value === undefined || value === "") return "is blank";
-  if (typeof value === "object") return "is not as it must be";
+  if (typeof value === "object") return "has the wrong form";
   return typeof value === "number" ? `is ${number(value, unit)}` : `is \u201c${value}\u201d`;
 }
 
@@ -42,7 +42,7 @@ function ruled(rule, unit, ahead) {
   const wanted = WANTED.find(([pattern]) => pattern.test(rule));
   if (wanted) return `must be ${wanted[1]}`;
   if (PARSER.test(rule)) return `must be ${rule.replace(PARSER, "").replaceAll("`", "")}`;
-  if (NO_DAY.test(rule)) return "must be a day such as 2008-09-30";
+  if (NO_DAY.test(rule)) return "must be a date such as 2008-09-30";
   const whole = rule.includes("whole number") ? "a whole number " : "";
   const named = places(ahead).reduce((words, [place, name]) => words.replace(place, name), rule);
   return named.replace(BOUNDS, (_, verb, opening, low, high, closing) => {

@@ -20,7 +20,7 @@ const LONGEST_NAME = 100;
 export async function view(query, leaving) {
   const ids = (new URLSearchParams(query ?? "").get("sessions") ?? "").split(",").filter(Boolean);
   const trail = h("p", { class: "trail" }, h("a", { href: "#/sessions" }, "Overview"));
-  const title = "Go on with another policy";
+  const title = "Continue with another policy";
   if (ids.length === 0) return { title, trail, body: h("p", {}, "Tick the sessions in the ", h("a", { href: "#/sessions" }, "overview"), " first.") };
   const [policies, sessions] = await Promise.all([all("/policies", "policies", leaving), Promise.all(ids.map((id) => get(`/sessions/${id}`, leaving)))]);
   return { title, trail, body: renewing(sessions, policies, leaving) };
@@ -60,22 +60,22 @@ export function anew(session, history, { specification, name }, now) {
 function renewing(sessions, policies, leaving) {
   const choice = select({
     name: "policy",
-    label: "Go on by",
-    note: "A policy trained anew is the same in all but its record: every return seen by now, the last ones too.",
-    choices: [["", "To be chosen"], [ANEW, "The same policy, trained anew on the returns seen"], ...policyChoices(policies)],
+    label: "Continue with",
+    note: "A retrained policy differs only in its record: it includes every return seen so far.",
+    choices: [["", "Choose one"], [ANEW, "The same policy, retrained on the returns seen"], ...policyChoices(policies)],
   });
   choice.element.classList.add("broad");
   const outcomes = new Map(sessions.map(({ session }) => [session, h("span", { class: "under" })]));
   const policyName = (id) => called(id, policies.find(({ policy }) => policy === id)?.name);
-  const rows = table("Sessions that go on", [
+  const rows = table("Sessions that continue", [
     { name: "Session", cell: ({ session, name }) => h("div", { class: "said" }, headed(`#/sessions/${session}`, session, name), outcomes.get(session)) },
     { name: "Policy now", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, policyName(policy)) },
     { name: "Periods", numeric: true, cell: ({ period, horizon, rolling }) => (rolling ? count(period - 1) : `${count(period - 1)} of ${count(horizon)}`) },
     { name: "Wealth", numeric: true, cell: ({ wealth: now }) => wealth(now) },
   ], sessions);
   const line = h("p", { class: "note", role: "status", tabindex: -1 });
-  const button = h("button", { type: "submit" }, sessions.length === 1 ? "Go on" : `Go on with the ${count(sessions.length)}`);
-  const form = h("form", { novalidate: true }, fieldset("From the coming period", [choice]), rows, refusal(), h("div", { class: "send" }, button, line));
+  const button = h("button", { type: "submit" }, sessions.length === 1 ? "Continue" : `Continue the ${count(sessions.length)}`);
+  const form = h("form", { novalidate: true }, fieldset("From the next period", [choice]), rows, refusal(), h("div", { class: "send" }, button, line));
   const tell = ({ session }, words, wrong = false) => {
     outcomes.get(session).textContent = words;
     outcomes.get(session).classList.toggle("wrong", wrong);
@@ -102,16 +102,16 @@ function renewing(sessions, policies, leaving) {
     const { renewals } = await get(`/sessions/${session.session}`, leaving);
     const { period, horizon } = await post(`/sessions/${session.session}/renewals`, { renewal: renewals + 1, policy });
     goneOn.add(session.session);
-    tell(session, `goes on: its new policy advises periods ${count(period)} to ${count(horizon)}`);
+    tell(session, `continues: its new policy advises periods ${count(period)} to ${count(horizon)}`);
   };
   sending(form, button, async () => {
-    if (choice.control.value === "") throw { field: choice.name, message: "Choose what to go on by." };
+    if (choice.control.value === "") throw { field: choice.name, message: "Choose a policy to continue with." };
     const left = sessions.filter(({ session }) => !goneOn.has(session));
     trainings.clear();
-    if (choice.control.value === ANEW) line.textContent = "Stay on this page until the sessions have gone on: a session does so once its policy is trained.";
+    if (choice.control.value === ANEW) line.textContent = "Stay on this page until every session continues. A session continues once its policy is trained.";
     await Promise.all(left.map((session) => one(session).catch((error) => leaving.aborted || tell(session, error.message, true))));
     if (leaving.aborted) return;
-    const words = `${counted(goneOn.size, "session goes", "sessions go")} on by another policy${goneOn.size < sessions.length ? `, and ${count(sessions.length - goneOn.size)} as before` : ""}.`;
+    const words = `${counted(goneOn.size, "session continues", "sessions continue")} with another policy${goneOn.size < sessions.length ? `, and ${count(sessions.length - goneOn.size)} as before` : ""}.`;
     line.textContent = words;
     announce(words);
     line.focus();

@@ -10,7 +10,7 @@ import { fraction, typed } from "./number_text.js";
 import { dayOf } from "./periods.js";
 import { problemWords } from "./problem_words.js";
 
-const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "None is known" };
+const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "Not known" };
 
 /** What the service takes. */
 export const LIMITS = { log_return: [-5, 5], simple_return: [-5, 5].map(Math.expm1), share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
@@ -23,7 +23,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
     within,
     name: "return",
     label,
-    note: "Of the stocks: \u22122.5 is a loss of 2.5 %",
+    note: "Return of the stocks: \u22122.5 is a loss of 2.5 %.",
     unit: "percent",
     changed: edited,
   });
@@ -44,11 +44,11 @@ export function reportFields({ within, label, advised, rate, contribution, date:
     within,
     name: "flow",
     label: "Money added at the end",
-    note: `Blank: ${contribution === null ? "what the policy says" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is 100 taken.`,
+    note: `Blank: ${contribution === null ? "the policy\u2019s amount" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`,
     changed: edited,
   });
-  const reached = input({ within, name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives.", changed: edited });
-  const date = input({ within, name: "date", label: "Last day", note: "Such as 2008-09-30. May be blank.", inputmode: "text", value: likely ?? "" });
+  const reached = input({ within, name: "wealth", label: "Wealth reached", note: "Blank: computed from the other fields.", changed: edited });
+  const date = input({ within, name: "date", label: "Last day", note: "For example 2008-09-30. May be blank.", inputmode: "text", value: likely ?? "" });
   const more = h(
     "details",
     {},
@@ -98,7 +98,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
     trouble() {
       if (isMissing() || fraction(given.control.value) !== null) return null;
       const text = given.control.value.trim();
-      const words = text === "" ? "The return is blank." : `\u201c${text}\u201d is not a number of percent.`;
+      const words = text === "" ? "The return is blank." : `\u201c${text}\u201d is not a percentage.`;
       return { message: words, field: "return" };
     },
   };
@@ -119,7 +119,7 @@ export function foretold(read, { wealth: now, before, cost }) {
   if (beyond) return refused(beyond[0], beyond[1], `must be a number ${within(beyond[2])}`);
   const sum = (of) => parts.reduce((all, part, index) => all + of(part, index), 0);
   const whole = sum(({ held }) => held);
-  if (whole > 1 + 1e-9) return `This will be refused: ${percent(whole)} in all cannot be held.`;
+  if (whole > 1 + 1e-9) return `This will be refused: the shares held add up to ${percent(whole)}, more than 100\u202f%.`;
   const traded = 1 - cost * sum(({ held }, index) => Math.abs(held - before[index]));
   const grown = (1 - whole) * (1 + rate) + sum(({ held, growth }) => held * growth);
   const left = Number.isNaN(ended) ? now * traded * grown + added : ended;
@@ -216,18 +216,18 @@ const overtaken = (refusal, now, { calendar, refresh }) => ({ observations }) =>
   const { log_return } = row?.now ?? row ?? { log_return: null };
   const stands = log_return === null ? "as missing" : `as ${percent(Math.expm1(log_return), 2)}`;
   const words = correction
-    ? `Not recorded: ${calendar.inText(report.period)} was corrected by somebody else a moment ago, and stands ${stands}. `
+    ? `Not recorded: ${calendar.inText(report.period)} was corrected by somebody else a moment ago, and is now recorded ${stands}. `
     : `Not recorded: ${calendar.inText(report.period)} was reported ${stands} a moment ago. `;
   const place = h("div", {});
   const right = (confirmed) => async () => {
-    const request = { correction: now.corrections + 1, reason: reason ?? "It was reported twice, and this was meant", ...report, ...confirmed };
+    const request = { correction: now.corrections + 1, reason: reason ?? "It was reported twice, and this report is the right one", ...report, ...confirmed };
     try {
       await post(`/sessions/${now.session}/corrections`, request);
     } catch (error) {
       if (error.type !== UNCONFIRMED) throw error;
       return place.replaceChildren(question(error, { meant: right({ confirm: true }) }));
     }
-    await refresh("The period is put right.");
+    await refresh("The period is corrected.");
   };
   const button = h("button", { type: "button", onclick: ({ target }) => pressed(target, right({})) }, "Correct it");
   return h("div", { class: "doubts", role: "alert" }, h("p", { class: "error" }, `${words}You typed ${returnWords(report)}. `), place, h("p", { class: "send" }, button));

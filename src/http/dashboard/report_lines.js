@@ -99,7 +99,7 @@ function readLine(line, find, scaled) {
   if (numbered) return { found: find(numbered[0]), name: numbered[0], report: { simple_return: scaled(numbered[1]) }, said: saysPercent(numbered[1]), trouble: null };
   if (!known) return { found: [], name: line, report: {}, trouble: null };
   const [name, number] = known;
-  return { found: find(name), report: {}, trouble: number === "" ? null : `\u201c${number}\u201d is not a number of percent` };
+  return { found: find(name), report: {}, trouble: number === "" ? null : `\u201c${number}\u201d is not a percentage` };
 }
 
 /** The header of a table and the rows below it; null where the first line heads none. */
@@ -119,7 +119,7 @@ function cellValue(name, text, scaled) {
   return typeof value !== "number" || (name === "period" && !(Number.isInteger(value) && value > 0)) ? null : value;
 }
 
-const WANTED = { date: "a day such as 2008-09-30", period: "the number of a period", flow: "a number", wealth: "a number" };
+const WANTED = { date: "a date such as 2008-09-30", period: "a period number", flow: "a number", wealth: "a number" };
 
 /** What a column says of a session of `assets`, none where it has one: `[list, asset]`, `[field]` or null. */
 function meant(head, assets) {
@@ -134,7 +134,7 @@ function readRow({ cells }, { header, heads }, find, assetsOf, scaled) {
   const named = heads.flatMap((head, index) => (columnOf(head) === "client" && cells[index] ? [cells[index]] : []));
   const found = named.map(find).find((sessions) => sessions.length > 0) ?? [];
   const read = { found, name: named.join(", "), report: {}, unsaid: [], said: false, trouble: null };
-  if (cells.length > heads.length) read.trouble = `has ${cells.length} cells, and the header ${heads.length}`;
+  if (cells.length > heads.length) read.trouble = `has ${cells.length} cells, but the header has ${heads.length}`;
   if (found.length !== 1) return read;
   const assets = assetsOf(found[0].policy);
   for (const [index, head] of heads.entries()) {
@@ -145,7 +145,7 @@ function readRow({ cells }, { header, heads }, find, assetsOf, scaled) {
     const value = name && cellValue(asset ? "simple_return" : name, text, isSaid ? fraction : scaled);
     if (isSaid && name?.startsWith("simple_return")) read.said = true;
     if (name === undefined) read.unsaid.push(header.cells[index]);
-    else if (value === null) read.trouble ??= `\u201c${text}\u201d in the column \u201c${header.cells[index]}\u201d is not ${WANTED[name] ?? "a number of percent"}`;
+    else if (value === null) read.trouble ??= `\u201c${text}\u201d in the column \u201c${header.cells[index]}\u201d is not ${WANTED[name] ?? "a percentage"}`;
     else read.report[name] = asset ? { ...read.report[name], [asset]: value } : value;
   }
   return read;
@@ -153,21 +153,21 @@ function readRow({ cells }, { header, heads }, find, assetsOf, scaled) {
 
 /** What keeps a report from being sent, or null. */
 function wrong({ found, name }, { period, ...report }, { assetsOf, lately }) {
-  if (found.length > 1) return `${found.length} sessions are called so: write the identifier`;
+  if (found.length > 1) return `${found.length} sessions have this name: use the identifier`;
   const [entry] = found;
   if (!entry) return `no session is called \u201c${name}\u201d`;
   const assets = assetsOf(entry.policy);
   if (assets === undefined) return "its policy is being read";
-  if (entry.state === "completed" && period === undefined) return "has reached its end";
+  if (entry.state === "completed" && period === undefined) return "is completed";
   const { simple_return, simple_returns = {}, executed_allocations: held } = report;
   const without = (list) => (assets ?? []).filter((asset) => !(asset in list));
   if (assets && (simple_return !== undefined || without(simple_returns).length > 0))
-    return `holds several assets: it needs a header, and a return in each of the columns ${assets.map((asset) => `\u201c${asset}\u201d`).join(", ")}`;
-  if (held && without(held).length > 0) return `says what is held of some assets, and not of ${without(held).join(", ")}`;
+    return `holds several assets: give a header, and a return in each of the columns ${assets.map((asset) => `\u201c${asset}\u201d`).join(", ")}`;
+  if (held && without(held).length > 0) return `gives the share held of some assets, but not of ${without(held).join(", ")}`;
   if (!assets && simple_return === undefined) return "has no return";
   if (period !== undefined) return null;
-  if (report.date && entry.date && report.date <= entry.date) return `is reported up to ${day(entry.date)} already`;
-  return !report.date && lately(entry) ? "was reported within the hour: say its last day, or below that the next period is meant" : null;
+  if (report.date && entry.date && report.date <= entry.date) return `is already reported up to ${day(entry.date)}`;
+  return !report.date && lately(entry) ? "was reported within the last hour: give its last day, or tick that this is the next period" : null;
 }
 
 /**

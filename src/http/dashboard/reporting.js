@@ -27,7 +27,7 @@ export async function view(query, leaving) {
 }
 
 /** What the returns without a percent sign are in, where that is asked. */
-const UNITS = { "": "To be said first", percent: "Percent: 1.2 is 1.2 %", fraction: "Fractions: 0.012 is 1.2 %", hundredth: "Hundredths of a percent: 120 is 1.2 %" };
+const UNITS = { "": "Choose one", percent: "Percent: 1.2 is 1.2 %", fraction: "Fractions: 0.012 is 1.2 %", hundredth: "Hundredths of a percent: 120 is 1.2 %" };
 
 /** `{of(policy), deviation(policy), read(policies)}`: the names of a policy's assets, null where it has one, and the deviation of the
  * record it was trained on; undefined until it is read. */
@@ -59,7 +59,7 @@ function reporting(sessions, chosen, leaving) {
   const lines = area({
     name: "lines",
     label: "Sessions and their returns, %",
-    note: `A line for each: its name or identifier, and its return, as in \u201cAda 1.2\u201d; \u22122.5 is a loss of 2.5 %. Or a table below a header, its columns in any order: ${HEADS.join(", ")}, or the name of an asset for its return, with \u201cheld\u201d behind it for its share.`,
+    note: `One line for each session: its name or identifier, then its return, as in \u201cAda 1.2\u201d. \u22122.5 is a loss of 2.5 %. Or a table with a header, its columns in any order: ${HEADS.join(", ")}. A column with the name of an asset holds its return; add \u201cheld\u201d to the name for its share.`,
     rows: 8,
     value: chosen.map((entry) => written(find, entry)).join("\n"),
     changed: () => soon(),
@@ -68,10 +68,10 @@ function reporting(sessions, chosen, leaving) {
     lines.control.value = text;
     look();
   });
-  const common = input({ name: "common", label: "Return of the others, %", note: "Of those that have none of their own. May be blank.", unit: "percent", changed: () => soon() });
-  const date = input({ name: "date", label: "Last day", note: "Of all that say none, such as 2008-09-30. May be blank.", inputmode: "text", value: likelyDay(chosen.length > 0 ? chosen : sessions, isoDay(new Date())) ?? "", changed: () => soon() });
-  const [meant, sure] = tick("confirm", "What is doubted is meant", () => look());
-  const [next, again] = tick("next", "Of those reported within the hour, the next period is meant", () => look());
+  const common = input({ name: "common", label: "Return of the others, %", note: "For sessions without a return of their own. May be blank.", unit: "percent", changed: () => soon() });
+  const date = input({ name: "date", label: "Last day", note: "For lines without a date, for example 2008-09-30. May be blank.", inputmode: "text", value: likelyDay(chosen.length > 0 ? chosen : sessions, isoDay(new Date())) ?? "", changed: () => soon() });
+  const [meant, sure] = tick("confirm", "The doubted returns are right", () => look());
+  const [next, again] = tick("next", "For sessions reported within the last hour, this is the next period", () => look());
   const unit = select({ name: "unit", label: "These returns are", choices: UNITS, changed: () => look() });
   const unitWords = h("p", { class: "note wrong" });
   const doubt = h("div", { hidden: true, role: "group" }, unitWords, unit.element);
@@ -95,7 +95,7 @@ function reporting(sessions, chosen, leaving) {
     unitWords.textContent = seems === null ? "" : DOUBTS[seems];
     const read = as(unit.control.value || "percent");
     const held = (row) => row.trouble === null && !meant.checked && isDoubted(row);
-    rows = read.rows.map((row) => (held(row) ? { ...row, trouble: "is doubted: change it, or say above that it is meant" } : row));
+    rows = read.rows.map((row) => (held(row) ? { ...row, trouble: "is doubted: change it, or tick above that it is right" } : row));
     header = read.header;
     sure.hidden = !rows.some((row) => row.entry && isDoubted(row));
     again.hidden = !rows.some(({ entry, report }) => entry && isLate(entry) && !report.date && report.period === undefined);
@@ -104,7 +104,7 @@ function reporting(sessions, chosen, leaving) {
     button.disabled = ready === 0 || isOpen;
     button.textContent = ready === 0 ? "Report" : `Report for ${count(ready)}`;
     standing.replaceChildren(rows.length > 0 ? looked(rows, ready) : "");
-    preview.replaceChildren(rows.length > 0 ? section("Who gets what", leftOut(read.unread), withoutLine(sessions, rows), previewed(rows)) : "");
+    preview.replaceChildren(rows.length > 0 ? section("What will be reported", leftOut(read.unread), withoutLine(sessions, rows), previewed(rows)) : "");
     const unknown = [...new Set(rows.flatMap(({ entry }) => (entry && policies.of(entry.policy) === undefined ? [entry.policy] : [])))];
     if (unknown.length > 0) policies.read(unknown).then((found) => found.length > 0 && look(), (error) => leaving.aborted || say(error.message));
   };
@@ -145,9 +145,9 @@ function reporting(sessions, chosen, leaving) {
       look();
     }
     const failed = told.filter(({ answer }) => answer.status !== 200);
-    const words = `${counted(told.length - failed.length, "return is", "returns are")} recorded${rows.length > 0 ? `, and ${count(rows.length)} left above for another try` : ""}.`;
+    const words = `${counted(told.length - failed.length, "return is", "returns are")} recorded${rows.length > 0 ? `, and ${count(rows.length)} left above to try again` : ""}.`;
     const heading = h("p", { class: "sentence", tabindex: -1 }, words);
-    outcome.replaceChildren(section("What came of it", heading, filling(failed), outcomes(told, advised(leaving))));
+    outcome.replaceChildren(section("Results", heading, filling(failed), outcomes(told, advised(leaving))));
     heading.focus();
     announce(words);
   };
@@ -172,14 +172,14 @@ function reporting(sessions, chosen, leaving) {
     const gaps = failed.filter(({ answer }) => answer.problem.type === UNCONFIRMED).map(({ entry, answer }) => ({ entry, first: answer.period, days: missingDays(answer.problem) })).filter(({ days }) => days.length > 0);
     if (gaps.length === 0) return "";
     const all = gaps.reduce((sum, { days }) => sum + days.length, 0);
-    const words = `Report the ${counted(all, "missing period")} of ${counted(gaps.length, "session")} as missing, and then what is left`;
+    const words = `Report the ${counted(all, "missing period")} of ${counted(gaps.length, "session")} as missing, then the rest`;
     return h("p", { class: "send" }, h("button", { type: "button", onclick: ({ target }) => pressed(target, () => fill(gaps), ({ message }) => message) }, words));
   };
   const form = h(
     "form",
     { novalidate: true },
     fieldset("The period that ended", [date, common, sure, again]),
-    h("fieldset", {}, h("legend", {}, "Who"), drop, lines.element, doubt),
+    h("fieldset", {}, h("legend", {}, "The sessions"), drop, lines.element, doubt),
     preview,
     message,
     h("div", { class: "send held" }, standing, button),
@@ -200,8 +200,8 @@ function reporting(sessions, chosen, leaving) {
 
 /** Why the unit is asked. */
 const DOUBTS = {
-  fraction: "Read as percent, all of these returns are less than a twentieth of what the records of their sessions vary by. Are they fractions?",
-  hundredth: "Read as percent, most of these returns are more than ten times what the records of their sessions vary by. What are they in?",
+  fraction: "Read as percent, all of these returns are less than a twentieth of the usual variation in the records of their sessions. Are they fractions?",
+  hundredth: "Read as percent, most of these returns are more than ten times the usual variation in the records of their sessions. What unit are they in?",
 };
 
 /** `[box, element]`: something to be said by a tick, hidden until it may be asked. */
@@ -228,7 +228,7 @@ function withoutLine(sessions, rows) {
 function leftOut(columns) {
   if (columns.length === 0) return "";
   const names = columns.map((name) => `\u201c${name}\u201d`).join(", ");
-  return h("p", { class: "note wrong" }, `Nothing is read from ${columns.length === 1 ? "the column" : "the columns"} ${names}. A column is called ${HEADS.join(", ")} or like an asset of the sessions named, and each is there once.`);
+  return h("p", { class: "note wrong" }, `Nothing is read from ${columns.length === 1 ? "the column" : "the columns"} ${names}. Use the names ${HEADS.join(", ")} or the name of an asset of these sessions, each once.`);
 }
 
 /** What is said of a period, to tell whether it is something else. */
@@ -260,7 +260,7 @@ function besides({ report }) {
   const words = [
     executed_allocation !== undefined && `${percent(executed_allocation)} held`,
     rate !== undefined && `the bank paid ${percent(rate, 3)}`,
-    flow !== undefined && `${wealth(Math.abs(flow))} ${flow < 0 ? "taken" : "added"}`,
+    flow !== undefined && `${wealth(Math.abs(flow))} ${flow < 0 ? "withdrawn" : "added"}`,
     reached !== undefined && `wealth ${wealth(reached)}`,
     date && `to ${date}`,
   ].filter(Boolean);
@@ -308,7 +308,7 @@ const FIELDS = {
   executed_allocation: ["The share held", "percent"],
   executed_allocations: ["The share held", "percent"],
   rate: ["What the bank paid", "percent"],
-  flow: ["What was added"],
+  flow: ["The money added"],
   wealth: ["The wealth reached"],
   date: ["The last day"],
 };

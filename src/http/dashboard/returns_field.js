@@ -12,8 +12,8 @@ const KINDS = {
   simple: "Simple returns",
   log: "Log-returns",
   price: "Prices",
-  gross: "What 1 becomes (1.012)",
-  cumulated: "Gains since the start",
+  gross: "Gross returns (1.012)",
+  cumulated: "Cumulative gains since the start",
 };
 const UNITS = { percent: "Percent (1.2)", fraction: "Fractions (0.012)" };
 const ORDERS = { false: "The oldest", true: "The newest" };
@@ -115,7 +115,7 @@ export function returnsField({ name, label, blank = null, example = null, severa
     await (stale ? take() : reading);
     if (answer?.outcome === "read") return null;
     if (answer === null) return blank ? null : "Returns are needed: paste them, or choose a file.";
-    return answer.outcome === "asked" ? `To be answered first: ${words(answer)}` : words(answer);
+    return answer.outcome === "asked" ? `Answer this first: ${words(answer)}` : words(answer);
   };
   const show = (history, assets = null) => {
     said = { kind: "log", unit: "fraction", unusual: true, excess: false, ...(assets ? { columns: assets } : {}) };
@@ -155,7 +155,7 @@ function drop(id, open, example) {
 
 /** What a person can say of the text: the answers to questions, the place of a fault, or another reading. */
 function below(answer, { said, say, forget, area, bank, several }) {
-  const again = h("button", { type: "button", class: "link", onclick: forget }, "Forget what was said of it");
+  const again = h("button", { type: "button", class: "link", onclick: forget }, "Discard the answers");
   const isSaid = Object.keys(said).some((name) => name !== "latest");
   switch (answer.outcome) {
     case "asked":
@@ -179,7 +179,7 @@ function questions(asked, say, several) {
     h(
       "fieldset",
       {},
-      h("legend", {}, minus(one.question), isMany(one) ? " Several columns are several assets." : ""),
+      h("legend", {}, minus(one.question), isMany(one) ? " Several columns mean several assets." : ""),
       one.options.map(({ label, sentence }, index) =>
         h(
           "label",
@@ -198,7 +198,7 @@ function questions(asked, say, several) {
     const columns = (index) => ({ columns: choices(index).flatMap((choice) => choice.columns) });
     say(Object.assign({}, ...asked.flatMap((one, index) => (isMany(one) ? columns(index) : choices(index)))));
   };
-  const button = h("button", { type: "button", class: "quiet", onclick: answered }, "Read it so");
+  const button = h("button", { type: "button", class: "quiet", onclick: answered }, "Read it this way");
   return h("div", {}, groups, h("p", { class: "actions" }, button));
 }
 

@@ -7,13 +7,13 @@ import { allocation, count, counted, percent, points } from "./format.js";
 /** Frameworks of policies that learn from returns; by the others no return changes the advice. */
 const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 
-const HEADING = "How near it is to changing";
+const HEADING = "How close the advice is to changing";
 
 /** `{element, ask()}`: the section, and what fills it from `/action`. */
 export function nearness({ id, policy, leaving, unit }) {
   const said = (words) => ({ element: section(HEADING, h("p", { class: "sentence" }, words)), ask: async () => {} });
-  if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes it: the policy does not learn from what comes.");
-  const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
+  if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes the advice, because the policy does not learn from new returns.");
+  const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Computing the advice for about a hundred other records\u2026"));
   const ask = async () => {
     try {
       const action = await get(`/action?session=${id}&sensitivity=true`, leaving);
@@ -34,7 +34,7 @@ export function headline({ allocation: told, sensitivity: { next_return } }, uni
   const move = Math.max(...[next_return.low, next_return.high].map((end) => Math.abs(end.allocation - told)));
   if (move < STEADY) return `It is steady: nine in ten ${unit}s would move it by less than ${points(STEADY, 0)}.`;
   const by = points(move, move < 0.1 ? 1 : 0);
-  return move < NEAR ? `It moves a little: an unusual ${unit} would move it by up to ${by}.` : `It is near to changing: an unusual ${unit} would move it by ${by}.`;
+  return move < NEAR ? `It moves a little: an unusual ${unit} would move it by up to ${by}.` : `It is close to changing: an unusual ${unit} would move it by ${by}.`;
 }
 
 /** What an answer with its sensitivity says. */
@@ -48,7 +48,7 @@ const simple = ({ simple_return }) => percent(simple_return);
 function lacking({ allocation: told }, range) {
   if (range === null) return [];
   const differs = [range.lowest, range.highest].filter((end) => allocation(end.allocation) !== allocation(told));
-  if (differs.length === 0) return ["No return of the record by itself makes a difference: without any one the advice stays."];
+  if (differs.length === 0) return ["No single return of the record matters: without any one of them the advice stays the same."];
   return differs.map((end) => `Without its return of ${simple(end)} the advice would be ${allocation(end.allocation)}.`);
 }
 
@@ -56,14 +56,14 @@ function coming({ allocation: told }, { to_bank, to_highest, low, high }, unit) 
   const [now, after_low, after_high] = [told, low.allocation, high.allocation].map(allocation);
   const stays = now === after_low && now === after_high;
   const after = stays
-    ? `After a return of ${simple(low)}, and after one of ${simple(high)} too, it would stay at ${now}.`
+    ? `After a return of ${simple(low)} or of ${simple(high)} it would stay at ${now}.`
     : `After a return of ${simple(low)} the advice would be ${after_low}; after one of ${simple(high)} it would be ${after_high}.`;
   return [
     after,
-    to_bank && now === allocation(0) && `The next ${unit} must return more than ${simple(to_bank)} before it leaves the bank.`,
-    to_bank && now !== allocation(0) && `A coming return of ${simple(to_bank)} would take the advice to the bank.`,
+    to_bank && now === allocation(0) && `The advice leaves the bank only if the next ${unit} returns more than ${simple(to_bank)}.`,
+    to_bank && now !== allocation(0) && `A return of ${simple(to_bank)} next ${unit} would move the advice fully into the bank.`,
     to_highest && now === allocation(1) && `It stays there unless the next ${unit} returns less than ${simple(to_highest)}.`,
-    to_highest && now !== allocation(1) && `One of ${simple(to_highest)} would take it to the highest allocation.`,
+    to_highest && now !== allocation(1) && `A return of ${simple(to_highest)} next ${unit} would move it to the highest allocation.`,
   ].filter(Boolean);
 }
 
@@ -72,10 +72,10 @@ const deciding = (one, other) => (one === other ? 2 : Math.min(6, Math.max(2, Ma
 
 function paying({ present, needed, periods_more }, unit) {
   const digits = needed === null ? 2 : deciding(100 * present, 100 * needed);
-  const paid = `The record has paid ${percent(present, digits)} a ${unit} beyond what the bank pays now`;
-  if (needed === null) return [`${paid}; no other mean near it would part the bank from holding something.`];
+  const paid = `The record has paid ${percent(present, digits)} a ${unit} more than the bank pays now`;
+  if (needed === null) return [`${paid}; at no similar average does the advice enter or leave the bank.`];
   const leaves = `${paid}; the advice leaves the bank at ${percent(needed, digits)}.`;
   if (periods_more === 0) return [leaves];
-  if (periods_more === null) return [leaves, `No number of ${unit}s like those seen, up to ${count(10000)}, would do.`];
-  return [leaves, `About ${counted(periods_more, `more ${unit}`)} like those seen would do as well.`];
+  if (periods_more === null) return [leaves, `No number of ${unit}s like those seen, up to ${count(10000)}, would be enough.`];
+  return [leaves, `About ${counted(periods_more, `more ${unit}`)} like those seen would also be enough.`];
 }

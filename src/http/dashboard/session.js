@@ -61,7 +61,7 @@ export async function view(id, leaving) {
 }
 
 /** What stands at the end of the page on paper. */
-const DISCLAIMER = "This is computed from past returns, which do not tell what is to come. What is said of the worst market holds for the markets that the record allows, and for no others.";
+const DISCLAIMER = "This is computed from past returns, which do not predict the future. Statements about the worst market hold only for the markets that the record allows.";
 
 /** What the page says on paper alone: of what day it is, and by which policy. */
 const letterhead = ({ policy, name, specification: { problem, fund } }) =>
@@ -132,7 +132,7 @@ function figures(shown, action) {
   const change = grown(history).at(-1) / 100 - 1;
   const moved = history.observations.some((_, index) => addedIn(history, index + 1) !== 0);
   const apart = moved ? `, time-weighted; ${wealth(Math.abs(put))} ${put < 0 ? "withdrawn" : "added"} in all` : "";
-  const end = session.rolling ? "a horizon of the policy from now" : `at the end of ${calendar.inText(session.horizon)}`;
+  const end = session.rolling ? "one policy horizon from now" : `at the end of ${calendar.inText(session.horizon)}`;
   const caution = action && points(action.radius * shown.cautionScale, 2);
   return h(
     "div",
@@ -141,9 +141,9 @@ function figures(shown, action) {
       ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start${apart}`],
       [`Held in ${risky(shown.history)}`, allocation(session.holding), "of wealth, before trading"],
       action && ["Worth as much as a sure", wealth(action.certainty_equivalent), end],
-      action && ["All in the bank", wealth(action.floor), `${end}, all sold now`],
+      action && ["All in the bank", wealth(action.floor), `${end}, if all is sold now`],
       history.observations.length > 0 && worstFallFact(shown),
-      action && isCautious(shown.policy.specification.problem) && ["Caution", caution, `the average return may really be so much lower a ${calendar.unit}`],
+      action && isCautious(shown.policy.specification.problem) && ["Caution", caution, `how much lower the average return a ${calendar.unit} may really be`],
       [
         "Returns seen",
         count(session.sample_size),
@@ -156,18 +156,18 @@ function figures(shown, action) {
 /** That the returns no longer come as they came, where they do not. */
 function changed({ session: { drift } }) {
   if (drift.level === "none") return "";
-  const how = drift.level === "alarm" ? "no longer come as they came" : "may no longer come as they came";
-  const words = `The returns ${how}: where nothing changes, so clear a sign is seen in one session of ${count(Math.floor(drift.highest))} at most. The advice rests on all returns seen; a policy trained on newer ones may serve better.`;
+  const how = drift.level === "alarm" ? "has changed" : "may have changed";
+  const words = `The market ${how}. If nothing had changed, at most one session in ${count(Math.floor(drift.highest))} would show so clear a sign. The advice rests on all returns seen; a policy trained on newer returns may serve better.`;
   return h("p", { class: "note wrong" }, words);
 }
 
 /** The way to another policy for the session, from the coming period on. */
-const goOn = (id, words = "Go on with another policy") => h("a", { class: "button quiet", href: `#/renew?sessions=${id}` }, words);
+const goOn = (id, words = "Continue with another policy") => h("a", { class: "button quiet", href: `#/renew?sessions=${id}` }, words);
 
 /** That the policy advises no later period, and nothing follows by itself. */
 function ending({ id, session, calendar }) {
   if (session.renew || session.rolling || session.period < session.horizon) return "";
-  return h("p", { class: "note wrong" }, `${calendar.name(session.horizon)} is the last period that its policy advises. `, h("a", { href: `#/renew?sessions=${id}` }, "Go on with another"), ".");
+  return h("p", { class: "note wrong" }, `${calendar.name(session.horizon)} is the last period that its policy advises. `, h("a", { href: `#/renew?sessions=${id}` }, "Continue with another policy"), ".");
 }
 
 function completed({ id, session, history }) {
@@ -190,9 +190,9 @@ function due({ session: { renewal } }) {
   const job = renewal.job ? h("a", { href: "#/jobs" }, "its training") : "its training";
   const states = {
     due: ["The next policy is about to be trained: ", job, "."],
-    training: ["The next policy is being trained: ", job, ". Until then this one goes on."],
-    trained: ["The next policy is trained, and about to be gone on by: ", job, "."],
-    failed: ["The next policy is not there: ", job, ` failed${renewal.error ? ` (${renewal.error})` : ""}. It is tried again by itself; until then this one goes on.`],
+    training: ["The next policy is being trained: ", job, ". Until then this one continues."],
+    trained: ["The next policy is trained and about to take over: ", job, "."],
+    failed: ["The next policy is missing: ", job, ` failed${renewal.error ? ` (${renewal.error})` : ""}. The service will try again; until then this one continues.`],
   };
   return h("p", { class: renewal.state === "failed" ? "note wrong" : "note" }, ...states[renewal.state]);
 }
@@ -208,7 +208,7 @@ function frontier({ session, policy, history, canTry }) {
     h(
       "p",
       { class: "note" },
-      "What other amounts of caution would lose on many records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
+      "What other amounts of caution would lose on many records drawn like this one. Each period counts alone, without trading costs, without discounting older returns, and without money added or withdrawn.",
     ),
     h("p", {}, asking(policy.specification, recordOf(history), session.wealth)),
   );
@@ -223,6 +223,6 @@ function deletion(id, name) {
     await remove(`/sessions/${id}`);
     location.hash = "#/sessions";
   };
-  button.addEventListener("click", () => confirm(`Delete ${name.replace(/^S(?=ession)/, "s")} and all it observed, for good?`) && pressed(button, act));
+  button.addEventListener("click", () => confirm(`Delete ${name.replace(/^S(?=ession)/, "s")} and all its reports for good?`) && pressed(button, act));
   return button;
 }

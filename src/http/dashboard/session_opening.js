@@ -20,7 +20,7 @@ export async function view(query, leaving) {
 function opening(policies, asked, leaving) {
   const labels = labelFields();
   // Of several nobody knows which is meant.
-  const unchosen = policies.length > 1 ? [["", "To be chosen"]] : [];
+  const unchosen = policies.length > 1 ? [["", "Choose one"]] : [];
   const policy = select({ name: "policy", label: "Policy", choices: [...unchosen, ...policyChoices(policies)] });
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
@@ -32,14 +32,14 @@ function opening(policies, asked, leaving) {
   });
   const going = select({
     name: "rolling",
-    label: "How it goes on",
-    choices: { ends: "To the horizon of the policy", renews: "Renewed by itself", rolls: "Rolling" },
-    note: "Renewed, it goes on by policies trained on what was seen by then.",
+    label: "How it continues",
+    choices: { ends: "Until the horizon of the policy", renews: "Renewed automatically", rolls: "Rolling" },
+    note: "A renewed session continues with policies trained on the returns seen by then.",
     changed: (choice) => [every, window].forEach(({ element }) => (element.hidden = choice !== "renews")),
   });
   for (const { element } of [policy, going]) element.classList.add("broad");
-  const every = input({ name: "renew.every", label: "Periods by each policy", note: "Fewer than it looks ahead." });
-  const window = input({ name: "renew.window", label: "Returns it is trained on", note: "The last ones. Blank: all." });
+  const every = input({ name: "renew.every", label: "Periods with each policy", note: "Fewer than it looks ahead." });
+  const window = input({ name: "renew.window", label: "Returns it is trained on", note: "How many of the latest. Blank: all." });
   every.element.hidden = window.element.hidden = true;
   let known = [];
   const history = returnsField({
@@ -62,9 +62,9 @@ function opening(policies, asked, leaving) {
     }
     const { horizon } = problem;
     if (every.control.value === usual) every.control.value = usual = String(Math.max(1, Math.floor(horizon / 2)));
-    every.element.querySelector(".note").textContent = `1 to ${horizon - 1}: this policy looks ${horizon} ahead.`;
+    every.element.querySelector(".note").textContent = `1 to ${horizon - 1}: this policy looks ${horizon} periods ahead.`;
     for (const { element } of [every, window]) element.hidden = going.control.value !== "renews";
-    goingNote.textContent = ["Renewed, it goes on by policies trained on what was seen by then.", ...Object.values(reasons)].join(" ");
+    goingNote.textContent = ["A renewed session continues with policies trained on the returns seen by then.", ...Object.values(reasons)].join(" ");
   };
   const chosen = async () => {
     const asked = policy.control.value;
@@ -86,7 +86,7 @@ function opening(policies, asked, leaving) {
   const other = h(
     "details",
     {},
-    h("summary", {}, "Other returns are known than the policy\u2019s history"),
+    h("summary", {}, "Use other known returns than the policy\u2019s history"),
     history.element,
   );
   const more = h("details", {}, h("summary", {}, "Tags and notes"), h("div", { class: "fields" }, labels.tags.element, labels.notes.element));
@@ -95,7 +95,7 @@ function opening(policies, asked, leaving) {
   const form = h(
     "form",
     { novalidate: true },
-    fieldset("Whose session", [labels.name, policy, stake, holding, shares]),
+    fieldset("The session", [labels.name, policy, stake, holding, shares]),
     fieldset("How long", [going, every, window]),
     other,
     more,
@@ -105,7 +105,7 @@ function opening(policies, asked, leaving) {
   sending(form, open, async () => {
     const trouble = await history.trouble();
     if (trouble) throw { field: "history", message: trouble };
-    if (policy.control.value === "") throw { field: policy.name, message: "Choose the policy that this session is to live by." };
+    if (policy.control.value === "") throw { field: policy.name, message: "Choose a policy for this session." };
     if (!(await choosing) && !(await choose())) return;
     const request = { policy: policy.control.value, ...labels.read() };
     if (known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
@@ -136,11 +136,11 @@ function byDate(series, assets) {
 function cannot({ horizon, contributions, learning, utility }, { initial_laws }) {
   const flows = [contributions ?? 0].flat();
   const reasons = {};
-  if (horizon < 2) reasons.renews = "This policy looks one period ahead, so that nothing is left of it to be renewed.";
-  else if (Array.isArray(contributions)) reasons.renews = "It is not renewed by itself: this policy has a list of contributions, which ends with it.";
-  if (learning?.kind !== "decay") reasons.rolls = "Rolling needs a policy to which older returns count less, and to this one all count the same.";
-  else if (initial_laws !== "resampled") reasons.rolls = "Rolling needs a policy trained for other records than its own.";
-  else if (utility.kind === "exponential" || flows.some((amount) => amount !== 0)) reasons.rolls = "Rolling needs a policy whose advice does not depend on wealth.";
+  if (horizon < 2) reasons.renews = "A renewed session needs a policy that looks at least two periods ahead. This one looks one period ahead.";
+  else if (Array.isArray(contributions)) reasons.renews = "A session cannot be renewed automatically if its policy lists contributions period by period.";
+  if (learning?.kind !== "decay") reasons.rolls = "A rolling session needs a policy that counts older returns less. This one counts all returns equally.";
+  else if (initial_laws !== "resampled") reasons.rolls = "A rolling session needs a policy trained for other records than its own.";
+  else if (utility.kind === "exponential" || flows.some((amount) => amount !== 0)) reasons.rolls = "A rolling session needs a policy whose advice does not depend on wealth.";
   return reasons;
 }
 

@@ -17,7 +17,7 @@ import { welcome } from "./welcome.js";
 const PAGE = 50;
 /** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
 const PAUSE = 250;
-const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Returns have changed", ending: "Completed, or in the last period" };
+const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Market has changed", ending: "Completed, or in the last period" };
 const NEWEST = "-created";
 /** What is asked for, as it stands in the address, and what it is where nothing is said. */
 const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
@@ -43,11 +43,11 @@ const lead = () =>
   h(
     "p",
     { class: "lead" },
-    "No session yet. A session is one investor who lives by a policy: report each return as it comes, and read what to hold next.",
+    "No session yet. A session is one investor who follows a policy: report each return as it comes, and read what to hold next.",
   );
 
 /** Sessions that the store no longer has as they were written. */
-const damagedWords = (damaged) => (damaged.length === 0 ? "" : `. Damaged, to be restored by an operator: ${damaged.join(", ")}`);
+const damagedWords = (damaged) => (damaged.length === 0 ? "" : `. Damaged; ask an operator to restore: ${damaged.join(", ")}`);
 
 const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 
@@ -67,9 +67,9 @@ function overview(chosen, first, leaving) {
   const ticks = ticking("sessions", {
     links: [
       { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` },
-      { at: "#/renew", words: (ticked) => `Go on with the ${count(ticked)}` },
+      { at: "#/renew", words: (ticked) => `Continue the ${count(ticked)}` },
     ],
-    asked: (ticked) => `Delete ${counted(ticked, "session")} and all that was observed?`,
+    asked: (ticked) => `Delete ${counted(ticked, "session")} and all their reports?`,
     remove: (id) => remove(`/sessions/${id}`),
     removed: async () => {
       await Promise.all([ask({}), judgeAll()]);
@@ -146,7 +146,7 @@ function overview(chosen, first, leaving) {
 }
 
 /** Of how many sessions shown the advice was not trained for; the list itself does not tell. */
-const outsideWords = (count) => (count === 0 ? "" : `Of those shown, ${counted(count, "lies outside what its policy was", "lie outside what their policies were")} trained for.`);
+const outsideWords = (count) => (count === 0 ? "" : `Of the sessions shown, ${counted(count, "is", "are")} in a situation that the policy was not trained for.`);
 
 /** `{element, state}`: the search and the filters, that by state for itself; `ask(changed)` at every change. */
 function filters(chosen, ask, tags) {
@@ -205,12 +205,12 @@ function lastReport({ date, last_report_ms }, { next, late }) {
   const under = (words, wrong) => h("span", { class: wrong ? "under wrong" : "under" }, words);
   const reported = date ? day(date) : last_report_ms ? moment(last_report_ms).split(",")[0] : "None yet";
   const coming = late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : next === null ? null : under(`next ${date ? "" : "about "}${day(next)}`);
-  return [reported, last_report_ms && !date ? under("without a day") : null, coming];
+  return [reported, last_report_ms && !date ? under("without a date") : null, coming];
 }
 
 /** Its state, how far it is, and what needs care. */
 function standing({ state, period, horizon, drift, care }) {
-  const drifting = { warning: "Returns may have changed", alarm: "Returns have changed" }[drift];
+  const drifting = { warning: "Market may have changed", alarm: "Market has changed" }[drift];
   return [
     h("span", { class: `state ${state}` }, state),
     h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),

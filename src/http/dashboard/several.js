@@ -67,7 +67,7 @@ export function severalAdvice(action, place, assets, rest) {
 export function severalWorst(action, assets, { unit }) {
   const means = action.one_step?.worst_means;
   const quant = disclosure("For the quant", () =>
-    h("p", { class: "note" }, `${SOURCES[action.source][0].toUpperCase()}${SOURCES[action.source].slice(1)}. Radius of the fund\u2019s uncertainty set ${figures(action.radius, 3)}, around ${action.sample_size} returns.${action.one_step ? ` The one-step problem is worth at least ${wealth(action.one_step.certainty_equivalent)}, and no allocation more than ${wealth(action.one_step.bound)}.` : ""}`),
+    h("p", { class: "note" }, `${SOURCES[action.source][0].toUpperCase()}${SOURCES[action.source].slice(1)}. Radius of the fund\u2019s uncertainty set ${figures(action.radius, 3)}, around ${action.sample_size} returns.${action.one_step ? ` The one-step problem is worth at least ${wealth(action.one_step.certainty_equivalent)}, and no allocation is worth more than ${wealth(action.one_step.bound)}.` : ""}`),
   );
   if (!means) return section("How it was found", quant);
   const row = (name) => {
@@ -78,8 +78,8 @@ export function severalWorst(action, assets, { unit }) {
   const most = rows.reduce((one, other) => (other.less > one.less ? other : one));
   const words =
     most.less < 5e-6
-      ? `It assumes that every asset returns on average what it did, as no market allowed does worse to this advice.`
-      : `It takes most from ${most.name}: ${percent(most.worst, 2)} a ${unit} on average, where ${percent(most.seen, 2)} was seen.`;
+      ? `It assumes that every asset keeps its average return, because no allowed market is worse for this advice.`
+      : `It takes most from ${most.name}: ${percent(most.worst, 2)} a ${unit} on average, compared with ${percent(most.seen, 2)} seen.`;
   const number = (name, cell) => ({ name, numeric: true, cell });
   return section(
     "The worst market it guards against",

@@ -9,7 +9,7 @@ import { fraction, typed } from "./number_text.js";
 import { dayOf } from "./periods.js";
 import { inPercent, LIMITS } from "./report_fields.js";
 
-const KINDS = { simple: "Gains or losses", missing: "None is known" };
+const KINDS = { simple: "Gains or losses", missing: "Not known" };
 
 /** The log-return of each asset in an observed period, counted from 0, as it stands; null where none is known. */
 export function assetReturns({ assets, observations }, index) {
@@ -35,10 +35,10 @@ export function severalFields(assets, { within = "", advised, rate, contribution
   const returns = part("simple_returns", (name) => `Return of ${name}, %`, () => null);
   const held = part("executed_allocations", (name) => `${name} held, %`, (name) => (advised ? `Blank: the ${allocation(advised[name])} advised.` : "Blank: as advised."));
   const field = (name, label, note, more = {}) => input({ within, name, label, note, changed, ...more });
-  const day = field("date", "Last day", "Such as 2008-09-30. May be blank.", { inputmode: "text", value: date ?? "" });
+  const day = field("date", "Last day", "For example 2008-09-30. May be blank.", { inputmode: "text", value: date ?? "" });
   const paid = field("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`, { unit: "percent" });
-  const flow = field("flow", "Money added at the end", `Blank: ${contribution === null ? "what the policy says" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is 100 taken.`);
-  const reached = field("wealth", "Wealth reached", "Blank: what all the rest gives.");
+  const flow = field("flow", "Money added at the end", `Blank: ${contribution === null ? "the policy\u2019s amount" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`);
+  const reached = field("wealth", "Wealth reached", "Blank: computed from the other fields.");
   const isMissing = () => kind.control.value === "missing";
   const silenced = () => returns.forEach(({ control }) => (control.disabled = isMissing()));
   const kind = select({
@@ -71,9 +71,9 @@ export function severalFields(assets, { within = "", advised, rate, contribution
     },
     trouble() {
       const wrong = isMissing() ? null : returns.find((field) => fraction(text(field)) === null);
-      if (wrong) return { field: wrong.name, message: text(wrong) === "" ? "The return is blank." : `\u201c${text(wrong)}\u201d is not a number of percent.` };
+      if (wrong) return { field: wrong.name, message: text(wrong) === "" ? "The return is blank." : `\u201c${text(wrong)}\u201d is not a percentage.` };
       const bare = isHeldSaid() && !advised ? held.find((field) => text(field) === "") : null;
-      return bare ? { field: bare.name, message: "Where one share is said, all are." } : null;
+      return bare ? { field: bare.name, message: "Give the share of every asset, or of none." } : null;
     },
     report() {
       const report = isMissing() ? { missing: true } : { simple_returns: byName(returns, () => null) };

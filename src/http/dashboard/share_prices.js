@@ -21,8 +21,8 @@ export function priceFields(names, known, changed) {
     const given = names.map((name, index) => [name, fields[index].control.value.trim()]).filter(([, text]) => text !== "");
     const values = given.map(([name, text]) => [name, typed(text)]);
     const bad = given.find((_, index) => !(values[index][1] > 0));
-    note.textContent = bad ? `\u201c${bad[1]}\u201d is no price.` : "";
+    note.textContent = bad ? `\u201c${bad[1]}\u201d is not a price.` : "";
     changed(Object.fromEntries(values.filter(([, price]) => price > 0)));
   };
-  return h("details", { class: "prices" }, h("summary", {}, "In shares, at a price of today"), h("div", { class: "fields" }, fields.map(({ element }) => element)), note);
+  return h("details", { class: "prices" }, h("summary", {}, "In shares, at today\u2019s price"), h("div", { class: "fields" }, fields.map(({ element }) => element)), note);
 }

@@ -26,14 +26,14 @@ export const PAPER = {
 };
 
 const MEANINGS = {
-  adaptive: "It guards against the worst market that the returns seen still allow, and learns from every new one.",
-  static: "It guards against the worst market within the caution that the history asks for, and does not learn.",
+  adaptive: "It guards against the worst market that the returns seen still allow, and learns from every new return.",
+  static: "It guards against the worst market within its caution, which the history sets, and does not learn.",
   known_law: "It takes the market as known and guards against nothing.",
-  plug_in: "It takes the returns seen for the whole truth, and learns.",
+  plug_in: "It trusts the returns seen completely, and learns from every new return.",
   parametric_static:
-    "It takes returns as a bell curve, guards against every average and spread near the history\u2019s, and does not learn.",
+    "It assumes that returns follow a bell curve. It guards against every average and spread near those of the history, and does not learn.",
   parametric_adaptive:
-    "It takes returns as a bell curve, guards against every average and spread near those of the returns seen, and learns.",
+    "It assumes that returns follow a bell curve. It guards against every average and spread near those of the returns seen, and learns from every new return.",
 };
 
 /** Investors by their relative risk aversion, of power utility. */
@@ -79,7 +79,7 @@ function radiusRule(radius) {
     case "bridge":
     case "calibrated": {
       const times = radius.scale === 1 ? "" : `${significant(radius.scale)} times `;
-      const factor = radius.rule === "bridge" ? "" : ", times the factor that the history asks for";
+      const factor = radius.rule === "bridge" ? "" : ", times the factor calibrated from the history";
       return `${times}the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an${factor}`;
     }
     case "concentration":
@@ -120,11 +120,11 @@ function banks({ rate_per_step, periods_per_year }) {
 
 /** What may be a mistake in a problem, by the code of its warning, in the words and the units of the form; `field` is what it is in. */
 export const WARNED = {
-  rate_high: (problem) => `${banks(problem)} more than banks do. Is that what it pays in one ${unitOf(problem.periods_per_year)}, or in a year?`,
-  rate_above_record: (problem) => `${banks(problem)} more than the record returned on average. Is that what it pays in one ${unitOf(problem.periods_per_year)}?`,
+  rate_high: (problem) => `${banks(problem)} more than banks usually do. Is that what it pays in one ${unitOf(problem.periods_per_year)}, or in a year?`,
+  rate_above_record: (problem) => `${banks(problem)} more than the average return of the record. Is that what it pays in one ${unitOf(problem.periods_per_year)}?`,
   record_in_percent: (_, field) =>
-    `The ${field.includes("centre") ? "assumed " : ""}returns vary more than those of any market. Are they in percent, and were read as fractions?`,
-  trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of all that is traded. Is that meant?`,
+    `The ${field.includes("centre") ? "assumed " : ""}returns vary more than those of any market. Are they percentages that were read as fractions?`,
+  trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of what is traded. Is that right?`,
 };
 
 /** What may be a mistake in a problem. */
@@ -137,8 +137,8 @@ export function warningList(warnings, problem) {
 export function meant(form, { noun, job, warnings, problem }, yes) {
   form.querySelector(".meant")?.remove();
   if (warnings.length === 0) return yes();
-  const go = h("button", { type: "button", onclick: yes }, "Yes, go on");
-  const change = h("button", { type: "button", class: "quiet" }, "No, I change it");
+  const go = h("button", { type: "button", onclick: yes }, "Yes, continue");
+  const change = h("button", { type: "button", class: "quiet" }, "No, change it");
   change.addEventListener("click", () =>
     pressed(change, async () => {
       await post(`/jobs/${job}/cancel`);
@@ -146,7 +146,7 @@ export function meant(form, { noun, job, warnings, problem }, yes) {
       form.querySelector(`[name="${CSS.escape(warnings[0].field)}"]`)?.focus();
     }),
   );
-  const question = h("div", { class: "words meant", role: "group", "aria-label": "Is this meant?", tabindex: -1 }, h("p", {}, `The ${noun} is queued. Is this meant?`), warningList(warnings, problem), h("p", { class: "actions" }, go, change));
+  const question = h("div", { class: "words meant", role: "group", "aria-label": "Is this right?", tabindex: -1 }, h("p", {}, `The ${noun} is queued. Is this right?`), warningList(warnings, problem), h("p", { class: "actions" }, go, change));
   form.querySelector(":scope > .send").before(question);
   question.focus();
 }
@@ -177,11 +177,11 @@ export function caution(problem) {
 export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit = "period") {
   switch (kind) {
     case "smoothed":
-      return `Every return seen stands for a normal law around it, of deviation ${percent(bandwidth, 2)}.`;
+      return `Every return seen is spread out as a normal distribution around it, with deviation ${percent(bandwidth, 2)}.`;
     case "volatility_scaled":
-      return `Every return seen is brought to the volatility of now, in which squares count half after ${counted(half_life, unit)}.`;
+      return `Every return seen is rescaled to the current volatility, in which squared returns count half after ${counted(half_life, unit)}.`;
     case "mixed":
-      return `Beside the returns seen it counts a law that is assumed to tell as much as ${significant(weight)} more.`;
+      return `Besides the returns seen, it uses an assumed law that counts as much as ${significant(weight)} more returns.`;
     default:
       return "";
   }
@@ -197,7 +197,7 @@ export function inWords({ problem }, annualised) {
   const guarded = caution(problem) === "none" ? "" : ` Its caution: ${caution(problem)}.`;
   const { learning } = problem;
   const forgets =
-    learning.kind === "decay" ? ` Returns count less the older they are: half after ${counted(learning.half_life, unit)}.` : "";
+    learning.kind === "decay" ? ` Older returns count less: half after ${counted(learning.half_life, unit)}.` : "";
   const centred = centreInWords(problem.centre, unit);
   const all = limit === 1 ? "all" : `up to ${percent(limit, 0)}`;
   return [

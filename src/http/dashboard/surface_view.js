@@ -25,7 +25,7 @@ function workerAddress() {
   if (!globalThis.trustedTypes) return WORKER;
   trusted ??= trustedTypes.createPolicy("ballast-worker", {
     createScriptURL: (address) => {
-      if (address !== WORKER) throw new TypeError(`${address} is no worker of this page`);
+      if (address !== WORKER) throw new TypeError(`${address} is not a worker of this page`);
       return address;
     },
   });
@@ -121,7 +121,7 @@ const DRAWN = { single, line: alongOne, field: overTwo };
 function single({ band: [low, high], floor_gain }) {
   const here = "Here every session of this policy knows the same record: ";
   const [least, most] = [low, high].map(allocation);
-  if (most === allocation(0)) return h("p", { class: "single" }, here, "hold ", h("strong", {}, "nothing"), " in stocks, for in its worst market nothing beats the bank.");
+  if (most === allocation(0)) return h("p", { class: "single" }, here, "hold ", h("strong", {}, "nothing"), " in stocks, because in the worst market nothing beats the bank.");
   return h(
     "p",
     { class: "single" },
@@ -130,7 +130,7 @@ function single({ band: [low, high], floor_gain }) {
     h("strong", {}, least === most ? least : [least, " to ", most]),
     " in stocks, worth ",
     h("strong", {}, percentFigures(Math.expm1(floor_gain), 2)),
-    " more than the bank even in the worst market, to who starts in the bank.",
+    " more than the bank even in the worst market, if you start in the bank.",
   );
 }
 
@@ -149,7 +149,7 @@ function overTwo({ across, xs, ys, cells, dots, own, rest }) {
   const fixed = rest.map(([name, value]) => `${AXES[name].label.toLowerCase()} ${AXES[name].format(value)}`);
   const stretched = across === "deviation" ? " and standard deviation" : "";
   const marked = own ? " The cross is the history itself." : "";
-  const note = `Each cell is the history, moved to that average${stretched}${fixed.length > 0 ? `; ${fixed.join(", ")}` : ""}.${marked} Beyond the situations solved, Ballast solves the step anew. Returns here are log-returns.`;
+  const note = `Each cell is the history, shifted to that average${stretched}${fixed.length > 0 ? `; ${fixed.join(", ")}` : ""}.${marked} Beyond the situations solved, Ballast solves the step again. Returns here are log-returns.`;
   return heatmap({
     title: "Share held in stocks",
     name: "hold",

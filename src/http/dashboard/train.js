@@ -151,9 +151,9 @@ export async function view(query, leaving) {
     h(
       "p",
       { class: "note", id: "json-note" },
-      "The request as it will be sent. What is edited here changes the form and the other way round; ",
-      h("a", { href: "/docs" }, "the interface"),
-      " names every field.",
+      "The request as it will be sent. Edits here change the form, and edits of the form change the request. See ",
+      h("a", { href: "/docs" }, "the API description"),
+      " for every field.",
     ),
     h("label", { for: "json", class: "unseen" }, "Training request as JSON"),
     json,
@@ -165,14 +165,14 @@ export async function view(query, leaving) {
     { novalidate: true },
     h("fieldset", {}, h("legend", {}, "The returns seen so far"), source.element),
     fields.elements,
-    fieldset("What it is called", labels.parts),
+    fieldset("Labels", labels.parts),
     advanced,
     refusal(),
     h(
       "p",
       { class: "send" },
       send,
-      h("span", { class: "note" }, "Trains in the background; the job list shows how far it is. What is typed here is kept while this tab is open."),
+      h("span", { class: "note" }, "Trains in the background; the job list shows the progress. What you type here is kept while this tab is open."),
     ),
   );
   const ask = async () => {
@@ -204,8 +204,8 @@ export async function view(query, leaving) {
 /** What a form that is filled from a policy asks for. */
 function told(newer) {
   const words = newer
-    ? "Everything is as that policy was trained, its returns too: put newer ones in their place, and train."
-    : "Everything is as that policy was trained: change one thing, train, and compare the two.";
+    ? "Everything is as that policy was trained, including its returns. Replace them with newer ones, then train."
+    : "Everything is as that policy was trained. Change one thing, train, and compare the two.";
   return h("p", { class: "lead" }, words);
 }
 

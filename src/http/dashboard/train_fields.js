@@ -21,14 +21,14 @@ const OFFERED = Object.fromEntries(Object.entries(FRAMEWORKS).filter(([framework
 const HALF_LIFE = "problem.learning.half_life";
 /** What proposes the shares of several assets. */
 const COMPOSITION = "problem.composition";
-const COMPOSITIONS = { one_step: "Anew each period, against the worst market", inverse_volatility: "Less of what varies more", equal: "All alike" };
+const COMPOSITIONS = { one_step: "Chosen each period, against the worst market", inverse_volatility: "Less of what varies more", equal: "Equal shares" };
 /** How much of the statistical doubt is acted on. */
 const CAUTION = "problem.caution";
 const CAUTIONS = {
-  balanced: "Balanced: least to regret, whatever the premium is",
-  bold: "Bold: nearer to the record",
-  cautious: "Cautious: nearer to no premium",
-  paper: "All that the confidence asks for",
+  balanced: "Balanced: least regret, whatever the premium is",
+  bold: "Bold: closer to the record",
+  cautious: "Cautious: closer to no premium",
+  paper: "Full: everything that the confidence implies",
 };
 /** The choice of an investor that no preset is. */
 const OWN = "own";
@@ -67,7 +67,7 @@ const capital = (word) => word[0].toUpperCase() + word.slice(1);
 const PERIODS = "problem.periods_per_year";
 const RATE = "problem.rate_per_step";
 /** How often there is a period. */
-const CALENDARS = [["", "To be chosen"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: periods of another kind"]];
+const CALENDARS = [["", "Choose one"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: other periods"]];
 
 /** `{elements, show(request), periods(count), trouble(), choices(), choose(choices)}`; `changed(path, value)` at every edit. `periods` takes how
  * many periods a year the dates of a record tell, or null; `trouble()` is what is still to be chosen, as a refusal, or null; `choices()` is
@@ -83,23 +83,23 @@ export function trainFields(changed) {
     name: "investor",
     label: "Investor",
     note: investorNote,
-    choices: [...investorChoices(), [OWN, "Set for the quant"]],
+    choices: [...investorChoices(), [OWN, "Own settings, for the quant"]],
     changed: (name) => {
       if (name === OWN) quant.open = true;
       else changed("problem.utility", { kind: "power", risk_aversion: INVESTORS[name] });
     },
   });
-  const horizon = field("problem.horizon", "Periods ahead", "Until the money is needed, 1 to 520.");
+  const horizon = field("problem.horizon", "Periods ahead", "Until the money is needed: 1 to 520.");
   const known = () => Number(yearly.control.value) || null;
   const paid = () => {
     const value = bank.read(known());
     changed(RATE, value === undefined ? null : value);
   };
-  const bank = bankRate({ name: RATE, note: "Such as 0.25, or \u201c3 % a year\u201d.", changed: paid });
+  const bank = bankRate({ name: RATE, note: "For example 0.25, or \u201c3 % a year\u201d.", changed: paid });
   const yearly = select({
     name: PERIODS,
     label: "Periods a year",
-    note: "A year told in advice and rates, and the day of the next report, follow from it.",
+    note: "Yearly figures and the date of the next report depend on it.",
     choices: CALENDARS,
     changed: () => periods(known()),
   });
@@ -116,16 +116,16 @@ export function trainFields(changed) {
   };
   const trouble = () => {
     if (yearly.element.hidden) return null;
-    if (yearly.control.value === "") return { field: PERIODS, message: "The record has no dates that tell it: choose how many periods make a year." };
-    if (bank.isYearly() && bank.read(known()) === undefined) return { field: RATE, message: "What the bank pays in a year needs the periods a year: choose them, or tell what it pays in one period." };
+    if (yearly.control.value === "") return { field: PERIODS, message: "The record has no dates that show it: choose how many periods make a year." };
+    if (bank.isYearly() && bank.read(known()) === undefined) return { field: RATE, message: "A bank return per year needs the periods a year: choose them, or give the return per period." };
     return null;
   };
   const start = field("problem.initial_wealth", "Wealth at the start", "In any currency.");
-  const cost = field("problem.trading_cost", "Trading cost, %", "Of what is traded; 0 is free.", "percent");
+  const cost = field("problem.trading_cost", "Trading cost, %", "Share of what is traded; 0 is free.", "percent");
   const flow = input({
     name: "problem.contributions",
     label: "Added each period",
-    note: "At its end; negative is withdrawn. One number, or one for each period, apart by semicolons.",
+    note: "At the end of the period; negative is a withdrawal. One number, or one for each period, separated by semicolons.",
     changed: (text) => changed("problem.contributions", amounts(text)),
   });
   const framework = select({
@@ -135,18 +135,18 @@ export function trainFields(changed) {
     choices: OFFERED,
     changed: (value) => changed("problem.framework", value),
   });
-  const confidence = field("problem.radius.alpha", "Confidence, %", "More guards against more: usual is 90 %.", "confidence");
+  const confidence = field("problem.radius.alpha", "Confidence, %", "More confidence guards against more. 90 % is usual.", "confidence");
   const caution = select({
     name: CAUTION,
     label: "Caution",
-    note: "How much of what the record leaves open is guarded against.",
+    note: "How much of the uncertainty about the record is guarded against.",
     choices: CAUTIONS,
     changed: (value) => changed(CAUTION, value),
   });
   const composition = select({
     name: COMPOSITION,
     label: "How the assets are mixed",
-    note: "What each one\u2019s share is of all that is held.",
+    note: "How the total held is split between the assets.",
     choices: COMPOSITIONS,
     changed: (value) => changed(COMPOSITION, value),
   });
@@ -154,7 +154,7 @@ export function trainFields(changed) {
   const halfLife = input({
     name: HALF_LIFE,
     label: "Half-life of returns",
-    note: "In periods: one so old counts half. Blank: all count the same.",
+    note: "In periods: a return this old counts half. Blank: all count the same.",
     changed: (text) => {
       const half_life = typed(text);
       changed("problem.learning", half_life === null ? { kind: "equal" } : { kind: "decay", half_life });
@@ -168,10 +168,10 @@ export function trainFields(changed) {
     field(
       "problem.utility.risk_aversion_relative",
       "Relative risk aversion",
-      "Over the initial wealth: of one who starts with 100, 3 is 0.03 per unit of wealth.",
+      "Divided by the initial wealth: 3 at a wealth of 100 is 0.03 per unit of wealth.",
     ),
-    field("design.accuracy", "Accuracy", "Basis points by which the value may be off: design points are added until it is reached."),
-    field("design.count", "Design points", "States solved per step: 10 to 10,000, at most so many where an accuracy is given."),
+    field("design.accuracy", "Accuracy", "Largest error of the value, in basis points. Design points are added until it is reached."),
+    field("design.count", "Design points", "States solved per step: 10 to 10,000. With an accuracy this is the most."),
     field("seed", "Seed", "The same request and seed give the same policy."),
   ];
   const quant = h("details", {}, h("summary", {}, "For the quant"), fieldset("Utility and precision", paper));
@@ -182,7 +182,7 @@ export function trainFields(changed) {
       const value = found === undefined && part.name === HALF_LIFE && !request.problem?.assets ? "" : found;
       // A share in the place of a level.
       const share = part === caution ? value?.scale : undefined;
-      if (share !== undefined) caution.control.append(h("option", { value: share }, `${short(100 * share)} % of what the confidence asks for`));
+      if (share !== undefined) caution.control.append(h("option", { value: share }, `${short(100 * share)} % of what the confidence implies`));
       const shown = [share ?? value ?? ""].flat().map(readings[part.name]?.show ?? ((each) => each));
       if (part.control !== document.activeElement) part.control.value = shown.join("; ");
       part.element.hidden = value === undefined;
@@ -205,7 +205,7 @@ export function trainFields(changed) {
   };
   const elements = [
     fieldset("The investor", [investor, horizon, yearly, ...bank.parts, start, cost, flow]),
-    fieldset("What he guards against", [framework, composition, confidence, caution, halfLife]),
+    fieldset("What to guard against", [framework, composition, confidence, caution, halfLife]),
     quant,
   ];
   const choices = () => ({ told: bank.per.control.value, periods: yearly.control.value });

@@ -11,6 +11,6 @@ export const interval = ({ value, low, high }, format) => `${format(value)} (${f
 export function changing({ name, allocation, beyond, shown }) {
   const { value, low, high } = beyond;
   const size = interval(value < 0 ? { value: -value, low: -high, high: -low } : beyond, (amount) => tick(amount, 0.01));
-  const verdict = low > 0 || high < 0 ? "" : `: ${shown} not show that it did anything`;
-  return `${name} holds ${percent(allocation)} on average; that it changes the share ${value < 0 ? "cost" : "earned"} ${size} beside holding that all along${verdict}.`;
+  const verdict = low > 0 || high < 0 ? "" : `: ${shown} not show that it made a difference`;
+  return `${name} holds ${percent(allocation)} on average; changing the share ${value < 0 ? "cost" : "earned"} ${size} compared with holding that average throughout${verdict}.`;
 }

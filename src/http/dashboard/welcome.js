@@ -19,9 +19,9 @@ export function welcome() {
         "Train a policy",
         "Give it the returns seen so far. It prepares for the worst market within your caution, in seconds to minutes.",
       ),
-      step("Open a session", "A session is one investor: his wealth, and the returns he has lived through."),
+      step("Open a session", "A session is one investor: their wealth, and the returns of the periods so far."),
       step(
-        "Observe and act",
+        "Report and act",
         "Report each period\u2019s return as it comes. The advice for the next one follows from all of them.",
       ),
     ),

@@ -31,7 +31,7 @@ function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
     h(
       "p",
       { class: "note" },
-      `At \u00d7 1, the caution of this session, the average return may really be ${points(radius * cautionScale, 2)} a ${unit} lower than it was seen; at \u00d7 0 the record is the whole truth. Later periods keep their own caution.`,
+      `At \u00d7 1, the caution of this session, the average return may really be ${points(radius * cautionScale, 2)} a ${unit} lower than seen. At \u00d7 0 the record is fully trusted. Later periods keep their own caution.`,
     ),
     h(
       "div",

@@ -14,14 +14,14 @@ const LITTLE = 5e-4;
 export function assumed({ transport }, unit, cautious = true) {
   const moves = transport.filter(({ atom, moved_to, mass }) => atom !== moved_to && mass > 0);
   const share = (some) => some.reduce((sum, { mass }) => sum + mass, 0);
-  if (moves.length === 0) return `It assumes that every ${unit} comes as those seen did${cautious ? ": no market allowed does worse to this advice" : ""}.`;
+  if (moves.length === 0) return `It assumes that every ${unit} is like those seen${cautious ? ": no allowed market is worse for this advice" : ""}.`;
   const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
   const deep = moves.filter(({ moved_to }) => moved_to <= lowest + NEAR);
   const rest = share(moves) - share(deep);
   const size = (log) => percent(Math.abs(Math.expm1(log)), Math.abs(Math.expm1(log)) < 0.095 ? 1 : 0);
   const often = (mass) => (mass > 0.6 ? `most ${unit}s` : `one ${unit} in ${oneIn(mass)}`);
   const verb = (mass, word) => (mass > 0.6 ? word : `${word}s`);
-  const more = rest >= LITTLE ? `, and that ${often(rest)} ${verb(rest, "bring")} less than the like did` : "";
+  const more = rest >= LITTLE ? `, and that ${often(rest)} ${verb(rest, "bring")} less than similar ones did` : "";
   const mass = share(deep);
   if (lowest > 0) {
     const cut = share(moves);
@@ -38,14 +38,14 @@ export function whyNothing({ transport }, rate, size, unit) {
   const left = mean(({ moved_to }) => Math.expm1(moved_to)) - rate;
   const beyond = paid - rate;
   const told = (value) => percent(Math.abs(value), 2);
-  if (beyond <= 0) return `The record paid ${told(beyond)} a ${unit} less than the bank; the chance error of that is ${told(error)}.`;
-  return `The record beat the bank by ${told(beyond)} a ${unit}; the chance error of that is ${told(error)}. In this market it ${left > 0 ? `beats it by ${told(left)}` : `is ${told(left)} less`}.`;
+  if (beyond <= 0) return `The record paid ${told(beyond)} a ${unit} less than the bank, with a standard error of ${told(error)}.`;
+  return `The record beat the bank by ${told(beyond)} a ${unit}, with a standard error of ${told(error)}. In this market it ${left > 0 ? `beats the bank by ${told(left)}` : `pays ${told(left)} less than the bank`}.`;
 }
 
 /** The section; the robust step takes a while, so it comes after the rest of the page stands. `then()` when it has. */
 export function worstMarket({ id, policy, cautious, calendar: { unit }, leaving }, advice, then) {
   const paper = h("div", { class: "words quant" }, advice.quant);
-  const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step anew\u2026"));
+  const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step again\u2026"));
   const told = async () => {
     const anew = await get(`/action?session=${id}&explain=worst_case`, leaving);
     advice.checked(anew);
@@ -69,14 +69,14 @@ export function worstMarket({ id, policy, cautious, calendar: { unit }, leaving 
       then();
     },
   );
-  return section(cautious ? "The worst market it guards against" : "The market it counts on", holder, disclosure("For the quant", () => paper));
+  return section(cautious ? "The worst market it guards against" : "The market it assumes", holder, disclosure("For the quant", () => paper));
 }
 
 /** Of a market whose returns are a bell curve: its average and its spread beside those seen. */
 function assumedNormal({ normal, sentence }, unit) {
   if (!normal) return minus(sentence);
   const [average, spread, seenAverage, seenSpread] = [normal.mean, Math.sqrt(normal.variance), normal.estimated_mean, Math.sqrt(normal.estimated_variance)].map((value) => percent(value, 2));
-  return `It assumes that stocks return ${average} a ${unit} on average, give or take ${spread}, where ${seenAverage} and ${seenSpread} were seen (as log-returns).`;
+  return `It assumes that stocks return ${average} a ${unit} on average, give or take ${spread}. The record shows ${seenAverage}, give or take ${seenSpread} (log-returns).`;
 }
 
 function paperWords({ worst_case, radius, sample_size, certainty_equivalent, floor }, unit) {
@@ -86,6 +86,6 @@ function paperWords({ worst_case, radius, sample_size, certainty_equivalent, flo
   const law = transport.length === 0 ? "" : `The worst law within Wasserstein distance ${figures(radius, 3)} of the ${sample_size} returns seen moves ${percent(moved)} of the probability. `;
   // The worth is convex in the radius, and never below the floor.
   const most = Math.max(0, Math.min(10 * radius_cost, 1e4 * Math.log(certainty_equivalent / floor)));
-  const words = `${law}A ball of this ${unit} alone wider by 0.001 would cost at most ${significant(most, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(duality_gap), 2)} bp.`;
+  const words = `${law}Widening the ball of this ${unit} alone by 0.001 would cost at most ${significant(most, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(duality_gap), 2)} bp.`;
   return h("p", { class: "note" }, words);
 }
