@@ -5,10 +5,10 @@ import { endWords } from "./flows.js";
 import { allocation, figures, minus, percent, points, significant, wealth } from "./format.js";
 import { priceFields, shareCount } from "./share_prices.js";
 
-/** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
+/** Advice is shown to a tenth of a percent: within this distance the policy and the step solved again agree. */
 const TOLERANCE = 0.001;
 
-/** Where an advice comes from, in words: every source that the service names. */
+/** The text for each source of advice that the service names. */
 export const SOURCES = {
   policy_surrogate: "read off the policy",
   resolved: "solved again on request",
@@ -18,13 +18,14 @@ export const SOURCES = {
     "everything stays in the bank, because the step has no finite solution here or wealth cannot cover the planned withdrawals",
 };
 
-/** Whether two allocations are the same advice. */
+/** Tells whether two allocations are the same advice. */
 const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 
 /**
- * The advice of `action` with what follows it, `rest`. `place` is `{heading, end, cautious, price, cost, wealth}`: what the period is called,
- * when it is all for, whether it guards against worse than the record, the last price reported or null, and the session's terms. `{element, quant, checked(anew), unchecked(words)}`:
- * `checked` takes what `/action` says of the same state with the step solved anew, `unchecked` why it could not be.
+ * Shows the advice of `action`, followed by the elements `rest`. `place` is `{heading, end, cautious, price, cost, wealth}`: the name of the
+ * period, when the horizon ends, whether the policy guards against markets worse than the record, the last price reported or null, and the
+ * session's terms. Returns `{element, quant, checked(anew), unchecked(words)}`: `checked` takes the answer of `/action` for the same state
+ * with the step solved again, `unchecked` the reason why that failed.
  */
 export function adviceView(action, place, rest) {
   const note = h("p", { class: "note", id: "check" }, `${exactly(action)}. Solving the step again as a check\u2026`);
@@ -58,7 +59,7 @@ export function adviceView(action, place, rest) {
 
 const exactly = ({ allocation, source }) => `Allocation ${percent(allocation, 2)}, ${SOURCES[source]}`;
 
-/** What the advice comes to in money and, where a price is known, in shares; what is traded pays its cost. */
+/** Returns the advice in money, after trading costs, and in shares if a price is known. */
 export function inMoney({ allocation: advised, holding, trade }, { wealth: whole, cost, price }) {
   const all = whole * (1 - cost * Math.abs(trade));
   const [held, now] = [advised * all, holding * whole];
@@ -66,7 +67,7 @@ export function inMoney({ allocation: advised, holding, trade }, { wealth: whole
   return price === null ? parts : { ...parts, shares: held / price, traded: (held - now) / price };
 }
 
-/** What to do about what is held now. Less than the advice is told to is nothing. */
+/** Says what to trade. A trade smaller than the precision of the advice counts as none. */
 function order(action, place) {
   const { all, held, now, trade, bank, cost, shares, traded } = inMoney(action, place);
   const [low, high] = action.band;
@@ -81,7 +82,7 @@ function order(action, place) {
   return [`${stocks}${shares === undefined || shares === 0 ? "" : `, ${shareCount(shares)} shares`}. `, ...act, kept];
 }
 
-/** What the advice is worth even then, as the parts of a sentence. */
+/** Says what the advice is worth in the worst market, as the parts of a sentence. */
 export function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
   const worst = "n the worst market it guards against";
   const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy assumes");
@@ -95,7 +96,7 @@ export function why({ allocation, certainty_equivalent, floor }, { end, cautious
   ];
 }
 
-/** The figures behind the advice, in the words of the paper. */
+/** The figures behind the advice, in the paper's terms. */
 function quantWords({ radius, sample_size, effective_size, certainty_equivalent, floor, surrogate_sd }) {
   const weighed = effective_size < sample_size - 0.5 ? `, worth ${significant(effective_size, 3)} of equal weight` : "";
   return [

@@ -6,14 +6,14 @@ import { h } from "./dom.js";
 import { allocation, wealth } from "./format.js";
 import { inMoneyByName } from "./several.js";
 
-/** Browsers keep six connections to one address: so many leave room for what is clicked meanwhile. */
+/** Browsers keep six connections to one address: this many leave room for what the user clicks meanwhile. */
 const AT_ONCE = 4;
-/** A trade of a smaller share of wealth is none, as the advice is told to a tenth of a percent. */
+/** A trade of a smaller share of wealth counts as none, because advice is shown to a tenth of a percent. */
 const LITTLE = 0.0005;
 
-/** `{of(entry), isOutside(entry), forget()}`: `of` gives the elements `{hold, trade}` of a session's row, asked for once; what still waits is
- * not asked for after `forget()`, until its row is shown again. `isOutside(entry)` says of what was told so far whether the session
- * stands where its policy was not trained for; `changed()` hears of every such. */
+/** Returns `{of(entry), isOutside(entry), forget()}`. `of` gives the elements `{hold, trade}` of a session's row and requests the advice once.
+ * `forget()` drops the requests that still wait, until their rows are shown again. `isOutside(entry)` tells whether the answer so far puts
+ * the session outside what its policy was trained for; `changed()` is called for each such session. */
 export function advised(leaving, changed = () => {}) {
   const cells = new Map();
   const costs = new Map();
@@ -62,10 +62,10 @@ export function advised(leaving, changed = () => {}) {
   return { of, isOutside: (entry) => outside.has(state(entry)), forget };
 }
 
-/** What the advice of a row rests on: another report or another policy asks anew. */
+/** Returns the key of a row's advice: another report or another policy requests it again. */
 const state = ({ session, policy, last_report_ms }) => [session, policy, last_report_ms].join();
 
-/** No advice, and why. */
+/** Says that there is no advice, and why. */
 const none = (reason) => h("span", {}, "\u2013 ", h("span", { class: "under" }, reason));
 
 const isOfSeveral = (action) => typeof action.allocation === "object";
@@ -77,10 +77,10 @@ function held(action) {
   return [allocation(heldInAll(action)), h("span", { class: "under" }, `in ${names.length} of ${Object.keys(action.allocation).length} assets`), beyond];
 }
 
-/** The share of wealth to hold, in one asset or in all of several together. */
+/** Returns the share of wealth to hold, in one asset or in several together. */
 export const heldInAll = (action) => (isOfSeveral(action) ? action.total : action.allocation);
 
-/** What to buy and to sell, in money, as one or two words of order; what is traded pays its cost. */
+/** Returns the orders, "Buy" and "Sell" with amounts of money after trading costs. */
 export function orders(action, whole, cost) {
   const trades = isOfSeveral(action)
     ? inMoneyByName(action, Object.keys(action.allocation), { wealth: whole, cost }).rows.map(({ trade }) => trade)

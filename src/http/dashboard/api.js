@@ -3,7 +3,7 @@
 import { minus } from "./format.js";
 import { held, refusedWords, shown } from "./key.js";
 
-/** A stream that broke off is opened again after so long, in milliseconds. */
+/** Delay before a broken stream is opened again, in milliseconds. */
 const RECONNECT = 1000;
 
 /** A refusal or a failure, as a problem document (RFC 9457). */
@@ -14,7 +14,7 @@ export class Problem extends Error {
     Object.assign(this, { type, title, status, field, value, rule, doubts });
   }
 
-  /** Whether the request may have gone through unheard, or may do so later: sending it again is what to do. */
+  /** Tells whether to send the request again: it may have succeeded without an answer, or may succeed later. */
   get passing() {
     return this.status === 0 || this.status === 429 || this.status === 503;
   }
@@ -39,7 +39,7 @@ async function send(method, path, body, signal, headers = {}) {
   const problem = new Problem(await response.json().catch(() => fallback));
   if (problem.status === 401 && held()) {
     problem.message = refusedWords(problem, method !== "GET");
-    // It is said of the key and not of a field; what was typed stays while another is pasted.
+    // The problem is with the key, not with a field: what was typed stays while the user pastes another key.
     problem.field = problem.rule = undefined;
     if (method !== "GET") dispatchEvent(new CustomEvent("key-refused", { detail: problem.message }));
   }
@@ -56,15 +56,16 @@ export const text = async (path) => (await send("GET", path)).text();
 
 let described;
 
-/** Whether this service has a call, such as `/what-if`. */
+/** Tells whether this service has a call, such as `/what-if`. */
 export async function offers(path) {
   described ??= get("/openapi.json").then((description) => description.paths);
   return path in (await described.catch(() => ({})));
 }
 
 /**
- * Follows a job: `changed(job)` at once and at every change, until it ends or `signal` aborts. A stream that breaks off
- * is opened again, and told which event was seen last; `unheard(error)` hears of that, and of null once it goes on. By `fetch`, for an `EventSource` cannot show a key.
+ * Follows a job: calls `changed(job)` at once and at every change, until the job ends or `signal` aborts. A broken stream is opened again
+ * with the last event seen; `unheard(error)` is called then, and with null once the stream continues. It uses `fetch`, because an
+ * `EventSource` cannot send a key.
  */
 export async function follow(job, changed, signal, unheard = () => {}) {
   let seen = {};
@@ -87,7 +88,7 @@ export async function follow(job, changed, signal, unheard = () => {}) {
   }
 }
 
-/** The events in a stream, each with its fields; comments have no data and are passed over. */
+/** Yields the events of a stream, each with its fields; skips comments, which have no data. */
 async function* events(body) {
   const reader = body.pipeThrough(new TextDecoderStream()).getReader();
   const field = (line) => [line.split(":", 1)[0], line.slice(line.indexOf(":") + 1).trimStart()];
@@ -106,7 +107,7 @@ async function* events(body) {
   }
 }
 
-/** Listener of a link that downloads: with a key held, the browser alone would be refused. */
+/** Downloads the target of a link by a call with the key, because the browser alone would be refused. */
 export async function download(event) {
   const link = event.currentTarget;
   if (!held() || link.href.startsWith("blob:")) return;

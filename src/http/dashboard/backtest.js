@@ -13,19 +13,19 @@ import { colourOf, colourOfLevel } from "./strategies.js";
 import { belowHighest, compounded, grouped, places, returnsOf, rolling, worstFalls } from "./track.js";
 import { changing, ordinal } from "./verdict.js";
 
-/** Falls listed. */
+/** Number of falls listed. */
 const FALLS = 5;
-/** Years below which no strategy is called better than another: a crash that comes once in ten is missing from many shorter records. */
+/** With fewer years no strategy is called better than another: many shorter records miss a crash that comes once in ten years. */
 const FEWEST_YEARS = 30;
-/** A difference within a hundredth of a millionth of wealth is rounding. */
+/** A smaller difference of a certainty equivalent is rounding: wealth starts at 100. */
 const ROUNDING = 1e-6;
-/** Years that roll through the record: the first that it holds twice. */
+/** Lengths of rolling windows, in years: the first that fits twice into the record is used. */
 const ROLLING = [5, 1];
-/** With fewer returns the service is careful with an advice. */
+/** With fewer returns the service warns about its advice. */
 const SHORT_RECORD = 24;
 const KNOWN = ["all_bank", "sixty_forty", "all_stock"];
 
-/** The report with what is said and drawn of it. */
+/** Returns the report with the values that the page shows and draws. */
 const tell = (report) => ({ ...report, ...(report.assets ? ofAssets(report) : ofOne(report)), unit: unitOf(report.periods_per_year), times: times(report) });
 
 export function body(report) {
@@ -35,14 +35,14 @@ export function body(report) {
   return [...head, chosen(told), read, foot];
 }
 
-/** The strategies of one asset; `market` is what they are held against, `known` who stands beside each, `main` who most is said of. */
+/** Returns the strategies of one asset. `market` is the benchmark, `known` are the strategies shown beside each, `main` is the one described most. */
 function ofOne(report) {
   const told = { ...report, lines: lines(report) };
   const beside = KNOWN.map((kind) => known(told, kind));
   return { lines: told.lines, known: beside, market: known(told, "all_stock"), main: mainOf(told), held: "Share held in stocks" };
 }
 
-/** Every strategy with its name, its colour and its wealth from the start on, in the order of the report. */
+/** Returns every strategy with its name, its colour and its wealth from the start on, in the report's order. */
 const lines = (report) =>
   report.strategies.map((figures, index) => ({
     ...figures,
@@ -52,11 +52,11 @@ const lines = (report) =>
     colour: figures.kind === "adaptive" ? colourOfLevel(index, report.choices.alpha.length) : colourOf(figures.kind),
   }));
 
-/** The one that most is said about: the second cautious one that learns, or the only one. */
+/** Returns the strategy described most: the second cautious one that learns, or the only one. */
 const mainOf = ({ lines, choices }) => lines[Math.min(1, choices.alpha.length - 1)];
 const known = ({ lines }, wanted) => lines.find(({ kind }) => kind === wanted);
 
-/** Where the start and the end of each period stand on an axis, in years, and what they are called. */
+/** Returns the positions of the ends of the periods on an axis, in years, and their names. */
 function times({ dates, periods_per_year, periods }) {
   const length = periods[0].wealth.length;
   const [first, last] = dates ? [inYears(dates[0]), inYears(dates[length - 1])] : [0, (length - 1) / periods_per_year];
@@ -68,13 +68,13 @@ function times({ dates, periods_per_year, periods }) {
   return { values, index, name, during: { format: during, here: during }, after: (k) => (k === 0 ? "At the start" : `${dates ? "" : "After "}${name(k)}`) };
 }
 
-/** The start of a day, a month or a year, counted in years. */
+/** Returns the start of a day, a month or a year, counted in years. */
 function inYears(date) {
   const [year, month = 1, day = 1] = date.split("-").map(Number);
   return year + (month - 1) / 12 + (day - 1) / 372;
 }
 
-/** What was walked through, how, and for whom. */
+/** Describes the record, the method and the investor. */
 function walked({ choices, lines, unit, times }) {
   const { every, window, horizon, trading_cost, risk_aversion } = choices;
   const length = lines[0].wealth.length - 1;
@@ -91,7 +91,7 @@ function walked({ choices, lines, unit, times }) {
   );
 }
 
-/** What the figures say. */
+/** Returns the sentences that state the results. */
 function conclusions(told) {
   const { lines, whole_years, uncounted_periods } = told;
   const main = mainOf(told);
@@ -113,7 +113,7 @@ function conclusions(told) {
   return said;
 }
 
-/** Ahead of whom the record shows it, behind whom, and who cannot be told from it. */
+/** Says which strategies the main one is ahead of and behind, and which it cannot be told apart from. */
 function apart({ lines, intervals }, main, quoted) {
   const others = lines.filter((line) => line !== main);
   const ahead = others.filter(({ adaptive_ahead: { interval } }) => interval[0] > ROUNDING);
@@ -126,13 +126,13 @@ function apart({ lines, intervals }, main, quoted) {
   return `The record shows ${quoted} ${parts.join(" and ")}${rest > 0 ? `; it cannot tell it from the other ${rest}` : ""} (${compared}).`;
 }
 
-/** What is said of them, and what each came to. */
+/** Shows the sentences and the results of each strategy. */
 function resultsOfOne(told) {
   const more = ` \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average. Nobody knew that share beforehand, so it is not ranked with the others.`;
   return results(told, conclusions(told), more);
 }
 
-/** One strategy beside the three that everybody knows; which one is chosen here. */
+/** Shows one strategy, chosen here, beside the three well-known ones. */
 function chosen(told) {
   const { lines } = told;
   const names = lines.map(({ name }, index) => [index, name]);
@@ -145,7 +145,7 @@ function chosen(told) {
   return section("One strategy through the years", strategy.element, holder);
 }
 
-/** It and those that everybody knows, each once. */
+/** Returns the strategy and the well-known ones, each once. */
 const beside = (told, line) => [line, ...told.known.filter((other) => other !== line)];
 
 function course(told, line) {
@@ -176,7 +176,7 @@ function course(told, line) {
   ];
 }
 
-/** The return a year over the years before, whenever one looks: no single start or end decides. */
+/** Shows the yearly return over a rolling window, so that no single start or end decides. */
 function overYears(told, line, placed, drawn) {
   const { periods_per_year, market } = told;
   const span = ROLLING.find((years) => line.wealth.length > 2 * years * periods_per_year);
@@ -198,7 +198,7 @@ function overYears(told, line, placed, drawn) {
   ];
 }
 
-/** The worst falls of a strategy, when they began and how long they lasted. */
+/** Lists the worst falls of a strategy: when they began and how long they lasted. */
 function falls(told, line) {
   const { times, unit, market } = told;
   const worst = worstFalls(belowHighest(line.wealth), FALLS);
@@ -216,7 +216,7 @@ function falls(told, line) {
   return [h("h3", {}, "Its worst falls"), table(`The worst falls of ${line.name}`, columns, worst)];
 }
 
-/** Returns by the year, beside the others', and by the month as a map. */
+/** Shows returns by year beside those of the other strategies, and by month as a map. */
 function years(told, line) {
   const { dates, periods_per_year } = told;
   const of = (one) => returnsOf(one.wealth);
@@ -239,10 +239,10 @@ function years(told, line) {
 }
 
 const MONTHS = Array.from({ length: 12 }, (_, month) => new Date(Date.UTC(2000, month)).toLocaleDateString("en-GB", { timeZone: "UTC", month: "short" }).slice(0, 3));
-/** The stylesheet has so many shades of gain and of loss. */
+/** Number of shades of gain and of loss in the stylesheet. */
 const SHADES = 4;
 
-/** Each year's parts as cells, darker where more was gained or lost; the figure stands in each. */
+/** Shows the parts of each year as cells with their returns: the darker, the larger the gain or loss. */
 function map({ dates, unit }, line, where, byYear, called) {
   const parts = [...new Set(where.map(({ part }) => part))].filter(Boolean).sort((one, other) => one - other);
   if (parts.length === 0) return [];
@@ -266,7 +266,7 @@ function map({ dates, unit }, line, where, byYear, called) {
   return [h("h3", {}, `${grain[0].toUpperCase()}${grain.slice(1)} by ${grain}`), drawn];
 }
 
-/** What else is known: sentences by the report's own names, estimates with their ranges, radii. */
+/** Shows the rest for the quant: the report's own sentences, estimates with their ranges, and radii. */
 function quant(told) {
   const { sentences, lines, choices, times } = told;
   const guarding = lines.filter(({ periods }) => periods.radius.some((radius) => radius > 0));
@@ -291,7 +291,7 @@ function quant(told) {
   return quantSection("Ranges, ratios and radii", build);
 }
 
-/** What every strategy did, a period a line. */
+/** Returns the CSV of all strategies, one period a line. */
 export function csv(report) {
   const { lines, dates } = tell(report);
   const head = ["Period", "Date", ...lines.flatMap(({ name }) => [`${name}: held, %`, `${name}: return, %`, `${name}: wealth`])];

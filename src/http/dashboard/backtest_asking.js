@@ -9,12 +9,12 @@ import { unitOf } from "./periods.js";
 import { returnsField } from "./returns_field.js";
 import { INVESTORS, investorChoices, investorNote, meant } from "./specification.js";
 
-/** The windows of several assets: periods, or all. */
+/** Reads the windows of several assets: numbers of periods, or "all". */
 const windowsOf = (text) => text.split(";").map((part) => (part.trim() === "all" ? null : typed(part.trim())));
-/** Confidence levels that are asked for unless others are, of several assets or of one. */
+/** Default confidence levels, for several assets and for one. */
 const LEVELS = { true: "90", false: "95; 90; 50" };
 const OWN = "own";
-/** Twenty years to be trained on first, and ten to live through. */
+/** Twenty years for the first training, and ten to backtest. */
 const EXAMPLE = { latest: 360 };
 
 export async function view() {

@@ -11,7 +11,7 @@ const KNOWN = ["equal_shares", "sixty_equal"];
 
 const sum = (numbers) => numbers.reduce((all, number) => all + number, 0);
 
-/** The strategies as the page of one asset has them; `market` is what they are held against, `known` who stands beside each. */
+/** Returns the strategies in the form of one asset. `market` is the benchmark, `known` are the strategies shown beside each. */
 export function ofAssets(report) {
   const { assets } = report;
   const lines = report.strategies.map((figures, index) => {
@@ -29,7 +29,7 @@ export function ofAssets(report) {
   return { lines, known, market: known[0], main: lines[0], held: "Share held in all assets" };
 }
 
-/** What was walked through, how, and for whom. */
+/** Describes the record, the method and the investor. */
 export function walkedAssets({ assets, choices, lines, unit, times }) {
   const { every, trading_cost, risk_aversion } = choices;
   const length = lines[0].wealth.length - 1;
@@ -43,10 +43,10 @@ export function walkedAssets({ assets, choices, lines, unit, times }) {
   );
 }
 
-/** The report's own sentences, and what each came to. */
+/** Shows the report's own sentences and the results of each strategy. */
 export const resultsOfAssets = (told) => results(told, told.sentences.map(minus));
 
-/** What a strategy held of each asset through time, and on average. */
+/** Shows what a strategy held of each asset through time, and on average. */
 export function heldOfAssets({ assets, times }, line) {
   const shares = line.periods.wealth.map((_, k) => Object.fromEntries(assets.map((name) => [name, line.periods.allocations[name][k]])));
   const number = (name, cell) => ({ name, numeric: true, cell });
@@ -56,7 +56,7 @@ export function heldOfAssets({ assets, times }, line) {
   ];
 }
 
-/** Estimates with their ranges. */
+/** Shows the estimates with their ranges. */
 export function quantOfAssets(told) {
   const { alpha, seed } = told.choices;
   const beside = { beyond_equal: "More than equal shares", beyond_own_mix: "Beyond equal shares at its own total" };

@@ -9,7 +9,7 @@ export const START = 100;
 
 export const estimate = ({ value, interval: [low, high] }) => ({ value, low, high });
 
-/** What is said, and every strategy by what a year of it is worth; `more` stands in the note below. */
+/** Shows the sentences, and all strategies by what a year of each is worth; `more` is added to the note below. */
 export function results({ lines, intervals, assets, unit }, sentences, more = "") {
   const rows = [...lines].sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
   const estimated = (format) => ({ value }) => format(value);
@@ -43,8 +43,8 @@ export function results({ lines, intervals, assets, unit }, sentences, more = ""
   );
 }
 
-/** Estimates with their ranges, by the report's own names; `names` are those of what each is measured against, by what the report
- * calls that, and `more` ends the note above. */
+/** Shows the estimates with their ranges under the report's own names. `names` maps the report's fields of differences to column titles;
+ * `more` ends the note above. */
 export function ranges({ lines, intervals }, names, more) {
   const hundredth = (value) => tick(value, 0.01);
   const columns = [

@@ -3,13 +3,14 @@
 import { input, select } from "./form.js";
 import { fraction, typed } from "./number_text.js";
 
-/** Behind a number: that it is for a year. */
+/** The ending of a number that is meant for a year. */
 const A_YEAR = /\s*(?:(?:a|per|\/)\s*(?:year|annum)|p\.?\s?a\.?)$/i;
 
 const short = (value) => String(Number(value.toPrecision(10)));
 
-/** `{parts, read(periods), show(rate, periods), named(unit)}`: `read` gives the rate of a period, as a fraction, null where nothing is
- * typed, undefined where it is for a year of which the periods are not known, and the text where it is no number. `changed()` at every edit. */
+/** Returns `{parts, read(periods), show(rate, periods), named(unit)}`. `read` gives the rate of a period as a fraction: null if the field is
+ * blank, undefined if the rate is for a year and the periods a year are unknown, and the text if it is not a number. `changed()` is called
+ * at every edit. */
 export function bankRate({ name, note, changed = () => {} }) {
   const rate = input({
     name,

@@ -3,12 +3,12 @@
 import { h, table } from "./dom.js";
 import { titled } from "./naming.js";
 
-/** What two things are called in a table and in charts: A is the first. */
+/** The names of the two things in a table and in charts: A is the first. */
 export const LETTERS = ["A", "B"];
 
 /**
- * `rows`: `{name, cells: [of A, of B], apart}`; `apart` is the difference in words, where it is more than that they differ.
- * `kind` is where the two are, `names` what they are called, empty where nothing.
+ * Returns the table. `rows` are `{name, cells: [of A, of B], apart}`; `apart` is the difference in words, if there is more to say than that
+ * they differ. `kind` is the path of the two in the address, `names` are their names, empty if they have none.
  */
 export function beside(caption, kind, noun, ids, names, rows) {
   const link = (index) => [`${LETTERS[index]}: `, h("a", { href: `#/${kind}/${ids[index]}` }, titled(noun, ids[index], names[index]))];

@@ -4,7 +4,7 @@
 import { counted, count } from "./format.js";
 import { daysLate, isoDay } from "./periods.js";
 
-/** `{next, late}` of a session: when its next report is due, and by how many days that is overdue. */
+/** Returns `{next, late}` of a session: when its next report is due, and by how many days it is overdue. */
 export const care = ({ next, care }) => ({
   next,
   late: care.includes("overdue") ? Math.max(1, daysLate(next, isoDay(new Date()))) : 0,
@@ -17,7 +17,7 @@ const REASONS = {
   ending: ["is completed or in its last period", "are completed or in their last period"],
 };
 
-/** How many of the sessions need care, and why, in a sentence. */
+/** Says how many sessions need care, and why. */
 export function careWords({ sessions, any, ...reasons }) {
   if (any === 0) return `None of ${counted(sessions, "session")} needs care.`;
   const parts = Object.entries(REASONS).filter(([reason]) => reasons[reason] > 0);

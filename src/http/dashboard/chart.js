@@ -3,7 +3,7 @@
 import { disclosure, h, s, table } from "./dom.js";
 import { pictureButtons } from "./picture.js";
 
-/** Round numbers that span `[low, high]` with about `wanted` steps; at least one. */
+/** Returns round numbers that span `[low, high]` in about `wanted` steps; at least one. */
 export function ticks(low, high, wanted) {
   const rough = (high - low) / Math.max(1, wanted);
   if (!(rough > 0)) return [low];
@@ -14,12 +14,12 @@ export function ticks(low, high, wanted) {
   return values.length > 0 ? values : ticks(low, high, 2 * Math.max(1, wanted));
 }
 
-/** Digits of the only place of an axis that is no round number. */
+/** Digits of the label if an axis has only one tick, which need not be round. */
 const DIGITS = 3;
-/** No more digits tell the places of an axis apart. */
+/** Most digits that tell the ticks of an axis apart. */
 const MOST_DIGITS = 12;
 
-/** The power of ten of which all `places` of an axis are multiples: what their labels tell apart, from each other and from 0. */
+/** Returns the power of ten of which all `places` of an axis are multiples, so that labels differ from each other and from 0. */
 export function grain(places) {
   const top = Math.floor(Math.log10(Math.max(...places.map(Math.abs))) + 1e-9);
   if (!Number.isFinite(top)) return 1;
@@ -30,7 +30,7 @@ export function grain(places) {
   return 10 ** power;
 }
 
-/** Round numbers that span `[low, high]`, both above 0, where equal ratios take equal room. */
+/** Returns round numbers that span `[low, high]`, both above 0, on a logarithmic axis. */
 function logTicks(low, high) {
   const decades = Array.from({ length: Math.ceil(Math.log10(high)) - Math.floor(Math.log10(low)) + 1 }, (_, k) => 10 ** (Math.floor(Math.log10(low)) + k));
   const within = (factors) => decades.flatMap((decade) => factors.map((factor) => factor * decade)).filter((value) => value >= low && value <= high);
@@ -39,7 +39,7 @@ function logTicks(low, high) {
   return some.length >= 3 ? some : ticks(low, high, 4);
 }
 
-/** The map from `[low, high]` onto `[from, to]`. */
+/** Returns the linear map from `[low, high]` onto `[from, to]`. */
 export function scale([low, high], [from, to]) {
   const slope = high > low ? (to - from) / (high - low) : 0;
   const map = (value) => from + slope * (value - low);
@@ -47,10 +47,10 @@ export function scale([low, high], [from, to]) {
   return map;
 }
 
-/** Numbers that differ by less of their size differ by rounding: drawn apart, they would have labels of twelve digits. */
+/** A smaller relative difference is rounding: drawn apart, such numbers would have labels of twelve digits. */
 const ROUNDING = 1e-9;
 
-/** The range of finite `values`, widened by a twentieth and to hold `also`. */
+/** Returns the range of the finite `values`, widened by a twentieth and to include `also`. */
 export function extent(values, also = []) {
   const finite = [...values, ...also].filter(Number.isFinite);
   if (finite.length === 0) return [0, 1];
@@ -62,14 +62,14 @@ export function extent(values, also = []) {
   return [also.includes(low) ? low : low - room, also.includes(high) ? high : high + room];
 }
 
-/** No drawing is narrower, in pixels. */
+/** The least width of a drawing, in pixels. */
 const LEAST_WIDTH = 180;
 
-/** An element whose drawing follows its width: `draw(width)` gives the SVG's children; its `height` may follow it too. */
+/** Returns an element whose drawing follows its width: `draw(width)` gives the SVG's children; `height` may be a function of the width. */
 export function plot(height, draw) {
   const tall = (width) => (typeof height === "function" ? height(width) : height);
   const holder = h("div", { class: "plot" });
-  // Its room is kept before it is drawn, so that nothing below it moves.
+  // Reserves the height before the drawing, so that nothing below moves.
   holder.style.minHeight = `${tall(Infinity)}px`;
   const drawn = (width) => {
     const picture = s(
@@ -84,7 +84,7 @@ export function plot(height, draw) {
   return holder;
 }
 
-/** A page of A4 between the margins of print.css, in pixels: drawings as wide keep the size of their letters on paper. */
+/** The width of an A4 page between the margins of print.css, in pixels: drawings of this width keep their letter size on paper. */
 const PAPER_WIDTH = 672;
 
 const redrawAll = (width) => document.querySelectorAll(".plot").forEach((holder) => holder.redraw(width));
@@ -92,8 +92,8 @@ globalThis.addEventListener?.("beforeprint", () => redrawAll(PAPER_WIDTH));
 globalThis.addEventListener?.("afterprint", () => redrawAll());
 
 /**
- * Lets a reader walk along `count` positions of a plot by pointer or arrow keys.
- * `at(x)` is the position under a pixel; `read(position)` marks it and says what stands there.
+ * Lets a reader move along `count` positions of a plot by pointer or arrow keys.
+ * `at(x)` is the position under a pixel; `read(position)` marks it and returns its text.
  */
 export function walkable(holder, { label, count, start, at, read }) {
   const go = (position) => {
@@ -133,7 +133,7 @@ export function walkable(holder, { label, count, start, at, read }) {
 /** Half the width of a letter of a label, in pixels. */
 const LETTER_HALF = 3.4;
 
-/** Horizontal rules with their values, and the labels below. */
+/** Draws horizontal rules with their values, and the labels below. */
 export function axes({ x, y, xTicks, yTicks, xFormat, yFormat, left, right, bottom }) {
   const [across, up] = [grain(xTicks), grain(yTicks)];
   return [
@@ -166,7 +166,7 @@ export const block = (index, shape = "bar") =>
     s("rect", { class: `${shape} s${index}`, width: 12, height: 12 }),
   );
 
-/** Title, what is read off, the plot, and the same as a table. */
+/** Returns a figure: its title, its legend with the values read, the plot, and the same data as a table. */
 export function figure({ title, legend, holder, rows, note }) {
   const element = h(
     "figure",
@@ -182,10 +182,13 @@ export function figure({ title, legend, holder, rows, note }) {
 }
 
 /**
- * Lines over common positions.
- * x: `{values, domain, label, here, format, tick, whole, between, log}`, `between` where x names the unit before it and `here` what stands beside a value read, where that is not label and format; y: `{format, tick, also, log}`, `log` where equal ratios take equal room;
- * series: `[{name, values, band, kind: "line" | "bars" | "levels", bare, joined, apart, colour}]`, null where there is nothing. Bars and levels span
- * the unit before their x; a bare line has no dots, one that is `joined` passes over what is missing, and one `apart` is dots alone; `band` holds a low and a high end for each value; `colour` is the series' place unless said. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
+ * Draws lines over common positions.
+ * x: `{values, domain, label, here, format, tick, whole, between, log}`. `between` means that x names the unit before it; `here` gives the
+ * text of a position, if it is not label and format. y: `{format, tick, also, log}`; `log` means a logarithmic axis.
+ * series: `[{name, values, band, kind: "line" | "bars" | "levels", bare, joined, apart, colour}]`; a missing value is null. Bars and levels
+ * span the unit before their x. A `bare` line has no dots, a `joined` line skips missing values, and an `apart` series is dots alone. `band`
+ * holds a low and a high end for each value. `colour` defaults to the index of the series. The first position read is `start`, or the last
+ * value of the first series. `gutter` aligns charts that stand above each other.
  */
 export function lineChart({ title, x, y, series: given, height = 190, note, start: first, gutter = 0 }) {
   const series = given.map((one, index) => ({ colour: index, ...one }));
@@ -260,7 +263,7 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     const index = shown[at];
     here.textContent = x.here ? x.here(x.values[index]) : `${x.label} ${x.format(x.values[index])}`;
     const words = series.map((one) => said(one, index));
-    // Dots stand where others do not: what is not here goes unsaid beside its name.
+    // Series of dots have values at few positions: a missing one is left blank beside its name.
     series.forEach(({ apart, values }, k) => (outputs[k].textContent = apart && !Number.isFinite(values[index]) ? "" : words[k]));
     mark();
     return `${here.textContent}: ${series.map(({ name }, k) => `${name} ${words[k]}`).join(", ")}`;
@@ -320,7 +323,7 @@ function drawn({ values, band, kind, bare, joined, apart, colour }, positions, {
   ];
 }
 
-/** A staircase over positions that end a unit each, closed along `bottom` where that is given. */
+/** Returns the path of a staircase over positions that each end a unit, closed along `bottom` if it is given. */
 function steps(seen, wide, bottom) {
   if (seen.length === 0) return "";
   const stairs = seen.map(([right, top]) => `V${top.toFixed(1)}H${right.toFixed(1)}`).join("");

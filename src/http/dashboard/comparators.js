@@ -4,10 +4,10 @@
 import { addedIn, rateIn, termsOf } from "./flows.js";
 import { belowHighest } from "./track.js";
 
-/** What is held beside the bank, in words. */
+/** Returns the name of what is held besides the bank. */
 export const risky = ({ assets }) => (assets ? "the assets" : "stocks");
 
-/** What the periods observed brought, each as it stands: the growth of the asset, the bank's rate, the money added. */
+/** Returns the growth of the asset, the bank's rate and the money added in each observed period, with corrections applied. */
 const lived = (history) =>
   history.observations.map((row, index) => ({
     growth: Math.exp((row.now ?? row).log_return ?? 0),
@@ -16,7 +16,7 @@ const lived = (history) =>
     added: addedIn(history, index + 1),
   }));
 
-/** Wealth at the start and after each observed period of who brings the risky asset to `share` of it in each. */
+/** Returns wealth at the start and after each observed period, if the risky asset is rebalanced to `share` in each. */
 export function mixed(history, share) {
   let [wealth, holding] = [history.initial_wealth, history.initial_holding];
   return [
@@ -26,21 +26,21 @@ export function mixed(history, share) {
       const grown = (1 - share) * (1 + rate) + share * growth;
       const before = invested * grown;
       wealth = before + added;
-      // What is added comes to the bank.
+      // Money added goes to the bank.
       holding = wealth > 0 ? (invested * share * growth) / wealth : share;
       return wealth;
     }),
   ];
 }
 
-/** Wealth at the start and after each observed period of the session itself, as it stands. */
+/** Returns the session's own wealth at the start and after each observed period, with corrections applied. */
 export const wealths = (history) => [history.initial_wealth, ...history.observations.map((row) => (row.now ?? row).wealth)];
 
-/** What 100 at the start has become after each period, with money that comes and goes taken out: the time-weighted return. */
+/** Returns what 100 at the start has become after each period, without money added or withdrawn: the time-weighted return. */
 export function grown(history, wealth = wealths(history)) {
   let level = 100;
   return wealth.map((value, index) => (index === 0 ? level : (level *= (value - addedIn(history, index)) / wealth[index - 1])));
 }
 
-/** How far wealth lies below its highest so far, 0 or less, with money that comes and goes taken out. */
+/** Returns how far wealth lies below its highest so far, 0 or less, without money added or withdrawn. */
 export const falls = (history, wealth = wealths(history)) => belowHighest(grown(history, wealth));

@@ -10,9 +10,9 @@ import { unitOf } from "./periods.js";
 import { caution, centreInWords, FRAMEWORKS, moments, utility } from "./specification.js";
 import { surfaceCurve } from "./surface_view.js";
 
-/** Places at which the two are read. */
+/** Number of points at which the two are evaluated. */
 const ALONG = 61;
-/** Standard deviations of a mean, to either side of it, over which the two are shown. */
+/** Standard errors of the mean, on either side of it, over which the two are shown. */
 const ASIDE = 2.5;
 
 export async function policiesBeside(ids, leaving) {
@@ -22,7 +22,7 @@ export async function policiesBeside(ids, leaving) {
   return [h("p", { class: "lead" }, differences(asked, "They")), table, curves(ids, both, leaving)];
 }
 
-/** What differs, in a sentence: nothing is said to be the same that is not, also where no row tells it. */
+/** Says what differs. It never calls equal what differs, even if no row shows the difference. */
 export function differences([one, other], subject) {
   const all = rows([one, other]);
   const apart = all.filter(({ cells: [left, right] }) => left !== right).map(({ name }) => name.toLowerCase());
@@ -35,7 +35,7 @@ export function differences([one, other], subject) {
   return `${subject} differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
 }
 
-/** The row that tells a field of the problem. */
+/** The row that shows each field of the problem. */
 const ROW_OF = {
   framework: "kind",
   utility: "investor",
@@ -58,7 +58,7 @@ const ROW_OF = {
   seed: "precision",
 };
 
-/** How the total is spread over the assets. */
+/** How the total is split between the assets. */
 const MIXES = { one_step: "Best against the worst market", equal: "Equal shares", inverse_volatility: "By inverse volatility" };
 const mix = (composition) => MIXES[composition] ?? composition.given.map((share) => percent(share, 0)).join(", ");
 const moves = (support) => {
@@ -71,7 +71,7 @@ const moves = (support) => {
 };
 const NORMS = { scaled_one: "Each asset by its own volatility", sup: "All assets at once" };
 
-/** What two policies were asked, `{problem, fund, design, seed}` each, row by row. */
+/** Returns the rows that compare two specifications, `{problem, fund, design, seed}` each. */
 export function rows(asked) {
   const problems = asked.map(({ problem }) => problem);
   const row = (name, read, apart) => {
@@ -109,7 +109,7 @@ export function rows(asked) {
   ];
 }
 
-/** What each holds near the start against the average return of the record. */
+/** Draws what each holds near the start, by the average return of the record. */
 function curves(ids, both, leaving) {
   const holder = h("div", {}, h("p", { class: "note" }, "Reading the two policies\u2026"));
   const known = both.map(({ specification: { problem } }) => ({ ...moments(problem.history), n: problem.history.length }));

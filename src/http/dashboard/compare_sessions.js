@@ -35,11 +35,11 @@ async function read(id, leaving) {
   return { session, history, policy, problem, action, calendar: calendar(history, problem.periods_per_year), grown: grown(history) };
 }
 
-/** What the two hold beside the bank, in words. */
+/** Returns the name of what the two hold besides the bank. */
 const besideBank = (both) => risky(both.find(({ history }) => history.assets)?.history ?? both[0].history);
 
-/** The periods of both on one line, by their dates where both have such of one unit, else by their numbers: `{isDated, places, of(one)}`, each
- * place `{name, brief}`, and `of` the period of a session at each place, null where it has none. */
+/** Puts the periods of both on one line: by date if both have dates of one unit, otherwise by number. Returns `{isDated, places, of(one)}`:
+ * each place is `{name, brief}`, and `of` gives the period of a session at each place, null if it has none. */
 export function lined(both) {
   const isDated = both.every(({ calendar, grown }) => calendar.dated && grown.every((_, k) => calendar.date(k) !== null)) && new Set(both.map(({ calendar }) => calendar.unit)).size === 1;
   const nameOf = ({ calendar }, k) => (isDated ? calendar.name(k) : k === 0 ? "Start" : `Period ${k}`);
@@ -57,14 +57,14 @@ export function lined(both) {
   return { isDated, places, of };
 }
 
-/** The first and the last place at which both are, or null where they have fewer than two in common. */
+/** Returns the first and the last place that both have, or null if they share fewer than two. */
 export function common(both, { of, places }) {
   const periods = both.map(of);
   const shared = places.map((_, at) => at).filter((at) => periods.every((one) => one[at] !== null));
   return shared.length < 2 ? null : [shared[0], shared.at(-1)];
 }
 
-/** What 100 at a place has become at each. */
+/** Returns what 100 at the place `from` has become at each place. */
 function levels(one, line, from) {
   const periods = line.of(one);
   const start = one.grown[periods[from] ?? 0];
@@ -83,7 +83,7 @@ function sentence(both, line, span) {
   return `${when} 100 in A has become ${wealth(first)}, and in B ${wealth(second)}.${held}`;
 }
 
-/** Rows of the policies that are told also where they do not differ. */
+/** Rows of the policies that are shown even if they do not differ. */
 const ALWAYS = ["Investor", "Caution"];
 
 function rows(both, line, span) {
@@ -97,7 +97,7 @@ function rows(both, line, span) {
   const trade = ({ action, session, problem }) => orders(action, session.wealth, problem.trading_cost).join(", ").toLowerCase();
   const deepest = ({ history }) => worstFalls(falls(history), 1)[0]?.depth ?? 0;
   const active = (read) => (one) => (one.action ? read(one) : null);
-  // Of the money of two nobody asks the difference.
+  // Differences of the two amounts of money mean nothing, so they are not shown.
   const since = span && (line.isDated ? ` since the end of ${line.places[span[0]].name}` : " since the start");
   const last = ({ calendar, session }) => (session.period === 1 ? "none yet" : calendar.name(session.period - 1));
   return [
@@ -116,7 +116,7 @@ function rows(both, line, span) {
   ];
 }
 
-/** Growth and holdings on one line of time, what 100 has become from where both are on. */
+/** Draws growth and holdings on one time line; growth starts from 100 at the first common place. */
 function courses(both, line, span) {
   const { places } = line;
   if (places.length < 2) return "";

@@ -9,7 +9,7 @@ import { severalFields } from "./several_fields.js";
 
 const CHANGES = { replace: "The report is wrong", insert: "A period before it was skipped", remove: "The period should be removed" };
 
-/** The form for a session with observed periods. */
+/** Returns the form for a session with observed periods. */
 export function correctionForm({ id, session, history, policy, calendar, refresh }) {
   const within = "correction-";
   const periods = history.observations.map(({ period }) => [period, calendar.name(period)]);

@@ -9,19 +9,19 @@ import { isCautious } from "./specification.js";
 import { colourOf } from "./strategies.js";
 import { worstFalls } from "./track.js";
 
-/** What the session is measured by, each held through the same returns; 60/40 as people call it. */
+/** The comparators of a session, each held through the same returns. */
 export const besides = (history) => [
   { name: "All in the bank", share: 0, colour: colourOf("all_bank") },
   { name: "60/40", share: 0.6, colour: colourOf("sixty_forty") },
   { name: `All in ${risky(history)}`, share: 1, colour: colourOf("all_stock") },
 ];
-/** Charts above each other start at one line. */
+/** The common left margin of charts above each other, in pixels. */
 const GUTTER = 64;
 
-/** Less than this makes no chart of its own height. */
+/** A chart's axis spans at least this much. */
 export const [LEAST_FALL, LEAST_SHARE] = [0.01, 0.1];
 
-/** Positions of the periods from the start to the horizon, with their names. */
+/** Returns the positions of the periods from the start to the horizon, with their names. */
 function periodsOf({ session, history, calendar }) {
   const lived = history.observations.length;
   const horizon = session.rolling ? Math.max(12, lived + 1) : Math.max(session.horizon, lived);
@@ -30,7 +30,7 @@ function periodsOf({ session, history, calendar }) {
   return { horizon, values, x };
 }
 
-/** Wealth and falls: what a client is shown. */
+/** Draws wealth and falls, the part that a client is shown. */
 export function wealthCourse(shown) {
   const { history } = shown;
   const { horizon, values, x } = periodsOf(shown);
@@ -62,13 +62,13 @@ export function wealthCourse(shown) {
   return section("So far", own.length > 1 ? h("p", { class: "sentence" }, comparison(shown, own)) : "", ...charts);
 }
 
-/** The session's wealth beside the others', a sentence. */
+/** Compares the session's wealth with the comparators, in a sentence. */
 function comparison({ history }, own) {
   const worth = (share) => wealth(mixed(history, share).at(-1));
   return `It is worth ${wealth(own.at(-1))} now. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in ${risky(history)}.`;
 }
 
-/** The worst fall as a fact: `[name, value, note]`. */
+/** Returns the worst fall as a fact: `[name, value, note]`. */
 export function worstFallFact({ history, calendar }) {
   const [worst] = worstFalls(falls(history), 1);
   if (!worst) return ["Worst fall so far", "None", "never below its highest"];
@@ -76,7 +76,7 @@ export function worstFallFact({ history, calendar }) {
   return ["Worst fall so far", percent(worst.depth), `${from} to ${calendar.inText(worst.to)}`];
 }
 
-/** What was held, and the caution, through time. */
+/** Draws what was held, and the caution, through time. */
 export function holdings(shown, action) {
   const { history, policy, calendar, session } = shown;
   const { values, x } = periodsOf(shown);

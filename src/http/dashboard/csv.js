@@ -1,23 +1,23 @@
 // Writes rows as a file for spreadsheets, with plain numbers and shares in percent; reads the rows of such a file.
 
-/** A share in percent, as it is written into a file. */
+/** Returns a share in percent, as it is written into a file. */
 export const hundred = (share) => (share === null || share === undefined ? null : 100 * share);
 
-/** The text of a file; what is null is left blank. */
+/** Returns the text of a file; null is left blank. */
 export const csvText = (rows) => `${rows.map((row) => row.map(cell).join(",")).join("\r\n")}\r\n`;
 
 function cell(value) {
   if (value === null || value === undefined) return "";
-  // Beyond twelve digits are those of binary fractions.
+  // Digits after the twelfth come from binary fractions.
   const text = typeof value === "number" ? String(Number(value.toPrecision(12))) : inert(value);
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/** A text that no spreadsheet takes for a formula to run: an apostrophe before what would begin one. */
+/** Returns a text that no spreadsheet runs as a formula: puts an apostrophe before a start that could be one. */
 const inert = (text) => (/^[=+\-@\t\r]/.test(text) ? `'${text}` : text);
 
-/** The cells of a text in which `mark` stands between them, and the lines where its rows begin, from 1: `[{line, text, cells}]`. What
- * stands in quotes is one cell, a quote in it doubled; blank rows are passed over. */
+/** Returns the rows of a text whose cells are separated by `mark`, with the lines where they begin, from 1: `[{line, text, cells}]`. A quoted
+ * text is one cell, with its quotes doubled; blank rows are skipped. */
 export function csvRows(text, mark) {
   const rows = [];
   let [cells, cell, line, first, from, quoted] = [[], "", 1, 1, 0, false];

@@ -25,8 +25,8 @@ function filled(element, attributes, children) {
   return element;
 }
 
-/** A table: `columns` are `{name, cell(row), numeric, sorted}`, the last "ascending" or "descending" where rows are in its order. The
- * first column heads its row. */
+/** Returns a table. `columns` are `{name, cell(row), numeric, sorted}`; `sorted` is "ascending" or "descending" if the rows are in that
+ * order. The first column heads its row. */
 export function table(caption, columns, rows) {
   const cell = (row, column, index) =>
     h(
@@ -65,17 +65,17 @@ export function table(caption, columns, rows) {
   );
 }
 
-/** Content that a reader opens; built when first opened. */
+/** Returns content that a reader opens; it is built when first opened. */
 export function disclosure(summary, build) {
   const details = h("details", {}, h("summary", {}, summary));
   const fill = () => details.children.length === 1 && details.append(build());
   details.addEventListener("toggle", fill);
-  // The event of opening comes later than whoever opens it by script goes on.
+  // A script that opens it continues before the toggle event arrives.
   details.addEventListener("reveal", fill);
   return details;
 }
 
-/** Opens a disclosure, builds what is in it at once, and moves to its first field. */
+/** Opens a disclosure, builds its content at once, and moves to its first field. */
 export function reveal(details) {
   details.dispatchEvent(new Event("reveal"));
   details.open = true;
@@ -83,27 +83,27 @@ export function reveal(details) {
   details.querySelector("input, select, textarea")?.focus();
 }
 
-/** Figures that matter, each with its name: `[name, value, note]`. */
+/** Returns a list of key figures: `[name, value, note]`. */
 export function facts(entries) {
   const fact = ([name, value, note]) =>
     h("div", {}, h("dt", {}, name), h("dd", {}, value), note ? h("dd", { class: "note" }, note) : null);
   return h("dl", { class: "facts" }, entries.filter(Boolean).map(fact));
 }
 
-/** A titled part of a page. */
+/** Returns a titled part of a page. */
 export function section(title, ...children) {
   const heading = h("h2", { id: `h-${title.toLowerCase().replace(/[^a-z0-9]+/g, "-")}` }, title);
   return h("section", { "aria-labelledby": heading.id }, heading, children);
 }
 
-/** What the quant opens, at the end of a page; it is not printed. */
+/** Returns the section for the quant at the end of a page; it is not printed. */
 export function quantSection(summary, build) {
   const element = section("For the quant", disclosure(summary, build));
   element.classList.add("asked-for");
   return element;
 }
 
-/** Says something to readers of screens without moving them. */
+/** Announces a text to screen readers without moving the focus. */
 export function announce(text) {
   document.getElementById("status").textContent = text;
 }

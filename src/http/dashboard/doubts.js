@@ -8,7 +8,7 @@ import { day } from "./periods.js";
 
 export const UNCONFIRMED = "/problems/unconfirmed";
 
-/** Every doubt of a problem, a sentence each. */
+/** Returns a sentence for every doubt of a problem. */
 export const doubtWords = ({ doubts }) => doubts.map(inWords);
 
 function inWords({ reason, field, value, sentence, missing = [] }) {
@@ -18,10 +18,10 @@ function inWords({ reason, field, value, sentence, missing = [] }) {
   return asset === field ? `${sentence[0].toUpperCase()}${sentence.slice(1)}.` : `${asset}: ${sentence}.`;
 }
 
-/** The last days of the periods that are missing before a report. */
+/** Returns the last days of the periods that are missing before a report. */
 export const missingDays = ({ doubts }) => doubts.flatMap(({ missing = [] }) => missing);
 
-/** The question. `meant()` sends the report as it is; `filled(days)`, where it is offered, reports the missing periods as missing first. */
+/** Returns the question. `meant()` sends the report as it is; `filled(days)`, if given, first reports the missing periods as missing. */
 export function question(problem, { meant, filled }) {
   const days = filled ? missingDays(problem) : [];
   const button = (words, act) => h("button", { type: "button", onclick: ({ target }) => pressed(target, act) }, words);

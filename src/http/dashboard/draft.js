@@ -2,7 +2,7 @@
 
 import { h } from "./dom.js";
 
-/** `{read(), keep(content), drop(), note(again)}` of the form at `place`. */
+/** Returns `{read(), keep(content), drop(), note(again)}` for the form at `place`. */
 export function draft(place) {
   const key = `ballast-draft ${place}`;
   const drop = () => sessionStorage.removeItem(key);
@@ -17,11 +17,11 @@ export function draft(place) {
     try {
       sessionStorage.setItem(key, JSON.stringify(content));
     } catch {
-      // More than the browser keeps, which is millions of letters: the form goes on without.
+      // The browser stores at most some millions of letters: the form works without the draft.
       drop();
     }
   };
-  /** That what stands here was typed before; `again()` shows the form as it is without. */
+  /** Says that the content was typed before; `again()` shows the form without it. */
   const note = (again) =>
     h("p", { class: "note", role: "status" }, "This is what you typed here before. ", h("button", { type: "button", class: "link", onclick: () => (drop(), again()) }, "Start again"));
   return { read, keep, drop, note };

@@ -14,7 +14,7 @@ import { changing, interval, ordinal } from "./verdict.js";
 /** Histograms shown at once. */
 const SHOWN = 4;
 
-/** `policyLink(id)` is how a policy is named. */
+/** Draws the report. `policyLink(id)` returns a link to a policy. */
 export function body(report, policyLink) {
   const ended = outcomes(report);
   return [compared(report, policyLink), results(report, ended), spreads(report, ended), courses(report), quant(report, ended)];
@@ -24,14 +24,14 @@ const named = ({ strategy }) => strategy;
 
 const coloured = ({ framework, constant_mix }) => (framework ? colourOf(framework) : colourOfMix(constant_mix));
 
-/** What was put in over the periods, with the start. */
+/** Returns the money put in over all periods, including the start. */
 function putIn({ initial_wealth, contributions, horizon }) {
   const all = Array.isArray(contributions) ? contributions.reduce((sum, amount) => sum + amount, 0) : contributions * horizon;
   return initial_wealth + all;
 }
 
-/** Every strategy with its name, its colour and how its wealth spreads, what it is worth the most first: `shares` of the bins of
- * wealth, and what ends as all in the bank does. */
+/** Returns every strategy with its name, its colour and the spread of its wealth, sorted by worth. `shares` are those of the bins of wealth,
+ * and `banked` is the share of paths that end as all in the bank does. */
 export function outcomes({ strategies }) {
   const spread = ({ wealth: { histogram, at_bank } }) => {
     const total = histogram.reduce((sum, count) => sum + count, at_bank);
@@ -42,7 +42,7 @@ export function outcomes({ strategies }) {
     .sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
 }
 
-/** What was compared, on what, for whom. */
+/** Describes the strategies, the futures and the investor. */
 function compared({ request, histories, strategies }, policyLink) {
   const { problem } = request;
   const unit = unitOf(problem.periods_per_year);
@@ -73,10 +73,10 @@ const drawnFrom = (law) => LAWS[law?.kind] ?? "the market in the request";
 /** Tells whether futures are drawn from the very record that the policies know. */
 const isTrue = ({ histories, problem: { law } }) => histories.kind !== "drawn" && law?.kind === "bootstrap";
 
-/** A name within a sentence. */
+/** Returns a name within a sentence. */
 const called = ({ framework, name }) => (framework ? `\u201c${name}\u201d` : name);
 
-/** What the figures say. */
+/** Returns the sentences that state the results. */
 function conclusions({ reference, request }, ended) {
   const [best] = ended;
   const bank = ended.find(({ constant_mix }) => constant_mix === 0);
@@ -132,15 +132,15 @@ function results(report, ended) {
   );
 }
 
-/** Those drawn at first: the reference, what is worth the most, all in stocks, and the next kinds of policy. */
+/** Returns the strategies drawn first: the reference, the best, all in stocks, and the next kinds of policy. */
 function foremost(ended, reference) {
   const wanted = [ended.find(({ strategy }) => strategy === reference), ended[0], ended.find(({ constant_mix }) => constant_mix === 1)];
   const rest = [...ended].sort((one, other) => Number(Boolean(other.framework)) - Number(Boolean(one.framework)));
   return [...new Set([...wanted, ...rest].filter(Boolean))].slice(0, SHOWN);
 }
 
-/** A histogram a strategy, in the bins that wealth was counted in, all on one scale; what ends as the bank does is a bar of its own,
- * and where every path does there is nothing to draw. */
+/** Draws a histogram for each strategy, all on one scale. Paths that end as the bank does have a bar of their own; if all paths do, there is
+ * nothing to draw. */
 function spreads({ request, reference, wealth_edges: edges, floor }, ended) {
   const spread = ended.filter((one) => one.banked < 1);
   if (spread.length === 0) return "";
@@ -162,7 +162,7 @@ function spreads({ request, reference, wealth_edges: edges, floor }, ended) {
   );
 }
 
-/** What was held through time, where a policy decides. */
+/** Draws what the policies held through time. */
 function courses({ strategies, request }) {
   const deciding = strategies.filter(({ periods }) => periods);
   if (deciding.length === 0) return "";
@@ -175,7 +175,7 @@ function courses({ strategies, request }) {
   );
 }
 
-/** Utility, differences, radii and coverage, and what it took. */
+/** Shows utility, differences, radii, coverage and run times. */
 function quant(report, ended) {
   const { request, reference, sentences, costs, histories } = report;
   const referred = ended.find(({ strategy }) => strategy === reference)?.name.toLowerCase() ?? "the reference";

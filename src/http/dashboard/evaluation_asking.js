@@ -78,7 +78,7 @@ function asking(policies, asked) {
   return form;
 }
 
-/** The request for a policy's problem. With drawn histories every learning policy must be one for any history. */
+/** Returns the request for a policy's problem. With drawn histories every learning policy must be trained for any history. */
 function composed({ problem, design, surrogate, seed }, policy, choices) {
   const { framework, ...rest } = problem;
   const serves = choices.histories.kind === "given" || design.initial_laws === "resampled";

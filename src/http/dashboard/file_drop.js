@@ -2,7 +2,7 @@
 
 import { h } from "./dom.js";
 
-/** The text of a file: UTF-16 if its first bytes say so, else UTF-8, else Windows-1252, which spreadsheets in Europe save. */
+/** Returns the text of a file: UTF-16 if its first bytes say so, else UTF-8, else Windows-1252, which spreadsheets in Europe save. */
 async function content(file) {
   const bytes = await file.arrayBuffer();
   const [first, second] = new Uint8Array(bytes);
@@ -14,7 +14,7 @@ async function content(file) {
   }
 }
 
-/** Where a file is chosen or dropped; `open(text)` takes what is in it. `id` is that of the field which shows the text. */
+/** Returns the zone where a file is chosen or dropped; `open(text)` takes its text. `id` is that of the field that shows the text. */
 export function fileDrop(id, open) {
   const file = h("input", {
     type: "file",
@@ -25,7 +25,7 @@ export function fileDrop(id, open) {
   const opened = async (chosen) => chosen && open(await content(chosen));
   file.addEventListener("change", async () => {
     await opened(file.files[0]);
-    // The same file may be chosen again once it was changed.
+    // Allows the same file to be chosen again after a change.
     file.value = "";
   });
   const chosen = h("label", { class: "button quiet", for: file.id }, "Choose a CSV file");

@@ -3,31 +3,31 @@
 
 import { wealth } from "./format.js";
 
-/** What is added at the end of `period`, counted from 1; negative where it is withdrawn. */
+/** Returns the money added at the end of `period`, counted from 1; negative if it is withdrawn. */
 const added = ({ contributions }, period) =>
   Array.isArray(contributions) ? contributions[period - 1] : contributions;
 
-/** The terms of a period of a session, and the first period by them. */
+/** Returns the terms of a session's period, and the first period under them. */
 export const termsOf = ({ terms, renewals }, period) =>
   renewals.findLast((renewal) => renewal.period <= period) ?? { terms, period: 1 };
 
-/** True where nothing is ever added or withdrawn. */
+/** Tells whether nothing is ever added or withdrawn. */
 const none = ({ contributions }) => [contributions].flat().every((amount) => amount === 0);
 
-/** The report of an observed period as it stands. */
+/** Returns the report of an observed period, with corrections applied. */
 export const standing = (observation) => observation?.now?.reported ?? observation?.reported ?? {};
 
-/** What was added at the end of a period as it is reported, and what would be of one that is not. */
+/** Returns the money added at the end of a period: as reported, otherwise by the policy. */
 export function addedIn(history, period) {
   const { terms, period: first } = termsOf(history, period);
   return standing(history.observations[period - 1]).flow ?? added(terms, period - first + 1);
 }
 
-/** What the bank paid in a period as it is reported, and what the policy says of one that is not. */
+/** Returns the bank's rate of a period: as reported, otherwise the policy's. */
 export const rateIn = (history, period) => standing(history.observations[period - 1]).rate ?? termsOf(history, period).terms.rate_per_step;
 
-/** Wealth of selling everything at the start and staying in the bank, after each period up to `horizon`; of those observed as
- * they were reported. */
+/** Returns wealth after each period up to `horizon`, if everything is sold at the start and stays in the bank. Observed periods count as
+ * reported. */
 export function banked(history, horizon) {
   const held = [history.initial_wealth * (1 - history.terms.trading_cost * history.initial_holding)];
   for (let period = 1; period <= horizon; period++) {
@@ -36,7 +36,7 @@ export function banked(history, horizon) {
   return held;
 }
 
-/** `{toCome, reserve}` after `step` periods: what later contributions are worth now, and what must stay in the bank for them. */
+/** Returns `{toCome, reserve}` after `step` periods: the present value of later contributions, and what must stay in the bank for withdrawals. */
 export function flowsAfter(problem, step) {
   const bank = 1 + problem.rate_per_step;
   let [toCome, reserve] = [0, 0];
@@ -47,13 +47,13 @@ export function flowsAfter(problem, step) {
   return { toCome, reserve };
 }
 
-/** What happens at the end of a period, in words; nothing where nothing does. */
+/** Says what is added or withdrawn at the end of a period; blank if nothing is. */
 export function endWords(amount) {
   if (amount === 0) return "";
   return `At the end of the period ${wealth(Math.abs(amount))} is ${amount > 0 ? "added" : "withdrawn"}.`;
 }
 
-/** All contributions, in a sentence. */
+/** Says all contributions in a sentence. */
 export function inWords(problem) {
   const { contributions } = problem;
   if (none(problem)) return "";
@@ -65,6 +65,6 @@ export function inWords(problem) {
   return endWords(contributions).replace("the period", "each period");
 }
 
-/** What was added and withdrawn in the periods observed, in all. */
+/** Returns the net money added in all observed periods. */
 export const netAdded = (history) =>
   history.observations.reduce((net, _, index) => net + addedIn(history, index + 1), 0);

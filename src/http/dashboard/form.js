@@ -21,7 +21,8 @@ function field(name, label, note, control, within = "") {
   return { name, element, control };
 }
 
-/** A text field; `changed(text)` at every edit. `within` tells its id from that of the same field in another form. `unit` is "percent" where it counts so and the request does not, "confidence" where it is what the request's share leaves of 100 %. */
+/** Returns a text field; `changed(text)` is called at every edit. `within` is a prefix of its id, for forms with the same field. `unit` is
+ * "percent" if the field is in percent and the request holds a fraction, and "confidence" if the request holds one minus it. */
 export function input({ name, label, note, changed, within, value = "", unit = null, ...attributes }) {
   const control = h("input", {
     type: "text",
@@ -35,7 +36,7 @@ export function input({ name, label, note, changed, within, value = "", unit = n
   return field(name, label, note, control, within);
 }
 
-/** A field of several lines. */
+/** Returns a field of several lines. */
 export function area({ name, label, note, changed, within, value = "", rows = 2 }) {
   const control = h("textarea", { rows, class: "prose" });
   control.value = value;
@@ -43,7 +44,7 @@ export function area({ name, label, note, changed, within, value = "", rows = 2 
   return field(name, label, note, control, within);
 }
 
-/** A choice; `choices` maps values to words, or lists both where their order is not that of the values. */
+/** Returns a choice; `choices` maps values to texts, or lists pairs of both to fix their order. */
 export function select({ name, label, note, choices, changed, within }) {
   const control = h(
     "select",
@@ -68,8 +69,8 @@ export function fieldset(legend, parts) {
 }
 
 /**
- * Shows a refusal at the field it names, or at the nearest one above it (`problem.history[3]` at `problem.history`),
- * and moves there; elsewhere, and for failures that name none, in `message`.
+ * Shows a refusal at the field it names, or at the nearest one above it (`problem.history[3]` at `problem.history`), and moves there. If the
+ * form has no such field, or the problem names none, it is shown in `message`.
  */
 export function showProblem(form, message, problem, otherwise) {
   clear(form);
@@ -83,7 +84,7 @@ export function showProblem(form, message, problem, otherwise) {
   if (control === null) {
     message.hidden = false;
     message.textContent = failureWords(problem);
-    // A refusal that names no field is not mended in one.
+    // Only a refusal that names a field can be corrected in `otherwise`.
     const place = problem.field ? otherwise : null;
     place?.closest("details")?.setAttribute("open", "");
     (place ?? message).focus();
@@ -106,7 +107,7 @@ export function showProblem(form, message, problem, otherwise) {
 
 const failureWords = (problem) => (problem.rule && problem.field ? problemWords(problem, inWords(problem.field)) : problem.message);
 
-/** Does what a press of `button` asks for; it rests meanwhile. Why that failed stands beside it until it is pressed again. */
+/** Runs `act` for a press of `button`, which is disabled meanwhile. A failure is shown beside it until it is pressed again. */
 export async function pressed(button, act, words = failureWords) {
   if (button.nextElementSibling?.matches("span.error")) button.nextElementSibling.remove();
   button.disabled = true;
@@ -116,16 +117,16 @@ export async function pressed(button, act, words = failureWords) {
   } catch (error) {
     button.disabled = false;
     button.after(h("span", { class: "error", role: "alert" }, words(error)));
-    // A button that rests loses the focus.
+    // A disabled button loses the focus.
     if (document.activeElement === document.body) button.focus();
   }
 }
 
-/** Where a form says what is amiss with no field of it in particular. */
+/** Returns the element for errors that belong to no field. */
 export const refusal = () => h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
 
-/** At every sending of `form` does what is asked for, while `button` rests. Why that failed stands at the field it names, or in the
- * form's own message or `otherwise`, once `told(error)` has seen it. */
+/** Runs `act` at every submission of `form`, with `button` disabled meanwhile. A failure is passed to `told(error)`, then shown at the field it
+ * names, or in the form's message, or at `otherwise`. */
 export function sending(form, button, act, { otherwise, told } = {}) {
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
@@ -140,13 +141,13 @@ export function sending(form, button, act, { otherwise, told } = {}) {
   });
 }
 
-/** The last part of a field's path, as a label would have it: `design.sampling_law.degrees_of_freedom` is Degrees of freedom. */
+/** Turns the last part of a field's path into a label: `design.sampling_law.degrees_of_freedom` is "Degrees of freedom". */
 function inWords(path) {
   const last = path.replace(/\[\d+\]/g, "").split(".").at(-1).replaceAll("_", " ");
   return last[0].toUpperCase() + last.slice(1);
 }
 
-/** Takes errors away. */
+/** Removes all errors of a form. */
 export function clear(form) {
   const message = form.querySelector(":scope > .error");
   if (message) message.hidden = true;

@@ -10,20 +10,20 @@ function grouped(value, digits) {
     .replace("-", MINUS);
 }
 
-/** A sentence of the service with minus signs where it has hyphens before numbers. */
+/** Replaces hyphens before numbers by minus signs in a sentence of the service. */
 export const minus = (sentence) => sentence.replace(/(^|[\s([\u201c])-(?=[\d.])/g, `$1${MINUS}`);
 
-/** A share or a return, given as a fraction. */
+/** Formats a share or a return, given as a fraction. */
 export function percent(fraction, digits = 1) {
   return Number.isFinite(fraction) ? `${grouped(100 * fraction, digits)}${NARROW}%` : "\u2013";
 }
 
-/** An allocation: nothing and everything, or as good as that, are said without decimals. */
+/** Formats an allocation; nothing and everything, after rounding, have no decimals. */
 export function allocation(fraction) {
   return percent(fraction, [0, 1000].includes(Math.round(1000 * fraction)) ? 0 : 1);
 }
 
-/** Wealth, in whatever unit the investor counts. */
+/** Formats wealth, in the investor's own unit. */
 export function wealth(value) {
   if (!Number.isFinite(value)) return "\u2013";
   const size = Math.abs(value);
@@ -31,7 +31,7 @@ export function wealth(value) {
   return grouped(value, size >= 1e5 ? 0 : 2);
 }
 
-/** `digits` significant digits, with an exponent where that is shorter. */
+/** Formats `digits` significant digits, with an exponent for very large or small numbers. */
 export function significant(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "\u2013";
   if (value === 0) return "0";
@@ -43,25 +43,25 @@ export function significant(value, digits = 3) {
     .replaceAll("-", MINUS);
 }
 
-/** `digits` significant digits, zeros among them: in a column every number has as many. */
+/** Formats `digits` significant digits, including trailing zeros, so that all numbers of a column have as many. */
 export function figures(value, digits = 3) {
   if (value === 0 || !Number.isFinite(value ?? Number.NaN)) return significant(value, digits);
   const exponent = Math.floor(Math.log10(Math.abs(Number(value.toPrecision(digits)))));
   return exponent >= -4 && exponent < digits ? grouped(value, digits - 1 - exponent) : significant(value, digits);
 }
 
-/** A small share, to so many significant digits. */
+/** Formats a small share in percent, to `digits` significant digits. */
 export const percentFigures = (fraction, digits) => `${figures(100 * fraction, digits)}${NARROW}%`;
 
-/** A difference of shares or returns, in points of a hundred. */
+/** Formats a difference of shares or returns, in percentage points. */
 export function points(fraction, digits = 1) {
   return `${grouped(100 * fraction, digits)} points`;
 }
 
-/** How often something of a probability happens: one in so many. */
+/** Returns N for a probability of one in N. */
 export const oneIn = (probability) => count(Math.max(1, Math.round(1 / probability)));
 
-/** A number on an axis, with the digits that its `step` asks for. */
+/** Formats a number on an axis, with the digits that its `step` needs. */
 export function tick(value, step) {
   if (!Number.isFinite(value)) return "\u2013";
   const size = Math.max(Math.abs(value), Math.abs(step) || Math.abs(value));
@@ -69,40 +69,40 @@ export function tick(value, step) {
   return grouped(value, Math.min(FINEST, decimals(step)));
 }
 
-/** No axis needs more decimals. */
+/** Most decimals on an axis. */
 const FINEST = 10;
 
-/** Significant digits that tell numbers of a size apart by steps. */
+/** Returns the significant digits that tell numbers of a size apart by steps. */
 const apart = (size, step) => (step > 0 ? Math.max(2, power(size) - power(step) + 1) : 2);
 
 const power = (value) => Math.floor(Math.log10(value) + 1e-9);
 
-/** A share on an axis. */
+/** Formats a share on an axis. */
 export function percentTick(fraction, step) {
   return percent(fraction, Math.min(FINEST, decimals(100 * step)));
 }
 
-/** Decimals that tell multiples of `step` apart. */
+/** Returns the decimals that tell multiples of `step` apart. */
 function decimals(step) {
   return step > 0 ? Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) : 0;
 }
 
-/** A difference of log certainty equivalents, in basis points (1e-4). */
+/** Formats a difference of log certainty equivalents, in basis points (1e-4). */
 export function basisPoints(value) {
   return value === null || value === undefined ? "\u2013" : `${figures(1e4 * value, 2)}${NARROW}bp`;
 }
 
-/** A whole number. */
+/** Formats a whole number. */
 export function count(value) {
   return grouped(value, 0);
 }
 
-/** `count` things by name. */
+/** Formats a count of things with their name. */
 export function counted(value, noun, nouns = `${noun}s`) {
   return `${count(value)} ${value === 1 ? noun : nouns}`;
 }
 
-/** Seconds, to the precision of an estimate. */
+/** Formats seconds, to the precision of an estimate. */
 export function duration(seconds) {
   if (seconds < 0.95) return `under 1${NARROW}s`;
   if (seconds < 90) return `${Math.round(seconds)}${NARROW}s`;
@@ -110,13 +110,13 @@ export function duration(seconds) {
   return `${grouped(seconds / 3600, 1)}${NARROW}h`;
 }
 
-/** A moment, in milliseconds since 1970, in the reader's own time, which it names. */
+/** Formats a time, in milliseconds since 1970, in the reader's time zone, which it names. */
 export function moment(milliseconds) {
   const options = { day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit", timeZoneName: "short" };
   return new Date(milliseconds).toLocaleString("en-GB", options);
 }
 
-/** The part of an identifier that tells it from others. */
+/** Returns the distinctive part of an identifier. */
 export function short(id) {
   return id.replace(/^[a-z]+_/, "").slice(0, 10);
 }

@@ -11,7 +11,7 @@ import { shareOf } from "./specification.js";
 
 export function body(report) {
   const words = h("div", { class: "words" }, report.sentences.map((sentence) => h("p", {}, minus(sentence))));
-  // One scale for all laws, from nothing lost on.
+  // All laws share one scale, which starts at no loss.
   const domain = extent(report.resampled.flatMap(({ points }) => points.flatMap(({ lost: { low, high } }) => [low, high])), [0]);
   return [words, ...report.resampled.map((resampled) => drawn(report, resampled, domain))];
 }
@@ -22,11 +22,11 @@ const TITLES = {
   without_premium: () => "Records of a market that pays no more than the bank",
 };
 
-/** What is lost comes in basis points, and is told in percent. */
+/** Losses come in basis points and are shown in percent. */
 const inPercent = (value) => tick(value / 100, 0.001);
 const scaled = (scale) => ({ 0: "No caution", 1: "This caution" })[scale] ?? `${scale} times this`;
 
-/** One law: what each scale loses, and how much that varies. */
+/** Draws one law: what each scale of caution loses, and how much that varies. */
 function drawn({ own, per_year }, { bootstrap, best, points: scales }, domain) {
   const title = TITLES[bootstrap.kind](bootstrap);
   const total = (shares) => shares.reduce((sum, share) => sum + share, 0);
@@ -53,10 +53,10 @@ function drawn({ own, per_year }, { bootstrap, best, points: scales }, domain) {
   );
 }
 
-/** A button that asks for it, of a problem as a policy has it with the returns and the wealth of now; `fund` where there are several assets. */
+/** Returns the button that requests a frontier for a policy's problem with the current returns and wealth; `fund` is given for several assets. */
 export function asking({ problem: asked, fund }, history, initial_wealth) {
   const { rate_per_step, periods_per_year, action_interval, utility, radius: whole, support } = asked;
-  // Multiples of the caution that is followed.
+  // The scales are multiples of the caution in use.
   const radius = whole.scale === undefined ? whole : { ...whole, scale: whole.scale * shareOf(asked) };
   const investor = { initial_wealth, action_interval, utility, radius, support };
   const problem = { history, rate_per_step, periods_per_year, ...investor, ...(fund && several(fund, radius)) };
@@ -69,7 +69,7 @@ export function asking({ problem: asked, fund }, history, initial_wealth) {
   return button;
 }
 
-/** What is asked of several assets; the scale of the radius before it was made wide enough for all their funds. */
+/** Returns the request's fields of several assets, with the scale of the radius before it was widened for all their funds. */
 function several({ assets, ground_norm, radius_factor }, radius) {
   const scale = radius.scale && radius.scale / radius_factor;
   return { assets, ground_norm, radius: { ...radius, scale } };

@@ -10,7 +10,8 @@ const COLOURS = 11;
 
 /**
  * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x;
- * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: that of the record itself, or null; what is read first is the record itself, or the middle.
+ * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: the position of the record itself, or null. The
+ * cell read first is that of the record, or the middle.
  */
 export function heatmap({ title, x, y, field, range, format, dots, own = null, note, name }) {
   const [columns, rows] = [x.values.length, y.values.length];
@@ -117,13 +118,13 @@ export function heatmap({ title, x, y, field, range, format, dots, own = null, n
 
 const inside = ([px, py], xs, ys) => px >= xs[0] && px <= xs.at(-1) && py >= ys[0] && py <= ys.at(-1);
 
-/** A cross that stands out on every colour. */
+/** Draws a cross that stands out on every colour. */
 const cross = (x, y) => {
   const d = `M${x - 7} ${y}H${x + 7}M${x} ${y - 7}V${y + 7}`;
   return [s("path", { class: "own under", d }), s("path", { class: "own", d })];
 };
 
-/** One path a colour: a thousand elements would take a frame to make. */
+/** Draws one path for each colour, because making a thousand elements would take a frame. */
 function paths(field, colour, corner, wide, high) {
   const drawn = new Map();
   const box = `h${wide.toFixed(2)}v${high.toFixed(2)}h${(-wide).toFixed(2)}z`;
@@ -147,7 +148,7 @@ function ramp(left, [low, high], format) {
   return [blocks, [0, 0.5, 1].map((share) => label(low + share * (high - low), bottom - share * (bottom - top)))];
 }
 
-/** Every third column and row: enough to see the shape, few enough to read. */
+/** Returns a table of every third column and row: enough to see the shape, few enough to read. */
 function fieldTable({ title, x, y, field, format }) {
   const thin = (values) => values.map((_, index) => index).filter((index) => index % 3 === 1);
   const columns = [{ name: `${y.name} \\ ${x.name}`, cell: (r) => y.format(y.values[r]) }];

@@ -5,11 +5,12 @@ import { h, s, table } from "./dom.js";
 import { percent, percentTick, tick, wealth } from "./format.js";
 
 const HEIGHT = 130;
-/** Width of the bar of a point, in pixels. */
+/** Width of the bar of a point mass, in pixels. */
 const POINT = 5;
 
-/** `shares` of even bins over `domain`; `point` is `{at, share, name}` of what ends at one place, in none of the bins: a bar of its own;
- * `top`: the largest share of all that are drawn alike; `marks`: `[{name, at}]`; `of` is what is counted, told by `format`. */
+/** Draws the `shares` of equal bins over `domain`. `point` is `{at, share, name}` of the paths that end at one value: it is in no bin and has a
+ * bar of its own. `top` is the largest share of all histograms on the same scale; `marks` are `[{name, at}]`; `of` names the quantity, which
+ * `format` formats. */
 export function histogram({ title, shares, domain, point = null, top, colour, marks, of = "Wealth", format = wealth }) {
   const width = (domain[1] - domain[0]) / shares.length;
   const from = (bin) => domain[0] + bin * width;

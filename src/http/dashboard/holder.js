@@ -5,7 +5,7 @@ import { h } from "./dom.js";
 import { moment, short } from "./format.js";
 import { held } from "./key.js";
 
-/** What each role may do; an admin all of it. */
+/** What each role may do; an admin may do all of it. */
 const ROLES = {
   read: "see policies, sessions and jobs",
   operate: "open sessions and report their returns",
@@ -13,10 +13,10 @@ const ROLES = {
   admin: "see the audit, and the service\u2019s figures over all tenants",
 };
 
-/** The roles of the key in use, asked for once while it is in use. */
+/** The roles of the key in use, requested once for each key. */
 let known = { of: undefined };
 
-/** The roles that some of the page needs and the key in use lacks; none where the service does not say. */
+/** Returns the roles that parts of the page need and the key in use lacks; none if the service does not say. */
 export async function lacking() {
   if (known.of !== held()) known = { of: held(), holder: get("/key") };
   const holder = await known.holder.catch(() => (known = { of: undefined }));
@@ -24,12 +24,12 @@ export async function lacking() {
   return ["operate", "train"].filter((role) => !holder.roles.includes(role));
 }
 
-/** That the key may not do what a role may. */
+/** Says what the key in use may not do. */
 export const lackWords = (role) => `The key in use may not ${ROLES[role].replace(" and ", " or ")}: it lacks the role ${role}.`;
 
 const listed = (words) => words.join(", ").replace(/, (?=[^,]*$)/, " and ");
 
-/** A sentence or two, where the service says; nothing where it does not. */
+/** Says in a sentence or two what the key may do; blank if the service does not say. */
 export async function holderWords(signal) {
   const holder = await get("/key", signal).catch(() => null);
   if (holder === null) return "";

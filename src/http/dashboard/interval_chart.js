@@ -4,13 +4,13 @@ import { extent, figure, grain, plot, scale, ticks } from "./chart.js";
 import { s, table } from "./dom.js";
 
 const LINE = 26;
-/** The same where a name has a line of its own. */
+/** Height of a row whose name has a line of its own. */
 const TWO = 42;
 
-/** `rows`: `{name, value, low, high, colour, isMain}`; `noun` says what has the names, `domain` from where to where the scale goes. */
+/** Draws `rows`, `{name, value, low, high, colour, isMain}`. `noun` heads the column of names; `domain` is the range of the scale. */
 export function intervalChart({ title, noun = "Strategy", rows, format, tick, domain = extent(rows.flatMap(({ low, high }) => [low, high])) }) {
   const names = 20 + 7.2 * Math.max(...rows.map(({ name }) => name.length));
-  /** Beside their names the ranges have no room. */
+  /** Tells whether the names leave too little room for the ranges beside them. */
   const narrow = (width) => names > 0.55 * width;
   const line = (width) => (narrow(width) ? TWO : LINE);
   const holder = plot((width) => line(width) * rows.length + 34, (width) => {

@@ -14,7 +14,7 @@ import { about, KINDS } from "./report_title.js";
 
 const EVALUATIONS = ["Evaluations", "#/evaluations"];
 
-/** `drawn.body(report)` makes the page, `drawn.csv(report)`, where it has one, what else is saved. */
+/** Returns the view of a report. `drawn.body(report)` draws the page; `drawn.csv(report)`, if present, makes a CSV file. */
 const reported = (kind, [above, href], drawn) => async (id, leaving) => {
   const job = await get(`/jobs/${id}`, leaving);
   const trail = h("p", { class: "trail" }, h("a", { href }, above));

@@ -8,12 +8,12 @@ import { all, foot, Pages } from "./pages.js";
 import { byDay, KINDS, whenSeen } from "./report_title.js";
 import { welcome } from "./welcome.js";
 
-/** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
+/** Browsers keep six connections to one address: following two jobs leaves room for all other calls. */
 const FOLLOWED = 2;
-/** Jobs that are not followed are asked for this often, in milliseconds. */
+/** Jobs that are not followed are polled at this interval, in milliseconds. */
 const POLL = 1000;
 
-/** Where the page of a report is. */
+/** The address of a report's page. */
 const REPORTS = { evaluate: "evaluations", backtest: "backtests", frontier: "frontiers" };
 const named = (job) => `${KINDS[job.kind]}${byDay(job)}`;
 
@@ -26,17 +26,17 @@ export async function view(_, leaving) {
   return { title: "Jobs", actions, body: [jobs.element, foot(pages, ["job", "jobs"], entries.length, jobs.add)] };
 }
 
-/** A job whose report this page will show, until it does. */
+/** Shows a job until it succeeds; then the page reloads and shows its report. */
 export function until(job, leaving) {
   const again = ({ state }) => state === "succeeded" && dispatchEvent(new HashChangeEvent("hashchange"));
   return jobList([job], leaving, again).element;
 }
 
-/** What is said where the service does not answer: what stands below may long be otherwise. */
+/** Returns the warning that the service does not answer and the jobs shown may be out of date. */
 function silence() {
   const element = h("p", { class: "note wrong", role: "alert", hidden: true });
   let since = null;
-  /** `error` is null where it answered. */
+  /** `error` is null if the service answered. */
   const hear = (error) => {
     if (error?.name === "AbortError") return;
     if (error === null) since = null;
@@ -47,7 +47,7 @@ function silence() {
   return { element, hear };
 }
 
-/** `{element, add(entries)}`: jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
+/** Returns `{element, add(entries)}`: a list of jobs that stays up to date until `leaving`; `changed(job)` is called at every change. */
 export function jobList(entries, leaving, changed = () => {}) {
   const list = h("ol", { class: "cards" });
   const silent = silence();
@@ -65,8 +65,8 @@ export function jobList(entries, leaving, changed = () => {}) {
   return { element, add };
 }
 
-/** `tell(policy, then)`: `then(name)` hears what a policy is called, once that is read for all of them together; "" of one
- * without a name, null of one that is gone. */
+/** Returns `(policy, then)`: calls `then(name)` with a policy's name, once the names of all policies are read together. The name is "" if the
+ * policy has none, and null if it was deleted. */
 function policyNames(leaving) {
   const names = new Map();
   let asked = null;
@@ -80,17 +80,17 @@ function policyNames(leaving) {
   };
 }
 
-/** A job on the page, and how to bring it up to date; `names` tells what its policy is called. */
+/** Returns the card of a job, with `update(job)`; `names` gives the name of its policy. */
 function card(job, changed, names) {
   const element = h("li", { class: "card job" });
   const card = { element, job, names };
   card.update = (now) => {
-    // The answer to a cancellation may come after the event that it has ended.
+    // The answer to a cancellation may arrive after the event that the job has ended.
     if (isOver(card.job) && !isOver(now)) return;
     const ended = isOver(now) && !isOver(card.job);
     const moved = now.state === card.job.state && now.cancel_requested === card.job.cancel_requested;
     card.job = now;
-    // Progress comes many times a second: a button replaced between press and release would not be clicked.
+    // Progress arrives many times a second: a button replaced between press and release would not be clicked.
     if (moved && element.firstChild) advanced(element, now);
     else {
       const kept = element.contains(document.activeElement);
@@ -104,7 +104,7 @@ function card(job, changed, names) {
   return card;
 }
 
-/** Brings the moving parts of a running job up to date. */
+/** Updates the moving parts of a running job. */
 function advanced(element, job) {
   element.querySelector(".summary").textContent = summary(job);
   const progress = element.querySelector("progress");
@@ -137,7 +137,7 @@ function contents(card) {
   ].filter(Boolean);
 }
 
-/** How far a job is, in a sentence. */
+/** Says how far a job is, in a sentence. */
 export function summary({ state, progress, error, kind }) {
   if (state === "failed") return error ?? "No reason was recorded.";
   if (state === "queued") return "Waiting for the jobs before it.";
@@ -151,16 +151,16 @@ export function summary({ state, progress, error, kind }) {
   if (kind === "frontier") return `${count(progress.points_done ?? 0)} records advised${left}`;
   const { steps_done, step, phase, points_done, points_total } = progress;
   const idle = steps_done > 0 ? "Between two steps" : "Starting";
-  // Counted as they are done, beside how many are: the periods are solved from the last to the first.
+  // Steps are numbered in the order of solving, which is from the last period to the first.
   const at = phase === "simulating" ? "Simulating" : step === null || phase === null ? idle : `Step ${count(steps_done + 1)}, ${phase}`;
   const points = points_total ? `: ${count(points_done)} of ${counted(points_total, phase === "simulating" ? "path" : "situation")}` : "";
   return `${at}${points}${left}`;
 }
 
-/** Steps that must be done before they tell how long the others take: the first is another thing than those after it. */
+/** Steps needed for an estimate of the time left: the first step differs from those after it. */
 const TELLING = 2;
 
-/** What is left of a job, where that can be known: an evaluation ends with a simulation, which is not like the steps before it. */
+/** Says the time left of a job, if it can be estimated: an evaluation ends with a simulation, which differs from the steps before it. */
 function timeLeft(kind, { seconds_left, steps_done }) {
   if (seconds_left === null || steps_done < TELLING || kind === "evaluate") return "";
   const left = duration(seconds_left);
@@ -180,7 +180,7 @@ function bar(job) {
 
 const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${counted(steps_total, "step")} done`;
 
-/** Steps done, and nine tenths of the one being solved by its points: the rest is fitting. */
+/** Returns the steps done, plus nine tenths of the current one by its points: the rest is fitting. */
 function done({ steps_done, steps_total, points_done, points_total, phase }) {
   const share = phase === "fitting" ? 1 : points_total ? points_done / points_total : 0;
   return Math.min(steps_total, steps_done + 0.9 * share);
@@ -210,7 +210,7 @@ function links(card) {
   return h("span", {}, stop);
 }
 
-/** Follows the first running jobs and asks for the others now and then; the function given looks for new ones. */
+/** Follows the first running jobs and polls the others; returns a function that starts this for new jobs. */
 function watch(cards, leaving, hear) {
   const followed = new Set();
   let awake = false;

@@ -8,17 +8,17 @@ const PLACE = "ballast-key";
 
 export const held = () => sessionStorage.getItem(PLACE);
 
-/** What goes with every request. */
+/** Returns the headers of every request. */
 export const shown = () => (held() ? { authorization: `Bearer ${held()}` } : {});
 
-/** Why the key held was refused, and what to do: it expired, or it is none in force. */
+/** Says why the current key was refused, expired or not valid, and what to do. */
 export function refusedWords({ value }, isKept) {
   const [, at] = /^a key that expired at (\S+)$/.exec(value ?? "") ?? [];
   const why = at ? `Your key expired at ${moment(Date.parse(at))}.` : "The key is not valid here: it may have been revoked, or pasted in part.";
   return `${why} Paste a new one${isKept ? ": what you typed is kept" : ""}.`;
 }
 
-/** Asks for another key over the page, which stays as it is; once there is one, what was refused can be sent again. */
+/** Asks for another key in a dialog over the unchanged page; then the user can send the refused request again. */
 export function askForKey(words) {
   if (document.querySelector("dialog[open]")) return;
   const dialog = h("dialog", { class: "asking", "aria-labelledby": "key-asked" }, h("h2", { id: "key-asked" }, "Another key is needed"), h("p", { class: "sentence" }, words));
@@ -29,7 +29,7 @@ export function askForKey(words) {
   dialog.showModal();
 }
 
-/** A form that takes a key, or gives up the one held; `done()` hears of either. */
+/** Returns a form that takes a key or forgets the current one; `done()` is called after either. */
 export function keyForm(done) {
   const typed = h("input", { id: "key", type: "password", autocomplete: "off", spellcheck: "false", required: true });
   const keep = (event) => {

@@ -6,12 +6,12 @@ import { percent, percentTick } from "./format.js";
 
 const HEIGHT = 260;
 const BINS = 36;
-/** Pixels that a label takes with the room around it. */
+/** Width of a label with the space around it, in pixels. */
 const LABEL = 56;
 
 const simple = (logReturn) => percent(Math.expm1(logReturn));
 
-/** Masses of both laws over common bins: the empirical one, the worst, and the part of the worst that came from elsewhere. */
+/** Returns the masses of both laws over common bins: the empirical law, the worst law, and the part of the worst that was moved there. */
 function binned(transport) {
   const places = transport.flatMap(({ atom, moved_to }) => [atom, moved_to]);
   const [low, high] = [Math.min(...places), Math.max(...places)];
@@ -32,7 +32,7 @@ function binned(transport) {
   return bins;
 }
 
-/** The chart of a worst case as `/action?explain=worst_case` tells it. */
+/** Draws the worst case from an answer of `/action?explain=worst_case`. */
 export function lawChart({ transport }) {
   const bins = binned(transport);
   const tallest = Math.max(...bins.map(({ seen, worst }) => Math.max(seen, worst)));
@@ -129,7 +129,7 @@ export function lawChart({ transport }) {
   });
 }
 
-/** Keeps what stands clear of the label kept before it: equal returns lie ever closer as log-returns grow. */
+/** Keeps a label only if it is clear of the one kept before: equal steps of return lie closer as log-returns grow. */
 function roomy(place) {
   let last = -Infinity;
   return (value) => {

@@ -3,20 +3,20 @@
 // A shifted and scaled shape keeps the order of its atoms and its standardised moments, so both are computed once for
 // all laws drawn from it. Each law then needs a search and, for a new standard deviation, one pass.
 
-/** What of a return's weight is left one return later. */
+/** Returns the share of a return's weight that is left one return later. */
 export const retention = (learning) => (learning.kind === "decay" ? 0.5 ** (1 / learning.half_life) : 1);
 
-/** How many returns of equal weight tell as much as so many. */
+/** Returns the effective sample size of `count` returns. */
 export function effectiveSize(learning, count) {
   if (learning.kind !== "decay") return count;
   const half = Math.LN2 / (2 * learning.half_life);
   return Math.tanh(count * half) / Math.tanh(half);
 }
 
-/** The share that so many returns seen have of the centre of the ball. */
+/** Returns the share that `count` returns seen have in the centre of the ball. */
 export const shareSeen = ({ kind, weight } = {}, count) => (kind === "mixed" ? count / (count + weight) : 1);
 
-/** Atoms of mean 0 and variance 1, largest first, with what all laws of this shape have in common. Of returns, the oldest first. */
+/** Atoms of mean 0 and variance 1, largest first, with the sums that all laws of this shape share. The returns are given oldest first. */
 export class Shape {
   constructor(returns, kept = 1) {
     const weighted = returns.map((atom, index) => ({ atom, weight: kept ** (returns.length - 1 - index) }));
@@ -32,7 +32,7 @@ export class Shape {
     this.known = new Map();
   }
 
-  /** The mean of the powers of the standardised atoms. */
+  /** Returns the mean of a power of the standardised atoms. */
   moment(order) {
     if (!this.known.has(order)) {
       this.known.set(
@@ -43,7 +43,7 @@ export class Shape {
     return this.known.get(order);
   }
 
-  /** The law of this shape with a mean and a standard deviation. */
+  /** Returns the law of this shape with a mean and a standard deviation. */
   law(mean = this.mean, deviation = this.deviation) {
     if (this.stretched?.deviation !== deviation) this.stretched = new Stretched(this, deviation);
     return new Law(this, this.stretched, mean);
@@ -83,7 +83,7 @@ class Law {
     return this.shape.moment(order);
   }
 
-  /** The mean of a power of the atoms, by the binomial theorem. */
+  /** Returns the mean of a power of the atoms, by the binomial theorem. */
   raw(order) {
     let [sum, choose] = [0, 1];
     for (let k = 0; k <= order; k++) {
@@ -93,7 +93,7 @@ class Law {
     return sum;
   }
 
-  /** Mean and variance of e^Z / (1 + r) under the law of the ball with the least mean: atoms above a cut are moved onto it. */
+  /** Returns the mean and variance of e^Z / (1 + r) under the law of the ball with the least mean: atoms above a cut are moved onto it. */
   worst(radius, rate) {
     const n = this.shape.atoms.length;
     const used = this.moved(radius);
@@ -105,7 +105,7 @@ class Law {
     return { mean, variance: Math.max(0, square - mean * mean) };
   }
 
-  /** How many of the largest atoms the cut takes: the fewest whose average, lowered by the radius, is not below the next. */
+  /** Returns how many of the largest atoms are cut: the fewest whose average, lowered by the radius, is not below the next. */
   moved(radius) {
     const { atoms, above, sums } = this.shape;
     const n = atoms.length;

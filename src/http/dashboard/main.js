@@ -19,8 +19,7 @@ import * as sessionOpening from "./session_opening.js";
 import * as sessions from "./sessions.js";
 import * as train from "./train.js";
 
-/** Address, view, the entry of the navigation it belongs to, and the role it is of no use without, if any. A view is
- * `async (id, leaving) => {title, body}`. */
+/** Address, view, navigation entry, and the role that the view needs, if any. A view is `async (id, leaving) => {title, body}`. */
 const ROUTES = [
   [/^#\/jobs$/, jobs.view, "jobs"],
   [/^#\/train(?:\?(.*))?$/, train.view, "jobs", "train"],
@@ -56,7 +55,7 @@ async function show() {
     const hash = location.hash || "#/";
     [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
     lacks = await lacking();
-    // What hides by style alone stays hidden wherever a view puts it later.
+    // Hiding by style keeps elements hidden that a view adds later.
     document.documentElement.dataset.lacks = lacks.join(" ");
     if (lacks.includes(route?.[3])) page = { title: "Not allowed with this key", body: "" };
     else page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
@@ -84,7 +83,7 @@ async function show() {
   first = false;
 }
 
-/** Where a key is typed in, or given up. */
+/** The view where a key is entered or forgotten. */
 async function key(_, signal) {
   const note = "If the service asks for keys, it shows nothing without one. Only this tab keeps the key, until you close it.";
   return { title: "Key", body: [await holderWords(signal), h("p", {}, note), keyForm(() => location.assign("#/"))] };

@@ -5,19 +5,19 @@ import { announce, h } from "./dom.js";
 import { area, input, refusal, sending } from "./form.js";
 import { short } from "./format.js";
 
-/** What a thing is called in a sentence. */
+/** Returns the name of a thing within a sentence. */
 export const called = (id, name) => name || short(id);
 
-/** The same with what kind of thing it is, where only its identifier tells. */
+/** Returns the name of a thing, or its kind and identifier if it has no name. */
 export const titled = (noun, id, name) => name || `${noun} ${short(id)}`;
 
-/** What heads the row of a thing: its name with the identifier behind it, or the identifier alone. */
+/** Returns the head of a row: the name with the identifier below, or the identifier alone. */
 export function headed(href, id, name) {
   const code = h("code", {}, short(id));
   return name ? [h("a", { href }, name), h("span", { class: "under" }, code)] : h("a", { href }, code);
 }
 
-/** A link to a policy of which the identifier alone is known: where `asked`, its name takes the place of that once it is read. */
+/** Returns a link to a policy by its identifier; if `asked`, its name is requested and replaces the identifier. */
 export function policyLink(id, asked = true) {
   const link = h("a", { href: `#/policies/${id}` }, `policy ${short(id)}`);
   const name = ({ name }) => name && link.replaceChildren(name);
@@ -27,19 +27,19 @@ export function policyLink(id, asked = true) {
 
 export const tagList = (tags) => (tags.length > 0 ? h("span", { class: "tags" }, tags.map((tag) => h("span", { class: "tag" }, tag))) : null);
 
-/** The tags in a text, apart by commas; what stands in quotes is one tag, a quote in it doubled. */
+/** Returns the tags in a text, separated by commas; a quoted text is one tag, with its quotes doubled. */
 const tagsOf = (text) =>
   [...text.matchAll(/\s*(?:"((?:[^"]|"")*)"\s*|([^,]*))(?:,|$)/g)]
     .map(([, whole, plain]) => (whole === undefined ? plain : whole.replaceAll('""', '"')).trim())
     .filter(Boolean);
 
-/** A tag as it is typed. */
+/** Returns a tag as it is typed, in quotes if needed. */
 const quoted = (tag) => (/^"|,/.test(tag) ? `"${tag.replaceAll('"', '""')}"` : tag);
 
 const CLEARED = { name: "", notes: "", tags: [] };
 
-/** `{parts, read(), show(labels)}`: the fields of what a thing is called. `read()` gives those that are not blank, or with `{all: true}` all
- * of them. `changed()` at every edit. */
+/** Returns `{parts, read(), show(labels)}`: the fields for name, tags and notes. `read()` gives those that are not blank, or all of them with
+ * `{all: true}`. `changed()` is called at every edit. */
 export function labelFields({ within, changed } = {}) {
   const text = { within, inputmode: "text", changed };
   const name = input({ ...text, name: "name", label: "Name", note: "May be blank." });
@@ -61,10 +61,10 @@ export function labelFields({ within, changed } = {}) {
   return { name, tags, notes, parts: [name, tags, notes], read, show };
 }
 
-/** The role that it takes to change what a thing is called. */
+/** The role needed to change the labels of a thing. */
 const CHANGES = { Session: "operate", Policy: "train" };
 
-/** What stands below the heading of a thing at `path`: what it is called, to be changed in place. */
+/** Returns the labels of the thing at `path`, shown below its heading and edited in place. */
 export function labelled(noun, path, id, labels) {
   const element = h("div", { class: "labels" });
   const rest = () => {

@@ -14,7 +14,7 @@ const PATTERNS = {
   point: pattern("\\.", "[,'\u2019\u00a0\u202f ]"),
   comma: pattern(",", "[.'\u2019\u00a0\u202f ]"),
 };
-/** The mark itself and what stands between thousands. */
+/** The thousands separators for each decimal mark. */
 const APART = { point: /[,'\u2019\u00a0\u202f ]/g, comma: /[.'\u2019\u00a0\u202f ]/g };
 
 const bare = (text) =>
@@ -23,13 +23,13 @@ const bare = (text) =>
     .replace(/^[\u2212\u2013]/, "-")
     .replace(/\s*%$/, "");
 
-/** Whether `text` is a number by the decimal mark given. */
+/** Tells whether `text` is a number with the given decimal mark. */
 function isNumber(text, decimal) {
   const plain = bare(text);
   return plain !== "-0" && PATTERNS[decimal].test(plain);
 }
 
-/** The number that `text` is; only where `isNumber` says that it is one. A percent sign does not divide it. */
+/** Returns the number in `text`, for which `isNumber` must hold. A percent sign does not divide it. */
 function numberOf(text, decimal) {
   const joined = bare(text).replace(APART[decimal], "");
   return Number(decimal === "comma" ? joined.replace(",", ".") : joined);
@@ -38,8 +38,8 @@ function numberOf(text, decimal) {
 const hasPercent = (text) => /%\s*$/.test(text);
 
 /**
- * A number typed by itself: null where nothing is, and the text as it is where it is no number or could be two, as 100,000
- * could. `shares` takes 0.2 % for 0.002.
+ * Reads a number typed by itself. Returns null if the text is blank, and the text if it is not a number or is ambiguous, such as 100,000.
+ * With `shares`, 0.2 % is 0.002.
  */
 export function typed(text, { shares = false } = {}) {
   if (text.trim() === "") return null;
@@ -50,13 +50,13 @@ export function typed(text, { shares = false } = {}) {
   return hasPercent(text) ? hundredth(values[0]) : values[0];
 }
 
-/** A number typed in percent, as a fraction; null where it is none. */
+/** Returns a number typed in percent as a fraction, or null if it is not a number. */
 export function fraction(text) {
   const value = typed(text.replace(/\s*%$/, ""));
   return typeof value === "number" ? hundredth(value) : null;
 }
 
-/** Percent to a fraction without a rounding of its own: the decimal point moves in the text. */
+/** Turns percent into a fraction without rounding: the decimal point moves in the text. */
 export function hundredth(percent) {
   const [digits, power = "0"] = String(percent).split("e");
   return Number(`${digits}e${Number(power) - 2}`);

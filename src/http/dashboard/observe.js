@@ -4,7 +4,7 @@ import { h } from "./dom.js";
 import { foretold, reportFields, sendReports } from "./report_fields.js";
 import { severalFields } from "./several_fields.js";
 
-/** The form; what is held where nothing else is said is the advice. */
+/** Returns the form; a blank share held means the advised one. */
 export function observeForm(action, { id, session, history: { assets }, policy, calendar, refresh }) {
   const { rate_per_step, trading_cost } = policy.specification.problem;
   const preview = h("output", { class: "note" });

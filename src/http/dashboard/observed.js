@@ -16,14 +16,14 @@ import { save } from "./picture.js";
 import { assetReturns, assetsHeld } from "./several_fields.js";
 import { isCautious } from "./specification.js";
 
-/** Periods shown at first; who wants all asks. */
+/** Periods shown at first; a button shows all. */
 const NEWEST = 24;
 
 export function observed(shown) {
   const { history, calendar } = shown;
   const rows = [...history.observations].reverse();
   if (rows.length === 0) return "";
-  /** What stands, and beside it what was told where that was something else. */
+  /** Shows the current value, and beside it the first reported one if it differs. */
   const now = (name, words) => (row) => {
     const [stands, told] = [(row.now ?? row)[name], row[name]].map((value) => (value === null ? "missing" : words(value)));
     return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As first reported" }, told));
@@ -74,8 +74,8 @@ export function observed(shown) {
   );
 }
 
-/** The periods as a file, a row each with all that is known of it: numbers plain, shares and returns in percent; what was put right
- * as it stands, with what was told first. */
+/** Returns the CSV of the periods, one row each: plain numbers, shares and returns in percent. A corrected period has its current values and
+ * the first reported ones. */
 export function csv({ history, calendar, policy, cautionScale }) {
   const { observations, corrections, assets = [] } = history;
   const own = wealths(history);
@@ -85,9 +85,9 @@ export function csv({ history, calendar, policy, cautionScale }) {
   const simple = (log_return) => hundred(Number.isFinite(log_return ?? Number.NaN) ? Math.expm1(log_return) : null);
   const at = (milliseconds) => (milliseconds === undefined ? null : new Date(milliseconds).toISOString());
   const madeIn = (row) => corrections.filter(({ correction }) => row.corrections?.includes(correction));
-  /** A number of a row as it stands, and where anything was put right as it was told first. */
+  /** Returns the column of a current value, and that of the first reported one if the session has corrections. */
   const both = (name, unit, of) => [[`${name}${unit}`, (row) => of(row.now ?? row)], isCorrected && [`${name} told first${unit}`, of]];
-  /** What heads each column, what stands in it for a row, and for the start. */
+  /** The heading of each column, its value in a row, and its value at the start. */
   const columns = [
     ["Period", ({ period }) => period, 0],
     ["Name", ({ period }) => calendar.name(period), "Start"],
@@ -118,7 +118,7 @@ const ONE = ["log_return", "simple_return", "price", "previous_price", "executed
 const REPORT = [...ONE, ...ONE.map((name) => `${name}s`), "missing", "date", "rate", "flow", "wealth"];
 const reportOf = (said) => Object.fromEntries(REPORT.filter((name) => (said[name] ?? false) !== false).map((name) => [name, said[name]]));
 
-/** Sends a correction that was said before, or that takes something away, as a press of `button`. */
+/** Sends a confirmed correction, on a press of `button`. */
 function correct(button, { id, session, refresh }, period, report, reason, news) {
   const request = { correction: session.corrections + 1, period, reason, confirm: true, ...report };
   return pressed(button, async () => {
@@ -127,7 +127,7 @@ function correct(button, { id, session, refresh }, period, report, reason, news)
   });
 }
 
-/** The last report, with what to do where it was wrong. */
+/** Shows the last report, with what to do if it was wrong. */
 export function lastReport(shown) {
   const { history, calendar } = shown;
   const row = history.observations.at(-1);
@@ -157,19 +157,19 @@ export function lastReport(shown) {
   );
 }
 
-/** The form for a period put right, in a fold. */
+/** Returns the form for a correction, in a fold. */
 export function righting(shown) {
   const fold = disclosure("Correct a period", () => correctionForm(shown));
   fold.dataset.needs = "operate";
   return fold;
 }
 
-/** What was put right, newest first; the newest can be undone. */
+/** Lists the corrections, newest first; the newest can be undone. */
 function corrections(shown) {
   const { history, calendar } = shown;
   if (history.corrections.length === 0) return "";
   const done = { replace: "corrected", insert: "inserted", remove: "removed" };
-  /** The period as it is numbered now; one that was taken out as it was then. */
+  /** Returns the current number of a corrected period, or the former number of a removed one. */
   const now = ({ correction, period }) => history.observations.find(({ corrections }) => corrections?.includes(correction))?.period ?? period;
   const words = (made) => {
     const change = made.change ?? "replace";
@@ -192,7 +192,7 @@ function corrections(shown) {
   );
 }
 
-/** The policies that followed the first, newest first. */
+/** Lists the policies that followed the first, newest first. */
 function renewals({ history: { renewals }, calendar }) {
   if (renewals.length === 0) return "";
   const words = ({ period, policy, renewed_ms }, index) => [

@@ -4,18 +4,18 @@ import { get } from "./api.js";
 import { announce, h } from "./dom.js";
 import { count, counted } from "./format.js";
 
-/** Entries asked for at a time. */
+/** Entries of a page. */
 const PAGE = 100;
-/** The most that the service gives at a time, for lists to choose from. */
+/** The service's largest page, for lists to choose from. */
 const LARGEST = 1000;
 
-/** A list at `path`, which may have a query, page by page: `next()` gives the entries of the coming one, `more` says whether there may be one. */
+/** A list at `path`, which may have a query, page by page: `next()` gives the entries of the next page, `more` tells whether there may be one. */
 export class Pages {
   constructor(path, name, signal, { limit = PAGE, keep = () => true } = {}) {
     Object.assign(this, { path, name, signal, limit, keep, after: null, more: true });
   }
 
-  /** At least one entry that is kept, unless there is none left; with `keep` as many pages are read as that takes. */
+  /** Returns at least one entry, unless none is left; with `keep`, reads as many pages as that takes. */
   async next() {
     const found = [];
     while (this.more && found.length === 0) {
@@ -29,7 +29,7 @@ export class Pages {
   }
 }
 
-/** Every entry of a list. */
+/** Returns every entry of a list. */
 export async function all(path, name, signal) {
   const pages = new Pages(path, name, signal, { limit: LARGEST });
   const found = [];
@@ -37,7 +37,7 @@ export async function all(path, name, signal) {
   return found;
 }
 
-/** A holder of what `draw` makes of the first `most` rows, and a button that shows `all`, null where those are all. */
+/** Returns a holder with the first `most` rows, drawn by `draw`, and the button `all` that shows all rows, or null if there are no more. */
 export function firstOf(rows, most, draw) {
   const holder = h("div", {}, draw(rows.slice(0, most)));
   if (rows.length <= most) return { holder, all: null };
@@ -45,7 +45,7 @@ export function firstOf(rows, most, draw) {
   return { holder, all };
 }
 
-/** The line below a list of which `shown` entries stand, named by `nouns`, one and many: what is missing, and a button that `add`s it. */
+/** Returns the line below a list of `shown` entries, named by `nouns` (singular and plural): whether there are more, and a button that `add`s them. */
 export function foot(pages, nouns, shown, add) {
   const line = h("p", { class: "note" });
   const button = h("button", { class: "quiet" }, "Show more");

@@ -3,7 +3,7 @@
 import { standing } from "./flows.js";
 
 const DAY = 86_400_000;
-/** Days between two last days, at least and at most, by the unit they tell; and that unit's months or days. */
+/** The units of time: the least and most days between two last days, and the unit's months or days. */
 const UNITS = [
   { unit: "day", least: 1, most: 4 },
   { unit: "week", least: 6, most: 8, days: 7 },
@@ -11,21 +11,21 @@ const UNITS = [
   { unit: "quarter", least: 86, most: 95, months: 3 },
   { unit: "year", least: 360, most: 371, months: 12 },
 ];
-/** The unit by the periods in a year. */
+/** The unit for a number of periods in a year. */
 const A_YEAR = { 1: "year", 4: "quarter", 12: "month", 52: "week" };
-/** Trading days in a year are this many or more. */
+/** This many periods a year or more are trading days. */
 const DAILY = 200;
 
-/** A month, say, where that many periods make a year; "period" where that is not said. */
+/** Returns the unit of a period, such as "month", by the periods a year; "period" if they are unknown. */
 export const unitOf = (periods_per_year) =>
   periods_per_year >= DAILY ? "day" : (A_YEAR[Math.round(periods_per_year)] ?? "period");
 
-/** Midnight, UTC, of the day "2008-09-30". */
+/** Returns midnight, UTC, of a day such as "2008-09-30". */
 const parsed = (date) => Date.parse(`${date}T00:00:00Z`);
 const written = (time) => new Date(time).toISOString().slice(0, 10);
 const told = (time, options) => new Date(time).toLocaleDateString("en-GB", { timeZone: "UTC", ...options });
 
-/** The day that a text names, year first or as 30.9.2008, in the form 2008-09-30; null where it names none. */
+/** Reads a day, year first or as 30.9.2008, and returns it as 2008-09-30; null if the text is not a day. */
 export function dayOf(text) {
   const [, ...yearFirst] = /^(\d{4})-(\d\d?)-(\d\d?)$/.exec(text) ?? [];
   const [, ...dayFirst] = /^(\d\d?)\.(\d\d?)\.(\d{4})$/.exec(text) ?? [];
@@ -34,13 +34,13 @@ export function dayOf(text) {
   return Number.isFinite(time) && written(time) === date ? date : null;
 }
 
-/** A day, as 30 Sep 2008. */
+/** Formats a day as 30 Sep 2008. */
 export const day = (date) => told(parsed(date), { day: "numeric", month: "short", year: "numeric" });
 
-/** A day as above, a month as September 2008, a year as it is. */
+/** Formats a day as above, a month as September 2008, and leaves a year as it is. */
 export const dated = (date) => (date.length > 7 ? day(date) : date.length > 4 ? told(parsed(`${date}-01`), { month: "long", year: "numeric" }) : date);
 
-/** So many months later: the last day of a month stays that. */
+/** Returns the time some months later; the last day of a month stays the last day. */
 function later(time, months) {
   const from = new Date(time);
   const last = (year, month) => new Date(Date.UTC(year, month + 1, 0)).getUTCDate();
@@ -49,10 +49,10 @@ function later(time, months) {
   return Date.UTC(year, month, isLast ? last(year, month) : Math.min(from.getUTCDate(), last(year, month)));
 }
 
-/** The day that it is where the reader is, as 2008-09-30. */
+/** Returns the reader's local day, as 2008-09-30. */
 export const isoDay = (now) => [now.getFullYear(), now.getMonth() + 1, now.getDate()].map((part) => String(part).padStart(2, "0")).join("-");
 
-/** The last day that ended a period, so many of which are a year, on `today` or before it; null where no calendar is told. */
+/** Returns the last day on or before `today` that ended a period; null if the periods a year fit no calendar. */
 export function lastEnd(periods_per_year, today) {
   const [unit, now] = [unitOf(periods_per_year), new Date(parsed(today))];
   const [year, month, weekday] = [now.getUTCFullYear(), now.getUTCMonth(), now.getUTCDay()];
@@ -70,10 +70,10 @@ export function lastEnd(periods_per_year, today) {
   return isOver[unit] ? today : written(ends[unit]());
 }
 
-/** By how many days `today` is later than `next`. */
+/** Returns by how many days `today` is later than `next`. */
 export const daysLate = (next, today) => Math.max(0, Math.round((parsed(today) - parsed(next)) / DAY));
 
-/** The unit that the dates keep to, or null. */
+/** Returns the unit that the dates follow, or null. */
 function rhythm(dated) {
   const gaps = dated.slice(1).map(({ time, period }, index) => (time - dated[index].time) / DAY / (period - dated[index].period));
   if (gaps.length === 0) return null;
@@ -82,12 +82,12 @@ function rhythm(dated) {
 }
 
 /**
- * The calendar of a session: `unit` is what a period is called, `name(k)` period k from 1, `brief(k)` the same on an axis,
- * `after(k)` its end, `date(k)` its last day or null. `dated` says whether there are dates.
+ * Returns the calendar of a session: `unit` is the name of a period's unit, `name(k)` the name of period k from 1, `brief(k)` its short name
+ * on an axis, `after(k)` that of its end, `date(k)` its last day or null. `dated` tells whether there are dates.
  */
 export function calendar(history, periods_per_year) {
   const known = (row) => (row?.now ?? row)?.date;
-  // A period without a day of its own takes the next one due; where that is not known the day is that of a period before.
+  // A period without a date gets the next date due. If that is unknown, its date repeats that of the period before, so it counts as none.
   const dayIn = (row, index, rows) => standing(row).date ?? (known(row) === known(rows[index - 1]) ? null : known(row));
   const dated = history.observations
     .map((row, index, rows) => ({ period: row.period, date: dayIn(row, index, rows) }))
@@ -101,12 +101,12 @@ export function calendar(history, periods_per_year) {
     if (kept?.months) return later(time, steps * kept.months);
     return kept?.days ? time + steps * kept.days * DAY : null;
   };
-  /** The last day of a period: as reported, or as the nearest dated one tells. */
+  /** Returns the last day of a period: as reported, or counted from the nearest dated one. */
   const end = (period) => {
     const nearest = dated.reduce((best, one) => (best && Math.abs(best.period - period) <= Math.abs(one.period - period) ? best : one), null);
     return nearest && moved(nearest.time, period - nearest.period);
   };
-  // Two last days in one month have no names of their own.
+  // Periods are named by month only if no two of them end in one month.
   const months = dated.map(({ time }) => written(time).slice(0, 7));
   const byMonth = kept?.months === 1 && new Set(months).size === months.length;
   const name = (period) => {

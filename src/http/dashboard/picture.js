@@ -2,13 +2,13 @@
 
 import { h, s } from "./dom.js";
 
-/** What of the style sheet a drawing needs to look the same without it. */
+/** The style properties that a drawing needs to look the same without the style sheet. */
 const STYLES = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity", "font-size", "font-weight", "font-variant-numeric"];
 const FONT = "Inter, system-ui, sans-serif";
 const [MARGIN, HEAD, LINE] = [16, 26, 22];
-/** Pixels of the PNG for each of the drawing. */
+/** Pixels of the PNG for each pixel of the drawing. */
 const FINE = 2;
-/** Width of a letter of the legend, about. */
+/** Approximate width of a letter of the legend, in pixels. */
 const LETTER = 7.2;
 
 /** Saves text or bytes under a name. */
@@ -18,7 +18,7 @@ export function save(content, name, type) {
   URL.revokeObjectURL(link.href);
 }
 
-/** The buttons that save a figure's drawing. */
+/** Returns the buttons that save a figure's drawing. */
 export function pictureButtons(figure) {
   const name = () => titleOf(figure).toLowerCase().replace(/[^a-z0-9]+/g, "-");
   const button = (kind, act) =>
@@ -33,7 +33,7 @@ export function pictureButtons(figure) {
 
 const titleOf = (figure) => figure.querySelector("figcaption .title").textContent;
 
-/** The drawing with every style written out. */
+/** Returns the drawing with every style written out. */
 function standing(figure) {
   const drawn = figure.querySelector(".plot svg");
   const [width, height] = ["width", "height"].map((side) => Number(drawn.getAttribute(side)));
@@ -65,7 +65,7 @@ function standing(figure) {
   return whole;
 }
 
-/** The names beside their swatches, in as many lines as they take. */
+/** Draws the names beside their swatches, in as many lines as needed. */
 function legend(figure, width) {
   let [x, line] = [0, 0];
   const keys = [...figure.querySelectorAll(".legend > span")].flatMap((entry) => {
@@ -85,7 +85,7 @@ function legend(figure, width) {
 
 const svgText = (figure) => new XMLSerializer().serializeToString(standing(figure));
 
-/** The drawing on a canvas: shape by shape, for this page may load no picture that it made itself. */
+/** Draws on a canvas, shape by shape, because this page may not load a picture that it made itself. */
 async function png(figure) {
   const whole = standing(figure);
   const canvas = h("canvas", {});

@@ -9,7 +9,7 @@ import { foot, Pages } from "./pages.js";
 import { ticking } from "./ticking.js";
 import { caution, FRAMEWORKS, utility } from "./specification.js";
 
-/** Fewer than of other things at a time: each is asked for by itself. */
+/** Rows shown at a time: fewer than in other lists, because each needs a call of its own. */
 const PAGE = 50;
 
 export async function view(_, leaving) {
@@ -93,7 +93,7 @@ function importer() {
   const label = h("label", { class: "button quiet", for: "import" }, "Import");
   const act = async () => {
     const chosen = file.files[0];
-    // The same file may be chosen again once it was changed.
+    // Allows the same file to be chosen again after a change.
     const { policy } = await post("/policies/import", await chosen.text().finally(() => (file.value = "")));
     location.hash = `#/policies/${policy}`;
   };

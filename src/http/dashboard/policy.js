@@ -10,12 +10,12 @@ import { unitOf } from "./periods.js";
 import { FRAMEWORKS, inPaperWords, inWords, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
 
-/** Documents larger than this, in bytes, are fetched for the surface when asked only. */
+/** Larger documents, in bytes, are fetched for the surface only on request. */
 const READY_BYTES = 15e6;
-/** Digits of one number in the document. */
+/** Size of one number in the document, in bytes. */
 const NUMBER_BYTES = 20;
-/** Numbers a design point keeps beside its inputs: one for the value and one for the action, or the value at 17 holdings and
- * either end of the band. */
+/** Numbers stored for a design point besides its inputs: the value and the action, or the value at 17 holdings and both ends of the
+ * band. */
 const FUNCTIONS = { free: 2, costly: 19 };
 
 export async function view(id, leaving) {
@@ -76,13 +76,13 @@ function deletion(id) {
   return button;
 }
 
-/** That it is for several assets, where it is. */
+/** Names the assets of a policy for several. */
 function ofSeveral({ fund }) {
   if (!fund) return null;
   return h("p", {}, `It is for ${fund.assets.slice(0, -1).join(", ")} and ${fund.assets.at(-1)}. Below, \u201cstocks\u201d means all of them together.`);
 }
 
-/** `{element, told(now)}`: what it holds now, to the share once its document is read, and how often it holds nothing. */
+/** Returns `{element, told(now)}`: what the policy holds now, exactly once its document is read, and how often it holds nothing. */
 function answer({ problem: { horizon, periods_per_year }, fund }, diagnostics) {
   const unit = unitOf(periods_per_year);
   const assets = fund ? "the assets" : "stocks";
@@ -99,7 +99,7 @@ function answer({ problem: { horizon, periods_per_year }, fund }, diagnostics) {
   return { element: h("p", {}, now, parts.length > 0 ? ` It holds nothing ${parts.join(", and ")}.` : ""), told };
 }
 
-/** The ways to another policy like it. */
+/** Returns the links to train a similar policy. */
 function again(id) {
   return h(
     "p",
@@ -123,7 +123,7 @@ function surface({ policy: id, specification, diagnostics }, told, leaving) {
   return section("What it holds", holder);
 }
 
-/** One line for a manager, and the rest for the quant. */
+/** Shows one line for a manager, and the rest for the quant. */
 function solved(specification, diagnostics) {
   const widest = Math.max(...diagnostics.map(({ duality_gap }) => duality_gap));
   const error = ({ expected_error, value }) => (expected_error ? 1e-4 * expected_error.total : (value?.leave_one_out_error ?? 0));

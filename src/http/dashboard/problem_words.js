@@ -3,32 +3,32 @@
 import { wealth } from "./format.js";
 
 const MINUS = "\u2212";
-/** What the service's parser calls the types of numbers. */
+/** The parser's names for types of numbers, and the page's. */
 const WANTED = [
   [/expected (u8|u16|u32|u64|usize)/, "a whole number, zero or more"],
   [/expected (i32|i64)/, "a whole number"],
   [/expected (f32|f64)/, "a number without thousands separators"],
 ];
-/** What else the parser says before what it wants. */
+/** The start of a parser's message, before what it expects. */
 const PARSER = /^(?:invalid (?:type|value|length)|unknown (?:variant|field)|missing field)[^]*?, expected /;
 const BOUNDS = /(lies?|be a number|be a whole number)? ?in ([[(])(-?[\d.e+-]+), (-?[\d.e+-]+)([\])])/;
 
-/** What a rule names by its place in the request; `ahead` is the label of the field that says how far is looked ahead. */
+/** Replacements for the names of request fields in a rule; `ahead` is the label of the field for the horizon. */
 const places = (ahead) => [
   [/problem\.horizon = (?=\d)/g, ""],
   [/problem\.contributions/g, "the money added"],
   [/(?:the )?(?:problem\.)?\bhorizon\b/g, ahead ? `\u201c${ahead}\u201d` : "the number of periods ahead"],
   [/(?<=\bgive a wealth of )-?[\d.e+-]+/g, (amount) => wealth(Number(amount))],
 ];
-/** What the parser of days says of what is none. */
+/** The messages of the parser of dates. */
 const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|date)\b/;
 
-/** One sentence for a problem with a `rule`; `unit` is that of the field where it is not the request's: "percent", or "confidence",
- * which is what a share leaves of 100 %; `ahead` as above, where the form has such a field. */
+/** Returns one sentence for a problem with a `rule`. `unit` is that of the field, if it differs from the request's: "percent", or "confidence",
+ * which is 100 % minus the request's share. `ahead` is as above, if the form has such a field. */
 export function problemWords({ value, rule }, label, unit, ahead) {
   const name = label.replace(/, %(?=$|,)/, "");
   const words = ruled(rule, unit, ahead);
-  // Of what is asked for and cannot be had, the rule says why, and does not bound a value.
+  // A rule without "must" gives a reason instead of a bound on the value.
   return /^must\b/.test(words) ? `${name} ${given(value, unit)}; it ${words}.` : `${name}: ${words}.`;
 }
 
@@ -56,10 +56,10 @@ function ruled(rule, unit, ahead) {
   });
 }
 
-/** A number in the field's unit; bounds in percent are rounded inward, so that what is told is taken. */
+/** Formats a number in the field's unit; bounds in percent are rounded inward, so that the bounds shown are accepted. */
 function number(value, unit, round = Math.round) {
   const size = unit === "confidence" ? 1 - Number(value) : Number(value);
-  // Inward, but not by what a double is off.
+  // Removes the error of the double first, so that it does not change the rounding.
   const shown = unit ? round(Number((1e4 * size).toPrecision(12))) / 100 : size;
   const text = shown.toLocaleString("en-GB", { maximumFractionDigits: 6, useGrouping: "min2" }).replace("-", MINUS);
   return unit ? `${text}\u202f%` : text;

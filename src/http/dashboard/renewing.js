@@ -11,9 +11,9 @@ import { standing } from "./flows.js";
 import { policyChoices } from "./session_opening.js";
 import { requestOf } from "./train.js";
 
-/** The choice to train the policy of each session anew. */
+/** The choice to retrain the policy of each session. */
 const ANEW = "anew";
-/** Letters of a name that the service takes. */
+/** Most letters of a name that the service accepts. */
 const LONGEST_NAME = 100;
 
 /** `query`: `sessions=A,B`. */
@@ -26,14 +26,14 @@ export async function view(query, leaving) {
   return { title, trail, body: renewing(sessions, policies, leaving) };
 }
 
-/** All returns that a session has seen, its record's first; of several assets date by date. */
+/** Returns all returns that a session has seen, its record's first; for several assets date by date. */
 export function recordOf({ history, observations, assets }) {
   const stands = (row) => row.now ?? row;
   const returns = (row) => (assets ? assets.map((name) => stands(row).assets.log_returns?.[name] ?? null) : stands(row).log_return);
   return [...history, ...observations.map(returns).filter((one) => ![one].flat().includes(null))];
 }
 
-/** What a policy is called that is trained anew of another. */
+/** Returns the name of a policy that is retrained from another. */
 function renewedName(name, now) {
   const month = now.toLocaleDateString("en-GB", { month: "short", year: "numeric" });
   const stem = name.split(" (renewed ")[0];
@@ -41,7 +41,7 @@ function renewedName(name, now) {
   return stem === "" ? `R${when.slice(1)}` : `${[...stem].slice(0, LONGEST_NAME - when.length - 3).join("")} (${when})`;
 }
 
-/** The training of the policy of a session on all that it has seen, at the wealth it has reached, if that matters to the policy. */
+/** Returns the request to retrain a session's policy on all returns it has seen, at its current wealth if the policy depends on wealth. */
 export function anew(session, history, { specification, name }, now) {
   const request = requestOf(specification);
   const { problem, design } = request;
@@ -80,7 +80,7 @@ function renewing(sessions, policies, leaving) {
     outcomes.get(session).textContent = words;
     outcomes.get(session).classList.toggle("wrong", wrong);
   };
-  /** Trainings by what they are asked, so that sessions of one record and one policy share one. */
+  /** Trainings by their request, so that sessions with the same record and policy share one. */
   const trainings = new Map();
   const trained = async (session) => {
     const [history, policy] = await Promise.all([get(`/sessions/${session.session}/history`, leaving), get(`/policies/${session.policy}`, leaving)]);

@@ -12,11 +12,11 @@ import { problemWords } from "./problem_words.js";
 
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "Not known" };
 
-/** What the service takes. */
+/** The bounds that the service accepts. */
 export const LIMITS = { log_return: [-5, 5], simple_return: [-5, 5].map(Math.expm1), share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
 
-/** The fields for a period, with what is `advised` and the policy's rate and contribution as what they are where nothing is said, and
- * its last day as it most likely is; `advised` is null where that is what was advised then. */
+/** Returns the fields for a period. Blank fields mean the `advised` share and the policy's rate and contribution; the last day is filled in as
+ * expected. `advised` is null if it is the advice of that time. */
 export function reportFields({ within, label, advised, rate, contribution, date: likely = null, changed }) {
   const edited = () => changed?.();
   const given = input({
@@ -58,7 +58,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
   const isMissing = () => kind.control.value === "missing";
   return {
     element: h("div", {}, h("div", { class: "fields" }, given.element, date.element, kind.element), more),
-    /** What was reported, into the fields. */
+    /** Fills the fields with what was reported. */
     fill(report, logReturn) {
       const texts = new Map([[held, report.executed_allocation], [paid, report.rate]].map(([field, share]) => [field, inPercent(share)]));
       for (const [field, value] of [[flow, report.flow], [reached, report.wealth], [date, report.date]]) texts.set(field, value ?? "");
@@ -67,7 +67,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
       texts.set(given, logReturn === null ? "" : inPercent(report.simple_return ?? Math.expm1(logReturn)));
       for (const [field, text] of texts) field.control.value = text;
     },
-    /** What `foretold` reads; null where something cannot be read. */
+    /** Returns the values for `foretold`; null if a field cannot be read. */
     read() {
       const blank = (field, otherwise, read) => (field.control.value.trim() === "" ? otherwise : read(field.control.value));
       const value = isMissing() ? 0 : fraction(given.control.value);
@@ -80,7 +80,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
       const numbers = [[given, value, returned], [held, executed, LIMITS.share], [paid, rateThen, LIMITS.rate], [reached, ended, LIMITS.wealth]];
       return { parts: [{ held: executed, growth }], rate: rateThen, added, ended, missing: isMissing(), numbers, flow, reached };
     },
-    /** The report; fields that cannot be read go as they are typed, for the service to refuse by name. */
+    /** Returns the report; fields that cannot be read are sent as typed, so that the service refuses them by name. */
     report() {
       const report = isMissing() ? { missing: true } : { [kind.control.value]: fraction(given.control.value) };
       const texts = [
@@ -94,7 +94,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
         if (control.value.trim() !== "") report[name] = read(control.value.trim()) ?? control.value;
       return report;
     },
-    /** What keeps it from being sent, if anything does. */
+    /** Returns what is wrong with the report, or null. */
     trouble() {
       if (isMissing() || fraction(given.control.value) !== null) return null;
       const text = given.control.value.trim();
@@ -104,12 +104,11 @@ export function reportFields({ within, label, advised, rate, contribution, date:
   };
 }
 
-/** A share as it is typed in percent. */
+/** Returns a share as it is typed in percent. */
 export const inPercent = (share) => (share === null || share === undefined ? "" : String(Number((100 * share).toPrecision(12))));
 
-/** What a report makes of `wealth`, or why it will be refused, in the words of its refusal. Of what is read, `parts` are the shares
- * held of each asset and their growths, beside what was held `before`, and `numbers` the fields with what is said in them and what
- * the service takes. */
+/** Says what a report makes of `wealth`, or why it will be refused, in the words of the refusal. In `read`, `parts` are the shares held of each
+ * asset and their growths, `numbers` are the fields with their values and bounds. `before` are the shares held before. */
 export function foretold(read, { wealth: now, before, cost }) {
   const { parts, rate, added, ended, missing, numbers, flow, reached } = read;
   const refused = ({ element, control }, value, rule) =>
@@ -131,10 +130,10 @@ export function foretold(read, { wealth: now, before, cost }) {
 }
 
 /**
- * Sends what `compose` makes of the form to `path`, once at a time, and then has the session shown anew by `refresh`. What is
- * sent again after a failure is the very same request; `once` says why that is safe. What the service doubts is asked below the
- * form, and `numbered(request, count)` is the request once so many periods were reported as missing before it. What somebody else
- * reported meanwhile stays on the page beside what was typed.
+ * Sends the request that `compose` makes to `path`, one at a time, then shows the session again by `refresh`. After a failure the same request
+ * is sent again; `once` says why that is safe. A doubt of the service is shown as a question below the form, and
+ * `numbered(request, count)` is the request after `count` missing periods were reported before it. If somebody else reported meanwhile,
+ * their report is shown beside what was typed.
  */
 export function sendReports(form, { button, message, fields, path, compose, once, done, numbered, session, calendar, refresh }) {
   let request = null;
@@ -169,7 +168,7 @@ export function sendReports(form, { button, message, fields, path, compose, once
     await send();
     button.disabled = false;
   });
-  /** Reports the missing periods one by one, each once, and then the one that was typed. */
+  /** Reports the missing periods one by one, then the one that was typed. */
   const fill = (refusal) => async (days) => {
     for (const [index, date] of days.entries()) await post(path, { session: refusal.session, period: refusal.period + index, missing: true, date });
     request = numbered(refusal, days.length);
@@ -201,15 +200,15 @@ export function sendReports(form, { button, message, fields, path, compose, once
   };
 }
 
-/** What a report says of its return. */
+/** Says the return of a report. */
 function returnWords({ simple_return, log_return, simple_returns, missing }) {
   if (missing) return "a missing period";
   if (simple_returns) return Object.entries(simple_returns).map(([name, back]) => `${name} ${percent(back, 2)}`).join(", ");
   return percent(simple_return ?? Math.expm1(log_return), 2);
 }
 
-/** That a report was not recorded, since somebody else was faster: what stands, what was typed, and a button that puts it right.
- * `show(history)` gives it once the session is read anew. */
+/** Says that a report was not recorded because somebody else was faster: shows what is recorded, what was typed, and a button that corrects
+ * it. The result takes the history that is read again. */
 const overtaken = (refusal, now, { calendar, refresh }) => ({ observations }) => {
   const { session, correction, confirm, reason, ...report } = refusal;
   const row = observations[report.period - 1];

@@ -5,12 +5,12 @@ import { short } from "./format.js";
 import { fraction, hundredth, typed } from "./number_text.js";
 import { day, dayOf } from "./periods.js";
 
-/** So much of an identifier tells whose it is. */
+/** Least letters of an identifier that name a session. */
 const LEAST = 6;
-/** A session that reported so lately, in milliseconds, may be in the list twice. */
+/** A session that reported within this time, in milliseconds, may be in the list by mistake. */
 export const LATELY = 3_600_000;
 
-/** What heads a column, by what it says. */
+/** The accepted headings of each column. */
 const COLUMNS = {
   client: ["client", "session", "name", "investor", "account", "identifier", "id"],
   simple_return: ["return", "gain", "gain or loss", "performance"],
@@ -21,22 +21,22 @@ const COLUMNS = {
   date: ["date", "last day", "day"],
   period: ["period"],
 };
-/** The first word of each, for people. */
+/** The first heading of each, shown to users. */
 export const HEADS = Object.values(COLUMNS).map(([head]) => head);
 const SHARES = ["simple_return", "executed_allocation", "rate"];
 
-/** Returns that vary so much less, or more, than the records of their sessions are most likely in another unit. */
+/** Returns that vary this much less or more than the records of their sessions are most likely in another unit. */
 const FAR = { less: 0.035, more: 10 };
-/** So few unusual returns are asked about one by one. */
+/** Fewer returns are not enough to doubt the unit: the service asks about each unusual one. */
 const FEW = 3;
 
 const folded = (text) => text.trim().toLowerCase();
-/** What a column is called, without its unit. */
+/** The unit at the end of a heading. */
 const PERCENT = /[,\s]*(?:%|\(%\)|in percent)$/;
 const headOf = (cell) => folded(cell).replace(PERCENT, "").replaceAll("_", " ");
 const columnOf = (head) => Object.keys(COLUMNS).find((name) => COLUMNS[name].includes(head));
 
-/** `find(text)`: the sessions that a text names, by their names, or else by their identifiers. */
+/** Returns `find(text)`, which finds the sessions that a text names: by name, otherwise by identifier. */
 export function finder(sessions) {
   const index = (keyOf) => {
     const found = new Map();
@@ -59,9 +59,9 @@ export function finder(sessions) {
 }
 
 /**
- * What the unit of the returns of rows seems to be where it is not the one they are read in: `"fraction"` where all that say no percent
- * lie below a hundredth or so of what the records of their sessions vary by, `"hundredth"` where most lie a hundred times above, or
- * null. `deviationOf(entry)` is the deviation of a session's record, undefined while it is not known.
+ * Guesses the unit of returns that do not look like percent. Returns `"fraction"` if all returns without a percent sign are far smaller than
+ * the usual variation in the records of their sessions, `"hundredth"` if most are far larger, otherwise null. `deviationOf(entry)` is the
+ * deviation of a session's record, undefined while it is not known.
  */
 export function otherUnit(rows, deviationOf) {
   const told = rows.filter(({ trouble, said }) => trouble === null && !said).flatMap(({ entry, report }) => {
@@ -74,22 +74,22 @@ export function otherUnit(rows, deviationOf) {
   return told.length >= FEW && told.sort((a, b) => a - b)[told.length >> 1] > FAR.more ? "hundredth" : null;
 }
 
-/** What a session is written as: its name, where no other has it. */
+/** Returns how a session is written in a line: its name if it is unique, otherwise its identifier. */
 export const written = (find, { session, name }) => (name && find(name).length === 1 ? name : short(session));
 
 const saysPercent = (text) => text.endsWith("%");
 
-/** Reads a share in `unit`: `percent`, `fraction` or `hundredth` of a percent; one with a percent sign is that. */
+/** Returns a reader of shares in `unit`: `percent`, `fraction` or `hundredth` of a percent. A percent sign takes precedence. */
 export const inUnit = (unit) => (text) => {
   const value = fraction(text);
   if (value === null || saysPercent(text) || unit === "percent") return value;
   return unit === "fraction" ? typed(text) : hundredth(value);
 };
 
-/** The ways in which a line may be a name and a number, the likeliest first. */
+/** The ways to split a line into a name and a number, the likeliest first. */
 const SPLITS = [/^(.*)[\t;]\s*([^\t;]*)$/, /^(.*)\s([^\s]+(?:\s*%)?)$/, /^([^,]*),(.*)$/];
 
-/** A line as its sessions, `found`, what it says of the period, `report`, and what is wrong with it, or null. */
+/** Reads a line: the sessions `found`, the `report` of the period, and the `trouble` with it, or null. */
 function readLine(line, find, scaled) {
   const whole = find(line);
   if (whole.length > 0) return { found: whole, report: {}, trouble: null };
@@ -102,17 +102,17 @@ function readLine(line, find, scaled) {
   return { found: find(name), report: {}, trouble: number === "" ? null : `\u201c${number}\u201d is not a percentage` };
 }
 
-/** The header of a table and the rows below it; null where the first line heads none. */
+/** Returns the header of a table and its rows; null if the first line is not a header. */
 function tableOf(text) {
   const first = text.split("\n").find((line) => line.trim() !== "") ?? "";
   const mark = ["\t", ";"].find((mark) => first.includes(mark)) ?? ",";
   const [header, ...rows] = csvRows(text, mark);
-  // Of what is said by two columns, which may be two ways to name the client, the first alone is read.
+  // Of two columns with one heading only the first is read, except that several may name the client.
   const heads = (header?.cells ?? []).map(headOf).map((head, index, all) => (columnOf(head) !== "client" && all.indexOf(head) < index ? null : head));
   return heads.some((head) => columnOf(head) === "client") ? { header, heads, rows } : null;
 }
 
-/** A cell of a share, an amount, a day or a period; null where it is none. */
+/** Reads a cell of a share, an amount, a day or a period; null if it is not valid. */
 function cellValue(name, text, scaled) {
   if (name === "date") return dayOf(text);
   const value = SHARES.includes(name) ? scaled(text) : typed(text);
@@ -121,7 +121,7 @@ function cellValue(name, text, scaled) {
 
 const WANTED = { date: "a date such as 2008-09-30", period: "a period number", flow: "a number", wealth: "a number" };
 
-/** What a column says of a session of `assets`, none where it has one: `[list, asset]`, `[field]` or null. */
+/** Returns the meaning of a column for a session of `assets`, which are null for one asset: `[list, asset]`, `[field]` or null. */
 function meant(head, assets) {
   for (const name of assets ?? []) {
     if (head === folded(name)) return ["simple_returns", name];
@@ -151,7 +151,7 @@ function readRow({ cells }, { header, heads }, find, assetsOf, scaled) {
   return read;
 }
 
-/** What keeps a report from being sent, or null. */
+/** Returns what is wrong with a report, or null. */
 function wrong({ found, name }, { period, ...report }, { assetsOf, lately }) {
   if (found.length > 1) return `${found.length} sessions have this name: use the identifier`;
   const [entry] = found;
@@ -171,12 +171,11 @@ function wrong({ found, name }, { period, ...report }, { assetsOf, lately }) {
 }
 
 /**
- * The rows of a text as `{rows, header, unread}`: each row `{line, text, entry, report, trouble}` with the line it stands in, the session
- * it names, what it says of the period, and what is wrong with it, or null. `header` is the first line where it heads columns, and
- * `unread` the columns that nothing is read from. `all` says what holds for the rows that say nothing of their own: `{simple_return, date}`.
- * `assetsOf(policy)` are the names of its assets, null where it has one, undefined while that is not known; `lately(entry)` whether a
- * session reported so lately that it may be in the text by mistake; `unit` is what shares without a percent sign are in. Of a session that is named twice neither row is taken: nobody can
- * know which is meant.
+ * Reads a text as `{rows, header, unread}`. Each row is `{line, text, entry, report, trouble}`: its line, the session it names, its report of
+ * the period, and what is wrong with it, or null. `header` is the first line if it heads columns, `unread` the columns that are ignored.
+ * `all` is `{simple_return, date}` for rows without their own. `assetsOf(policy)` are the names of its assets: null for one asset, undefined
+ * while unknown. `lately(entry)` tells whether a session reported so recently that it may be in the text by mistake. `unit` is that of shares
+ * without a percent sign. If a session is named twice, both rows are refused, because nobody can know which one is right.
  */
 export function readLines(text, find, all, { assetsOf, lately, unit = "percent" }) {
   const [table, scaled] = [tableOf(text), inUnit(unit)];

@@ -7,10 +7,10 @@ import { dated, unitOf } from "./periods.js";
 
 export const KINDS = { train: "Training", evaluate: "Evaluation", backtest: "Backtest", frontier: "Frontier of caution" };
 
-/** A job of which no more is known, beside its kind. */
+/** Describes a job by its time, if nothing else is known besides its kind. */
 export const byDay = ({ created_ms }) => `, ${moment(created_ms)}`;
 
-/** So many assets are named in a title. */
+/** Most assets named in a title. */
 const NAMED = 3;
 
 function ofAssets(assets) {
@@ -35,13 +35,13 @@ const ABOUT = {
   frontier: ({ request: { problem } }) => `${ofAssets(problem.assets)}${onRecord(problem)}`,
 };
 
-/** What the report of a job of some kind is about, to stand behind the kind. */
+/** Returns what a report is about, as the text after its kind in a title. */
 export const about = async (kind, report, signal) => ABOUT[kind](report, signal);
 
-/** What is in a report does not change; what a policy is called does. */
+/** Titles by job: the content of a report does not change, but the name of a policy may. */
 const known = new Map();
 
-/** As `about`, to `then`, once `element` is seen: a report is long, and most of a list is not looked at. */
+/** Passes the result of `about` to `then` once `element` is visible: reports are long, and most of a list is never seen. */
 export function whenSeen(element, { job, kind, report }, then) {
   const observer = new IntersectionObserver(async ([{ isIntersecting }]) => {
     if (!isIntersecting) return;

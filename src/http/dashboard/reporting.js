@@ -14,10 +14,10 @@ import { dayOf, isoDay, lastEnd } from "./periods.js";
 import { problemWords } from "./problem_words.js";
 import { finder, HEADS, inUnit, LATELY, otherUnit, readLines, written } from "./report_lines.js";
 
-/** The service takes so many reports in one call. */
+/** Most reports that the service accepts in one call. */
 const AT_ONCE = 1000;
 
-/** `query`: `sessions=A,B` puts those into the table. */
+/** `query`: `sessions=A,B` puts those sessions into the lines. */
 export async function view(query, leaving) {
   const sessions = await all("/sessions", "sessions", leaving);
   const asked = (new URLSearchParams(query ?? "").get("sessions") ?? "").split(",");
@@ -26,11 +26,11 @@ export async function view(query, leaving) {
   return { title: "Report for several", trail, body: reporting(sessions, chosen, leaving) };
 }
 
-/** What the returns without a percent sign are in, where that is asked. */
+/** The units of returns without a percent sign, if the page asks. */
 const UNITS = { "": "Choose one", percent: "Percent: 1.2 is 1.2 %", fraction: "Fractions: 0.012 is 1.2 %", hundredth: "Hundredths of a percent: 120 is 1.2 %" };
 
-/** `{of(policy), deviation(policy), read(policies)}`: the names of a policy's assets, null where it has one, and the deviation of the
- * record it was trained on; undefined until it is read. */
+/** Returns `{of(policy), deviation(policy), read(policies)}`: the names of a policy's assets, null for one asset, and the deviation of its
+ * record; both undefined until the policy is read. */
 function policiesRead(leaving) {
   const [known, deviations] = [new Map(), new Map()];
   const asked = new Set();
@@ -53,7 +53,7 @@ function reporting(sessions, chosen, leaving) {
   const find = finder(sessions);
   const policies = policiesRead(leaving);
   let [rows, header, isOpen] = [[], null, false];
-  // What was doubted in the last list, by session: it alone can be meant, and as it is it is not sent without that.
+  // The reports doubted in the last list, by session: only these can be confirmed, and unchanged they are sent only if confirmed.
   const doubted = new Map();
   const isDoubted = ({ entry, report }) => doubted.get(entry.session) === said(report);
   const lines = area({
@@ -108,7 +108,7 @@ function reporting(sessions, chosen, leaving) {
     const unknown = [...new Set(rows.flatMap(({ entry }) => (entry && policies.of(entry.policy) === undefined ? [entry.policy] : [])))];
     if (unknown.length > 0) policies.read(unknown).then((found) => found.length > 0 && look(), (error) => leaving.aborted || say(error.message));
   };
-  // A browser may tell of what is pasted line by line.
+  // A browser may send the input events of a pasted text line by line.
   let waiting = 0;
   const soon = () => {
     clearTimeout(waiting);
@@ -136,7 +136,7 @@ function reporting(sessions, chosen, leaving) {
         }
       }
     } finally {
-      // What is not recorded stays for another try, also where a later list was not answered.
+      // Unrecorded lines stay for another try, even if a later call failed.
       const left = rows.filter((row) => !recorded.has(row)).map(({ text }) => text);
       lines.control.value = (left.length > 0 && header !== null ? [header, ...left] : left).join("\n");
       next.checked = false;
@@ -151,7 +151,7 @@ function reporting(sessions, chosen, leaving) {
     heading.focus();
     announce(words);
   };
-  /** Reports the periods that are missing before some reports as missing, one of each session at a time, and then those reports. */
+  /** Reports the missing periods as missing, one of each session at a time, then sends the reports after them. */
   const fill = async (gaps) => {
     const most = Math.max(...gaps.map(({ days }) => days.length));
     for (let index = 0; index < most; index += 1) {
@@ -198,13 +198,13 @@ function reporting(sessions, chosen, leaving) {
   return [form, outcome];
 }
 
-/** Why the unit is asked. */
+/** The reasons to ask for the unit. */
 const DOUBTS = {
   fraction: "Read as percent, all of these returns are less than a twentieth of the usual variation in the records of their sessions. Are they fractions?",
   hundredth: "Read as percent, most of these returns are more than ten times the usual variation in the records of their sessions. What unit are they in?",
 };
 
-/** `[box, element]`: something to be said by a tick, hidden until it may be asked. */
+/** Returns `[box, element]`: a checkbox with its text, hidden at first. */
 function tick(name, words, changed) {
   const box = h("input", { type: "checkbox", name, onchange: changed ?? null });
   return [box, h("div", { class: "field checks", hidden: true }, h("label", {}, box, words))];
@@ -215,7 +215,7 @@ function looked(rows, ready) {
   return h("p", { class: "sentence", role: "status" }, `${counted(ready, "return is", "returns are")} ready${bad > 0 ? `, and ${counted(bad, "line is", "lines are")} not` : ""}.`);
 }
 
-/** The active sessions that no row reports, which a list may have left out by mistake. */
+/** Lists the active sessions without a row, which may have been left out by mistake. */
 function withoutLine(sessions, rows) {
   const named = new Set(rows.map(({ entry }) => entry?.session));
   const left = sessions.filter(({ session, state }) => state === "active" && !named.has(session));
@@ -224,21 +224,21 @@ function withoutLine(sessions, rows) {
   return disclosure(`${counted(left.length, "active session")} ${left.length === 1 ? "has" : "have"} no line`, names);
 }
 
-/** That nothing is read from some columns, and what would be. */
+/** Says which columns are ignored, and which names are read. */
 function leftOut(columns) {
   if (columns.length === 0) return "";
   const names = columns.map((name) => `\u201c${name}\u201d`).join(", ");
   return h("p", { class: "note wrong" }, `Nothing is read from ${columns.length === 1 ? "the column" : "the columns"} ${names}. Use the names ${HEADS.join(", ")} or the name of an asset of these sessions, each once.`);
 }
 
-/** What is said of a period, to tell whether it is something else. */
+/** Returns the key of a report, to tell whether it was changed. */
 const said = ({ simple_return, simple_returns, date }) => JSON.stringify([simple_return, simple_returns, date]);
 
-/** Where a session stands after an answer. */
+/** Updates a session after an answer. */
 const follow = (entry, { period, answer: { wealth, date, completed } }) =>
   Object.assign(entry, { period: Math.max(entry.period, period + 1), wealth, date, last_report_ms: Date.now(), state: completed ? "completed" : entry.state });
 
-/** The day that most of the sessions have next, unless it is still to come; of those that never said a day the end of the last period. */
+/** Returns the next date of most sessions that is not in the future; sessions without dates count with the end of the last period. */
 function likelyDay(sessions, today) {
   const counts = new Map();
   for (const { state, date, next, periods_per_year } of sessions) {
@@ -254,7 +254,7 @@ const byName = (shares, digits) => Object.entries(shares).map(([name, share]) =>
 
 const returned = ({ report }) => (report.simple_returns ? byName(report.simple_returns, 2) : percent(report.simple_return, 2));
 
-/** What else a row says of the period. */
+/** Returns the other fields of a row. */
 function besides({ report }) {
   const { executed_allocation, executed_allocations, rate, flow, wealth: reached, date } = report;
   const words = [
@@ -269,7 +269,7 @@ function besides({ report }) {
 
 const isBeside = ({ report }) => Object.keys(report).some((name) => !["simple_return", "simple_returns", "period"].includes(name));
 
-/** So many rows are drawn at once: a list of thousands would be drawn anew at every letter. */
+/** Most rows drawn at once, because the list is drawn again at every letter. */
 const DRAWN = 100;
 
 const firstFew = (rows, draw) => {
@@ -301,7 +301,7 @@ const outcomes = (told, advice) => {
 
 const wrongLine = (line, words) => h("span", { class: "under wrong" }, `Line ${count(line)}: ${words}`);
 
-/** What the fields of a report are called here, and their units. */
+/** The names of a report's fields on this page, and their units. */
 const FIELDS = {
   simple_return: ["The return", "percent"],
   simple_returns: ["The return", "percent"],
@@ -313,7 +313,7 @@ const FIELDS = {
   date: ["The last day"],
 };
 
-/** Why a report was refused, in the words and the unit of the form. */
+/** Says why a report was refused, in the words and the unit of the form. */
 function refused(problem) {
   const { type, title, detail, field, value, rule } = problem;
   if (type === UNCONFIRMED) return doubtWords(problem).join(" ");

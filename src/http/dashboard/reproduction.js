@@ -9,7 +9,7 @@ import { colourOf, colourOfMix } from "./strategies.js";
 import { interval } from "./verdict.js";
 
 const STATISTICS = [["mean", "Mean"], ["variance", "Variance"], ["quantile_20", "20 % quantile"], ["quantile_90", "90 % quantile"], ["max", "Most"], ["min", "Least"]];
-/** Columns of the paper's tables and the frameworks they are of. */
+/** The columns of the paper's tables, with their frameworks and names. */
 const PRINTED = { adaptive: ["adaptive", "Adaptive robust"], known_law: ["known_law", "True law"], static_robust: ["static", "Static robust"] };
 const BINS = 30;
 
@@ -67,7 +67,7 @@ function quantiles({ quantiles: { shown, drawn, mean }, all }) {
   );
 }
 
-/** A table of the paper and its part of the second figure. */
+/** Shows a table of the paper and its part of the second figure. */
 function whole({ quantile, found, report }, index, printed, { quantiles, all }) {
   const tables = () => Object.entries(PRINTED).map(([column, [framework, name]]) => statistics(`${name}, Q near ${quantile}`, printed[column], find(report, framework), find(all, framework), report, all));
   return section(
@@ -87,7 +87,7 @@ function statistics(name, paper, own, all, report, everywhere) {
   return [h("h3", {}, name), table(name, columns, STATISTICS.map(([key, label], k) => [key, label, k]))];
 }
 
-/** How terminal utility spreads, on one scale. */
+/** Draws the distribution of terminal utility, on one scale. */
 function utilities({ strategies, histogram_edges: edges }) {
   const some = ["adaptive", "known_law"].map((name) => find({ strategies }, name)).filter(Boolean);
   const shares = ({ histogram: counts }) => counts.map((one) => one / counts.reduce((sum, other) => sum + other, 0));
@@ -96,7 +96,7 @@ function utilities({ strategies, histogram_edges: edges }) {
   return h("div", { class: "duo" }, some.map(drawn));
 }
 
-/** Mean and variance of all strategies, and what they held. */
+/** Draws mean and variance of all strategies, and what they held. */
 function mixes(all, printed) {
   const points = all.strategies.map((one) => ({ one, at: one.utility.variance.value, mean: one.utility.mean.value, constant: one.constant_mix !== null }));
   const paper = printed.map(({ adaptive: [mean, variance] }) => ({ at: variance, mean, paper: true }));

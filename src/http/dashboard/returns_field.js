@@ -17,30 +17,29 @@ const KINDS = {
 };
 const UNITS = { percent: "Percent (1.2)", fraction: "Fractions (0.012)" };
 const ORDERS = { false: "The oldest", true: "The newest" };
-/** Numbers are not judged while they are being typed, for so long, in milliseconds. */
+/** Pause in typing before the text is read, in milliseconds. */
 const PAUSE = 300;
-/** A longer text, in letters, is judged when its field is left. */
+/** A longer text, in letters, is read only when the field is left. */
 const LONG = 200_000;
-/** The service takes no longer history, and a chart shows no more. */
+/** The longest history that the service accepts and a chart shows. */
 const MOST = 20_000;
-/** Months of the US stock market. */
+/** Monthly returns of the US stock market. */
 const EXAMPLE = "/dashboard/us_market_monthly.csv";
-/** More lines than these are not told apart. */
+/** Most lines of a chart that can be told apart. */
 const LINES = 7;
 const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolons, tabs or lines.";
-/** What was said of these is asked anew once another column or kind is chosen. */
+/** The answers that are dropped when another column or kind is chosen. */
 const FOLLOWS = {
   columns: ["kind", "unit", "unusual", "excess", "decimal_comma"],
   kind: ["unit", "unusual", "excess"],
 };
 
 /**
- * `{element, show(history, assets), trouble(), typed(), restore(typed)}`; `changed(series, answer)` at every change, with the series that were read, `{column,
- * log_returns}`, and all that the service answered; with none and null while the text is not one reading. With `several` more than
- * one column may be chosen. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
- * request's field; `blank` is what an empty field means, where it may be empty; `example` what is said of the bundled returns
- * where they are offered; `bank(rate, periodsPerYear)` takes what a
- * column says that the bank paid last.
+ * Returns `{element, show(history, assets), trouble(), typed(), restore(typed)}`. `changed(series, answer)` is called at every change, with
+ * the series read, `{column, log_returns}`, and the service's answer; with none and null while the text has no single reading. With
+ * `several`, more than one column may be chosen. `trouble()` waits for a pending reading and says why there are no returns, or null. `name`
+ * is the request's field. `blank` says what an empty field means, if it may be empty. `example` holds the choices for the bundled returns, if
+ * they are offered. `bank(rate, periodsPerYear)` takes the bank's latest rate from a column.
  */
 export function returnsField({ name, label, blank = null, example = null, several = false, changed, bank = null }) {
   const id = `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
@@ -122,7 +121,7 @@ export function returnsField({ name, label, blank = null, example = null, severa
     area.value = assets ? [assets, ...history].map((row) => row.join("\t")).join("\n") : history.join(" ");
     reading = judge();
   };
-  /** What was typed and said of it, as `restore` takes it. */
+  /** Returns the text and the answers about it, for `restore`. */
   const typed = () => ({ text: area.value, said });
   const restore = ({ text, said }) => open(text, said);
   const element = h(
@@ -140,10 +139,10 @@ const words = ({ sentence, questions }) => {
   return minus(said.charAt(0).toUpperCase() + said.slice(1));
 };
 
-/** What is typed is mended word by word and keeps what was said of it; what is pasted is another text. */
+/** Tells whether the text is edited by typing, which keeps the answers about it; pasting starts a new text. */
 const isTyping = ({ inputType = "" }) => /^(insertText|insertLineBreak|deleteContent|deleteWord)/.test(inputType);
 
-/** Where a file is chosen or dropped, and where the example is offered if there is one: what is known of that. */
+/** Returns the zone for a file, with the example if `example` gives its choices. */
 function drop(id, open, example) {
   const zone = fileDrop(id, open);
   if (!example) return zone;
@@ -153,7 +152,7 @@ function drop(id, open, example) {
   return zone;
 }
 
-/** What a person can say of the text: the answers to questions, the place of a fault, or another reading. */
+/** Shows what the user can do about the text: answer questions, go to a fault, or choose another reading. */
 function below(answer, { said, say, forget, area, bank, several }) {
   const again = h("button", { type: "button", class: "link", onclick: forget }, "Discard the answers");
   const isSaid = Object.keys(said).some((name) => name !== "latest");
@@ -171,8 +170,8 @@ function below(answer, { said, say, forget, area, bank, several }) {
   }
 }
 
-/** Each question with its answers as radio buttons, of columns as boxes to tick where `several` may be chosen, and one button that
- * takes them all. */
+/** Shows each question with its answers as radio buttons, or as checkboxes for columns if `several` may be chosen, and one button for all
+ * answers. */
 function questions(asked, say, several) {
   const isMany = ({ asks }) => several && asks === "columns";
   const group = (one) =>
@@ -212,7 +211,7 @@ function shown({ line, value }, area) {
   return h("button", { type: "button", class: "link", onclick: go }, "Show the place");
 }
 
-/** Choices that read the same text otherwise. */
+/** Shows the choices that read the same text in another way. */
 function otherwise({ columns, series, dates, newest_first, count: all }, said, say, several) {
   const [{ column, kind, unit }] = series;
   const taken = series.map(({ column }) => column);
@@ -240,7 +239,7 @@ function otherwise({ columns, series, dates, newest_first, count: all }, said, s
   ];
 }
 
-/** The columns that count, each an asset; all are of one kind. */
+/** Shows the columns to use, each one an asset; all are of one kind. */
 function ticked(values, taken, say) {
   const element = h("div", { class: "field checks", role: "group", "aria-label": "Columns" });
   const boxes = () => [...element.querySelectorAll("input")];
@@ -258,7 +257,7 @@ function ticked(values, taken, say) {
 
 const field = (label, control) => h("div", { class: "field" }, h("label", { for: control.id }, label), control);
 
-/** What a column says of the bank, for the form to take. */
+/** Offers the bank's rate from a column to the form. */
 function offered({ rate: { column, rates }, periods_per_year }, bank) {
   const last = rates.at(-1);
   const use = () => bank(last, periods_per_year);
@@ -272,7 +271,7 @@ function picture({ series, dates }) {
   return lineChart({
     title: `Returns read, ${at(0)} to ${at(values.length - 1)}`,
     height: 130,
-    // Room for half of the last date.
+    // Leaves room for half of the last date.
     x: {
       values: values.map((_, index) => index),
       domain: [0, 1.05 * (values.length - 1)],

@@ -1,15 +1,15 @@
-// How close the advice is to changing, in sentences. It takes some hundred robust steps, so it comes after the rest.
+// How close the advice is to changing, in sentences. This takes about a hundred robust steps, so it is loaded after the rest.
 
 import { get } from "./api.js";
 import { h, section } from "./dom.js";
 import { allocation, count, counted, percent, points } from "./format.js";
 
-/** Frameworks of policies that learn from returns; by the others no return changes the advice. */
+/** The frameworks that learn from returns; with the others no return changes the advice. */
 const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 
 const HEADING = "How close the advice is to changing";
 
-/** `{element, ask()}`: the section, and what fills it from `/action`. */
+/** Returns `{element, ask()}`: the section, and the function that fills it from `/action`. */
 export function nearness({ id, policy, leaving, unit }) {
   const said = (words) => ({ element: section(HEADING, h("p", { class: "sentence" }, words)), ask: async () => {} });
   if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes the advice, because the policy does not learn from new returns.");
@@ -26,10 +26,10 @@ export function nearness({ id, policy, leaving, unit }) {
   return { element: section(HEADING, holder), ask };
 }
 
-/** An advice that an ordinary coming return moves by less than this stays; by more than the second it is near to changing. */
+/** Advice is steady if an ordinary next return moves it by less than the first, and close to changing if by more than the second. */
 const [STEADY, NEAR] = [0.02, 0.1];
 
-/** How near, in one sentence. */
+/** Says how close the advice is to changing, in one sentence. */
 export function headline({ allocation: told, sensitivity: { next_return } }, unit = "period") {
   const move = Math.max(...[next_return.low, next_return.high].map((end) => Math.abs(end.allocation - told)));
   if (move < STEADY) return `It is steady: nine in ten ${unit}s would move it by less than ${points(STEADY, 0)}.`;
@@ -37,7 +37,7 @@ export function headline({ allocation: told, sensitivity: { next_return } }, uni
   return move < NEAR ? `It moves a little: an unusual ${unit} would move it by up to ${by}.` : `It is close to changing: an unusual ${unit} would move it by ${by}.`;
 }
 
-/** What an answer with its sensitivity says. */
+/** Returns the sentences for an answer with its sensitivity. */
 export function sentences(action, unit = "period") {
   const { without_one, next_return, premium } = action.sensitivity;
   return [...lacking(action, without_one), ...coming(action, next_return, unit), ...paying(premium, unit)];
@@ -67,7 +67,7 @@ function coming({ allocation: told }, { to_bank, to_highest, low, high }, unit) 
   ].filter(Boolean);
 }
 
-/** Decimals in which two numbers differ by five units of the last or more: from 2 to 6. */
+/** Returns the decimals, from 2 to 6, at which two numbers differ by at least five units of the last. */
 const deciding = (one, other) => (one === other ? 2 : Math.min(6, Math.max(2, Math.ceil(Math.log10(5 / Math.abs(one - other))))));
 
 function paying({ present, needed, periods_more }, unit) {

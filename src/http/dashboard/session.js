@@ -38,7 +38,7 @@ export async function view(id, leaving) {
     calendar: calendar(history, policy.specification.problem.periods_per_year),
     cautionScale: cautionScale(policy.specification.problem),
   });
-  /** Shows the session anew, with what came of a report: that it is recorded, or what `alert(history)` makes of it. */
+  /** Shows the session again after a report: with a receipt, or with the result of `alert(history)`. */
   const refresh = async (news, alert) => {
     const now = known(...(await Promise.all([get(`/sessions/${id}`, leaving), get(`/sessions/${id}/history`, leaving)])));
     const { session, calendar, history } = now;
@@ -60,14 +60,14 @@ export async function view(id, leaving) {
   return { title: titled("Session", id, session.name), trail, under: [labelled("Session", `/sessions/${id}`, id, session), letterhead(policy)], body: [holder, h("p", { class: "printed note" }, DISCLAIMER), h("p", { class: "end" }, session.state === "active" ? goOn(id) : null, deletion(id, titled("Session", id, session.name)))] };
 }
 
-/** What stands at the end of the page on paper. */
+/** The text at the end of the printed page. */
 const DISCLAIMER = "This is computed from past returns, which do not predict the future. Statements about the worst market hold only for the markets that the record allows.";
 
-/** What the page says on paper alone: of what day it is, and by which policy. */
+/** Returns the line for the printed page only: the day and the policy. */
 const letterhead = ({ policy, name, specification: { problem, fund } }) =>
   h("p", { class: "printed note" }, `${day(isoDay(new Date()))}. ${fund ? `${fund.assets.join(", ")}. ` : ""}By ${name ? `\u201c${name}\u201d` : `policy ${short(policy)}`}, for ${utility(problem.utility)}.`);
 
-/** What one unit of the radius takes from the average return: of a normal law it counts in standard deviations. */
+/** Returns how much one unit of the radius takes from the average return; with a normal law the radius is in standard deviations. */
 const cautionScale = (problem) => (isParametric(problem.framework) ? moments(problem.history).deviation : 1);
 
 async function fill(holder, told) {
@@ -92,7 +92,7 @@ async function fill(holder, told) {
   );
 }
 
-/** The advice with what follows it, `rest`, and how it was found and went. */
+/** Returns the advice, followed by `rest`, and the sections on how it was found and what was held. */
 function ofOne(shown, action, rest) {
   const { id, session, policy, leaving, calendar } = shown;
   const advice = adviceView(action, place(shown, action), rest);
@@ -103,13 +103,13 @@ function ofOne(shown, action, rest) {
   return { advice: advice.element, found: [near.element, worst, caution?.element ?? "", held(shown, action)] };
 }
 
-/** The same of several assets, of which no other caution is advised. */
+/** Returns the same for several assets, without advice for other amounts of caution. */
 function ofSeveral(shown, action, rest) {
   const { assets } = shown.history;
   return { advice: severalAdvice(action, place(shown, action), assets, rest), found: [severalWorst(action, assets, shown.calendar), severalHeld(shown)] };
 }
 
-/** What the advice is about: its period, when it is all for, and in what money. */
+/** Returns the context of the advice: its period, the end of the horizon, and the terms in money. */
 function place({ session, history, policy, calendar }, { period }) {
   const { trading_cost, horizon } = policy.specification.problem;
   const name = calendar.name(period);
@@ -153,7 +153,7 @@ function figures(shown, action) {
   );
 }
 
-/** That the returns no longer come as they came, where they do not. */
+/** Warns that the market has changed, if it has. */
 function changed({ session: { drift } }) {
   if (drift.level === "none") return "";
   const how = drift.level === "alarm" ? "has changed" : "may have changed";
@@ -161,10 +161,10 @@ function changed({ session: { drift } }) {
   return h("p", { class: "note wrong" }, words);
 }
 
-/** The way to another policy for the session, from the coming period on. */
+/** Returns the link to another policy for the session, from the next period on. */
 const goOn = (id, words = "Continue with another policy") => h("a", { class: "button quiet", href: `#/renew?sessions=${id}` }, words);
 
-/** That the policy advises no later period, and nothing follows by itself. */
+/** Warns that this is the policy's last period and that no other policy follows automatically. */
 function ending({ id, session, calendar }) {
   if (session.renew || session.rolling || session.period < session.horizon) return "";
   return h("p", { class: "note wrong" }, `${calendar.name(session.horizon)} is the last period that its policy advises. `, h("a", { href: `#/renew?sessions=${id}` }, "Continue with another policy"), ".");
@@ -184,7 +184,7 @@ function completed({ id, session, history }) {
   );
 }
 
-/** That the next policy is to come, and what keeps it. */
+/** Says that the next policy is due, and what it waits for. */
 function due({ session: { renewal } }) {
   if (!renewal) return "";
   const job = renewal.job ? h("a", { href: "#/jobs" }, "its training") : "its training";
@@ -199,7 +199,7 @@ function due({ session: { renewal } }) {
 
 const held = (shown, action) => section("What it held", h("div", { class: "duo" }, ...holdings(shown, action)));
 
-/** What more or less caution would lose, where the policy has a ball. */
+/** Offers the frontier of caution, if the policy has a ball. */
 function frontier({ session, policy, history, canTry }) {
   const { problem } = policy.specification;
   if (!canTry || !hasBall(problem)) return "";

@@ -19,7 +19,7 @@ export async function view(query, leaving) {
 
 function opening(policies, asked, leaving) {
   const labels = labelFields();
-  // Of several nobody knows which is meant.
+  // With several policies the user must choose one.
   const unchosen = policies.length > 1 ? [["", "Choose one"]] : [];
   const policy = select({ name: "policy", label: "Policy", choices: [...unchosen, ...policyChoices(policies)] });
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
@@ -53,7 +53,7 @@ function opening(policies, asked, leaving) {
   const shares = h("div", { class: "fields", hidden: true });
   let usual = "";
   const goingNote = going.element.querySelector(".note");
-  /** Greys what the policy cannot do, and says why. */
+  /** Disables what the policy cannot do, and says why. */
   const allow = ({ problem, design }) => {
     const reasons = cannot(problem, design);
     for (const option of going.control.options) {
@@ -125,14 +125,14 @@ function opening(policies, asked, leaving) {
   return form;
 }
 
-/** Returns date by date, in the order of `assets`; where a column is of none of them, as the columns stand. */
+/** Arranges returns date by date, in the order of `assets`, or in that of the columns if their names are not those of the assets. */
 function byDate(series, assets) {
   const named = assets.map((name) => series.find(({ column }) => column === name));
   const columns = named.every(Boolean) ? named : series;
   return columns[0].log_returns.map((_, date) => columns.map(({ log_returns }) => log_returns[date]));
 }
 
-/** Why a session by a policy cannot be renewed by itself, or roll, by the ways to go on. */
+/** Returns the reasons why a session with a policy cannot be renewed automatically or roll, by the choice they disable. */
 function cannot({ horizon, contributions, learning, utility }, { initial_laws }) {
   const flows = [contributions ?? 0].flat();
   const reasons = {};
@@ -144,7 +144,7 @@ function cannot({ horizon, contributions, learning, utility }, { initial_laws })
   return reasons;
 }
 
-/** Policies to choose from, by what tells them apart: those that nobody trained by hand come last. */
+/** Returns the policies to choose from, with names that tell them apart; automatically renewed ones come last. */
 export const policyChoices = (policies) => {
   const isRenewed = ({ tags }) => Number(tags.includes("renewed"));
   return [...policies]

@@ -13,13 +13,13 @@ import { day } from "./periods.js";
 import { ticking } from "./ticking.js";
 import { welcome } from "./welcome.js";
 
-/** Rows shown at a time: the advice of each is asked for by itself. */
+/** Rows shown at a time: the advice of each needs a call of its own. */
 const PAGE = 50;
-/** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
+/** Pause in typing before the search is sent, in milliseconds. */
 const PAUSE = 250;
 const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Market has changed", ending: "Completed, or in the last period" };
 const NEWEST = "-created";
-/** What is asked for, as it stands in the address, and what it is where nothing is said. */
+/** The parameters of the address, with their defaults. */
 const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
 
 export async function view(_, leaving) {
@@ -46,15 +46,15 @@ const lead = () =>
     "No session yet. A session is one investor who follows a policy: report each return as it comes, and read what to hold next.",
   );
 
-/** Sessions that the store no longer has as they were written. */
+/** Names the sessions that are damaged in the store. */
 const damagedWords = (damaged) => (damaged.length === 0 ? "" : `. Damaged; ask an operator to restore: ${damaged.join(", ")}`);
 
 const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 
-/** What of `chosen` is other than where nothing is said. */
+/** Returns the entries of `chosen` that differ from the defaults. */
 const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
 
-/** A page of those that match; they are counted with the first. */
+/** Reads a page of matching sessions; the first one also counts them. */
 function read(chosen, after, signal) {
   const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), after === null ? ["count", "care"] : ["after", after]]);
   return get(`/sessions?${query}`, signal);
@@ -104,7 +104,7 @@ function overview(chosen, first, leaving) {
   const failed = (error) => {
     if (error.name !== "AbortError") line.textContent = error.message;
   };
-  /** Starts anew with what was changed. */
+  /** Reads the list again with the changed parameters. */
   const ask = async (changed) => {
     Object.assign(chosen, changed);
     asking.abort();
@@ -138,17 +138,17 @@ function overview(chosen, first, leaving) {
     const all = counts.any > 0 ? h("button", { class: "link", onclick: show }, "Show them") : "";
     needs.replaceChildren(careWords(counts), " ", all, " ", beyond);
   };
-  // Those of all sessions, whatever is searched for.
+  // The counts of all sessions, independent of the search.
   const judgeAll = () => get("/sessions?limit=1&count=care", leaving).then(({ care }) => judge(care), failed);
   if (filtered({ ...chosen, state: "" })) judgeAll();
   else judge(first.care);
   return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
 }
 
-/** Of how many sessions shown the advice was not trained for; the list itself does not tell. */
+/** Says how many of the sessions shown are outside what their policies were trained for; the list itself does not contain that. */
 const outsideWords = (count) => (count === 0 ? "" : `Of the sessions shown, ${counted(count, "is", "are")} in a situation that the policy was not trained for.`);
 
-/** `{element, state}`: the search and the filters, that by state for itself; `ask(changed)` at every change. */
+/** Returns `{element, state}`: the search and the filters, and the filter by state; calls `ask(changed)` at every change. */
 function filters(chosen, ask, tags) {
   let typing = 0;
   const soon = (changed) => {
@@ -194,13 +194,13 @@ function listed(entries, { ticks, advice, sorted, sort }) {
   ], entries);
 }
 
-/** How wealth changed by the last period, with what was added: an amount, since as a share it would be no return. */
+/** Returns the change of wealth in the last period, including money added: an amount, because as a share it would not be a return. */
 function change({ wealth_change }) {
   if (wealth_change === null || wealth_change === undefined) return "\u2013";
   return `${wealth_change > 0 ? "+" : ""}${wealth(wealth_change)}`;
 }
 
-/** The last day reported, and when the next report is due or how late it is. */
+/** Shows the last day reported, and when the next report is due or how late it is. */
 function lastReport({ date, last_report_ms }, { next, late }) {
   const under = (words, wrong) => h("span", { class: wrong ? "under wrong" : "under" }, words);
   const reported = date ? day(date) : last_report_ms ? moment(last_report_ms).split(",")[0] : "None yet";
@@ -208,7 +208,7 @@ function lastReport({ date, last_report_ms }, { next, late }) {
   return [reported, last_report_ms && !date ? under("without a date") : null, coming];
 }
 
-/** Its state, how far it is, and what needs care. */
+/** Shows the state of a session, its progress, and what needs care. */
 function standing({ state, period, horizon, drift, care }) {
   const drifting = { warning: "Market may have changed", alarm: "Market has changed" }[drift];
   return [

@@ -8,12 +8,12 @@ import { assetsHeld } from "./several_fields.js";
 import { priceFields, shareCount } from "./share_prices.js";
 import { stackedChart } from "./stacked.js";
 
-/** A trade of a smaller share of wealth is none. */
+/** A trade of a smaller share of wealth counts as none. */
 const LITTLE = 0.0005;
 
 const sum = (numbers) => numbers.reduce((all, number) => all + number, 0);
 
-/** What an advice by name comes to in money, asset by asset; all that is bought and sold pays its cost. */
+/** Returns the advice in money, asset by asset, after trading costs. */
 export function inMoneyByName(action, assets, { wealth: whole, cost }) {
   const all = whole * (1 - cost * sum(assets.map((name) => Math.abs(action.trade[name]))));
   const rows = assets.map((name) => {
@@ -27,7 +27,7 @@ export function inMoneyByName(action, assets, { wealth: whole, cost }) {
   return { rows, total, bank, cost: whole - all };
 }
 
-/** The advice, with what follows it, `rest`. */
+/** Shows the advice, followed by `rest`. */
 export function severalAdvice(action, place, assets, rest) {
   const { rows, total, bank, cost } = inMoneyByName(action, assets, place);
   const under = (words) => h("span", { class: "under" }, words);
@@ -63,7 +63,7 @@ export function severalAdvice(action, place, assets, rest) {
   );
 }
 
-/** What the worst market of the coming period makes of each asset, behind the shares of what is held. */
+/** Shows what the worst market of the next period does to the average return of each asset. */
 export function severalWorst(action, assets, { unit }) {
   const means = action.one_step?.worst_means;
   const quant = disclosure("For the quant", () =>
@@ -94,7 +94,7 @@ export function severalWorst(action, assets, { unit }) {
   );
 }
 
-/** What was held of each, period by period. */
+/** Draws what was held of each asset, period by period. */
 export function severalHeld({ history, calendar }) {
   const shares = history.observations.map(assetsHeld);
   if (shares.length === 0) return "";

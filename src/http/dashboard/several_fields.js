@@ -11,7 +11,7 @@ import { inPercent, LIMITS } from "./report_fields.js";
 
 const KINDS = { simple: "Gains or losses", missing: "Not known" };
 
-/** The log-return of each asset in an observed period, counted from 0, as it stands; null where none is known. */
+/** Returns the log-return of each asset in an observed period, counted from 0, with corrections applied; null if it is missing. */
 export function assetReturns({ assets, observations }, index) {
   const said = standing(observations[index]);
   const before = (name) => said.previous_prices?.[name] ?? standing(observations[index - 1]).prices?.[name];
@@ -22,12 +22,12 @@ export function assetReturns({ assets, observations }, index) {
   return said.missing ? null : Object.fromEntries(assets.map((name) => [name, one(name)]));
 }
 
-/** What was held of each through an observed period as it stands; where nothing is said, what was advised when it came. */
+/** Returns the share held of each asset in an observed period, with corrections applied; by default the share advised then. */
 export const assetsHeld = (row) => standing(row).executed_allocations ?? row.assets.advised_allocations;
 
 /**
- * The fields: `advised` is the share of each where none is typed, null where that is what was advised then; `rate` and `contribution` are
- * the policy's, the latter null where it differs from period to period, `date` the last day as it most likely is.
+ * Returns the fields. `advised` are the shares that blank fields mean, or null for the advice of that time. `rate` and `contribution` are the
+ * policy's; `contribution` is null if it differs from period to period. `date` is the expected last day.
  */
 export function severalFields(assets, { within = "", advised, rate, contribution, date = null, changed = null }) {
   const part = (list, label, note) =>
@@ -58,7 +58,7 @@ export function severalFields(assets, { within = "", advised, rate, contribution
   const isHeldSaid = () => held.some((field) => text(field) !== "");
   return {
     element: h("div", {}, elements([...returns, day, kind]), more),
-    /** What an observed period reported as it stands, into the fields. */
+    /** Fills the fields with the report of an observed period, with corrections applied. */
     fill(history, index) {
       const [said, back] = [standing(history.observations[index]), assetReturns(history, index)];
       assets.forEach((name, at) => {
@@ -81,7 +81,7 @@ export function severalFields(assets, { within = "", advised, rate, contribution
       for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, dayOf]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
       return report;
     },
-    /** What `foretold` reads, or null where something cannot be read; what is not known counts as unmoved. */
+    /** Returns the values for `foretold`, or null if a field cannot be read; a missing return counts as 0. */
     read() {
       const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
       const back = returns.map((field) => (isMissing() ? 0 : fraction(text(field))));

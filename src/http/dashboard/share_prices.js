@@ -5,12 +5,12 @@ import { input } from "./form.js";
 import { figures, wealth } from "./format.js";
 import { typed } from "./number_text.js";
 
-/** So many shares. */
+/** Formats a number of shares. */
 export const shareCount = (shares) => (shares >= 100 ? wealth(Math.round(shares)).replace(/\.00$/, "") : figures(shares, 3));
 
 /**
- * A fold with a field for the price of each asset in `names`, of which one that is called nothing is "one share". `known` are the prices
- * last reported, by name; `changed(prices)` hears of every edit, with what is a price by name.
+ * Returns a fold with a field for the price of each asset in `names`; an empty name means "one share". `known` are the prices last reported, by
+ * name; `changed(prices)` is called at every edit, with the valid prices by name.
  */
 export function priceFields(names, known, changed) {
   const note = h("p", { class: "note wrong", role: "status" });

@@ -39,22 +39,22 @@ const MEANINGS = {
 /** Investors by their relative risk aversion, of power utility. */
 export const INVESTORS = { cautious: 6, balanced: 3, bold: 1.5 };
 
-/** The presets to choose from, and what they are. */
+/** Returns the presets to choose from. */
 export const investorChoices = () => Object.keys(INVESTORS).map((name) => [name, `${name[0].toUpperCase()}${name.slice(1)}`]);
 export const investorNote = `How much a loss hurts: risk aversion ${Object.values(INVESTORS).join(", ").replace(/, (?=[^,]*$)/, " and ")}.`;
 
-/** The preset that a utility is, if it is one. */
+/** Returns the preset of a utility, if it is one. */
 export const presetOf = ({ kind, risk_aversion }) =>
   kind === "power" ? Object.keys(INVESTORS).find((name) => INVESTORS[name] === risk_aversion) : undefined;
 
-/** Whom a policy is for, after "for". */
+/** Describes the investor of a policy, as the text after "for". */
 export const investorWords = (asked) =>
   presetOf(asked) ? `a ${presetOf(asked)} investor (risk aversion ${significant(asked.risk_aversion)})` : `an investor with ${utility(asked)}`;
 
-/** A share that a thing is named by, with the digits it has: 95 %, 97.5 %. */
+/** Formats a share that is part of a name, with its own digits: 95 %, 97.5 %. */
 export const percentName = (share) => `${Number((100 * share).toPrecision(6))}\u202f%`;
 
-/** Utility in a few words. */
+/** Describes a utility in a few words. */
 export function utility({ kind, risk_aversion }) {
   if (kind === "log") return "log utility";
   const preset = presetOf({ kind, risk_aversion });
@@ -62,18 +62,18 @@ export function utility({ kind, risk_aversion }) {
   return `${kind} utility, risk aversion ${significant(risk_aversion)}${kind === "exponential" ? " per unit of wealth" : ""}`;
 }
 
-/** What trading costs, in a sentence. */
+/** Says what trading costs. */
 const trading = ({ trading_cost: cost }) =>
   cost > 0 ? `Trading costs ${percent(cost, 2)} of what is traded.` : "Trading is free.";
 
-/** The wealth whose utility is `value`. */
+/** Returns the wealth whose utility is `value`. */
 export function worth({ kind, risk_aversion: aversion }, value, floor) {
   if (kind === "log") return floor * Math.exp(value);
   if (kind === "power") return floor * (1 + (1 - aversion) * value) ** (1 / (1 - aversion));
   return floor - Math.log1p(-aversion * floor * value) / aversion;
 }
 
-/** The rule of the radius in a few words. */
+/** Describes the rule of the radius in a few words. */
 function radiusRule(radius) {
   switch (radius.rule) {
     case "bridge":
@@ -95,30 +95,30 @@ function radiusRule(radius) {
   }
 }
 
-/** Mean and standard deviation of returns. */
+/** Returns the mean and the standard deviation of returns. */
 export function moments(values) {
   const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
   const variance = values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / values.length;
   return { mean, deviation: Math.sqrt(variance) };
 }
 
-/** True where the uncertainty set is a ball of laws. */
+/** Tells whether the uncertainty set is a ball of laws. */
 export const hasBall = ({ framework }) => framework === "adaptive" || framework === "static";
 
-/** True where the uncertainty set is a confidence region of a normal law. */
+/** Tells whether the uncertainty set is a confidence region of a normal law. */
 export const isParametric = (framework) => framework.startsWith("parametric");
 
-/** True where a policy guards against markets worse than the record. */
+/** Tells whether a policy guards against markets worse than the record. */
 export const isCautious = (problem) => hasBall(problem) || isParametric(problem.framework);
 
-/** What the bank pays in a problem; where that is not one number, without it. */
+/** Says what the bank pays in a problem; without the number if the rates differ by period. */
 function banks({ rate_per_step, periods_per_year }) {
   if (typeof rate_per_step !== "number") return "The bank pays";
   const a_year = periods_per_year > 1 ? `, ${percent(Math.expm1(periods_per_year * Math.log1p(rate_per_step)), 1)} a year` : "";
   return `The bank pays ${percent(rate_per_step, 2)} a ${unitOf(periods_per_year)}${a_year},`;
 }
 
-/** What may be a mistake in a problem, by the code of its warning, in the words and the units of the form; `field` is what it is in. */
+/** The texts of warnings by their codes, in the words and the units of the form; `field` is the field in doubt. */
 export const WARNED = {
   rate_high: (problem) => `${banks(problem)} more than banks usually do. Is that what it pays in one ${unitOf(problem.periods_per_year)}, or in a year?`,
   rate_above_record: (problem) => `${banks(problem)} more than the average return of the record. Is that what it pays in one ${unitOf(problem.periods_per_year)}?`,
@@ -127,13 +127,13 @@ export const WARNED = {
   trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of what is traded. Is that right?`,
 };
 
-/** What may be a mistake in a problem. */
+/** Lists the warnings about a problem. */
 export function warningList(warnings, problem) {
   return warnings.map(({ code, field }) => h("p", { class: "note wrong" }, WARNED[code](problem, field)));
 }
 
-/** Asks in a form about what may be a mistake in the problem of a job that was queued, if anything may; `yes()` goes on from it. Where it is
- * not meant the job is cancelled, and the form stands as it was. */
+/** Asks in the form whether the warnings about a queued job are right, if there are any; `yes()` continues. The other answer cancels the job
+ * and leaves the form as it was. */
 export function meant(form, { noun, job, warnings, problem }, yes) {
   form.querySelector(".meant")?.remove();
   if (warnings.length === 0) return yes();
@@ -151,10 +151,10 @@ export function meant(form, { noun, job, warnings, problem }, yes) {
   question.focus();
 }
 
-/** The share of the radius that is acted on. */
+/** Returns the share of the radius that is used. */
 export const shareOf = ({ caution, levels }) => caution?.scale ?? levels?.[caution]?.scale ?? 1;
 
-/** The level of caution and its share of the radius, where it is not the paper's. */
+/** Describes the level of caution and its share of the radius, if it is not the paper's. */
 function levelInWords(problem) {
   const { caution } = problem;
   if (caution === undefined || caution === "paper") return "";
@@ -162,7 +162,7 @@ function levelInWords(problem) {
   return `${level}${percent(shareOf(problem), 0)} of `;
 }
 
-/** How cautious a policy is, in a few words. */
+/** Says how cautious a policy is, in a few words. */
 export function caution(problem) {
   const { radius } = problem;
   if (!isCautious(problem)) return "none";
@@ -173,7 +173,7 @@ export function caution(problem) {
   return `${acted}${scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`}`;
 }
 
-/** What the ball is centred on, where that is not the law of the returns seen. */
+/** Says what the ball is centred on, if that is not the law of the returns seen. */
 export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit = "period") {
   switch (kind) {
     case "smoothed":
@@ -187,10 +187,10 @@ export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit 
   }
 }
 
-/** What was asked for, a sentence a choice; `annualised` is what the service says by the year, where it does. */
+/** Describes the request, one sentence for each choice; `annualised` are the service's yearly figures, if it gives them. */
 export function inWords({ problem }, annualised) {
   const { mean, deviation: ofAll } = moments(problem.history.map(Math.expm1));
-  // As where the record is read: a sample's, by one return less.
+  // The sample's standard deviation, divided by n - 1, as shown where the record is read.
   const deviation = ofAll * Math.sqrt(problem.history.length / (problem.history.length - 1));
   const limit = problem.action_interval[1];
   const unit = unitOf(problem.periods_per_year);
@@ -207,7 +207,7 @@ export function inWords({ problem }, annualised) {
   ];
 }
 
-/** How it was asked for and solved, in the words of the paper. */
+/** Describes the request and its solution, in the paper's terms. */
 export function inPaperWords({ problem, design, surrogate, seed }) {
   const ball = hasBall(problem) ? `the radius of the ball is ${radiusRule(problem.radius)}` : isParametric(problem.framework) ? `the uncertainty set is ${radiusRule(problem.radius)}` : "there is no uncertainty set";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";

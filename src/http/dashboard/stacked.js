@@ -5,7 +5,7 @@ import { h, s, table } from "./dom.js";
 import { allocation, percentTick } from "./format.js";
 
 const [HEIGHT, FOOT, TOP] = [190, 30, 10];
-/** So many assets have a colour of their own, whichever stand beside each other unlike; the others are told together. */
+/** The colours of assets, chosen so that neighbours differ; further assets are shown together. */
 const COLOURS = [0, 1, 3, 6, 4, 7];
 const OTHERS = 2;
 const QUARTERS = [0, 0.25, 0.5, 0.75, 1];

@@ -1,6 +1,6 @@
 // One colour and one dash for each strategy, on every page: the tokens `.s0` to `.s19` of the stylesheet.
 
-/** By their kinds in reports, and those of several assets beside the one that they are like; two of one line never stand on a page together. */
+/** The kinds of strategies in reports. Kinds on one line share a colour: they are alike and never appear on one page. */
 const TOKENS = [
   ["adaptive", "robust"],
   ["all_stock", "equal_shares"],
@@ -16,10 +16,10 @@ const TOKENS = [
 
 export const colourOf = (kind) => TOKENS.findIndex((kinds) => kinds.includes(kind));
 
-/** Of a constant share in stocks: those that everybody knows have names, and others lie between the first and the last of them. */
+/** Constant shares in stocks that have names; the colours of the others lie between those of none and all in stocks. */
 const MIXES = { 0: "all_bank", 0.6: "sixty_forty", 1: "all_stock" };
 export const colourOfMix = (share) => (share in MIXES ? colourOf(MIXES[share]) : TOKENS.length + Math.min(9, Math.max(1, Math.round(10 * share))));
 
-/** Of cautious ones that learn and differ by their confidence, by how many there are: the one that most is said of is as where it is the only one. */
+/** The colours of cautious strategies that learn, by how many confidence levels there are: the main one has the colour that it has alone. */
 const LEVELS = { 1: [0], 2: [7, 0], 3: [7, 0, 8] };
 export const colourOfLevel = (index, count) => LEVELS[count][index];

@@ -8,8 +8,8 @@
 import { flowsAfter } from "./flows.js";
 import { effectiveSize, shareSeen } from "./laws.js";
 
-/** One named feature of a state `{wealth, law, radius, share, rate, riskAversion}`: total wealth, the radius with the share of it
- * that the centre has, and the last relative. */
+/** Returns a named feature of a state `{wealth, law, radius, share, rate, riskAversion}`: `wealth` is total wealth, `share` that of the returns
+ * seen in the centre, and `riskAversion` is relative. */
 export function feature(name, { wealth, law, radius, share = 1, rate, riskAversion }) {
   const mertonRatio = (excess, variance) => Math.asinh(excess / (riskAversion * variance));
   switch (name) {
@@ -34,7 +34,7 @@ export function feature(name, { wealth, law, radius, share = 1, rate, riskAversi
       return mertonRatio(mean - 1, Math.max(variance, law.variance / 100, 1e-18));
     }
     case "radius_trend":
-      // Takes the simulated bridges, which a policy does not carry: it stays at the centre of the design.
+      // This needs the simulated bridges, which a policy does not contain: it stays at the centre of the design.
       return 0;
   }
   const order = Number(name.split("_")[1]);
@@ -42,7 +42,7 @@ export function feature(name, { wealth, law, radius, share = 1, rate, riskAversi
   return order % 2 === 0 ? Math.log(law.standardised(order)) : law.standardised(order);
 }
 
-/** The mean of a stored process' first function at scaled inputs. */
+/** Returns the mean of a stored process' first function at scaled inputs. */
 export function predicted({ hyperparameters, weights: [weights], offset, scale }, inputs, x) {
   const lengths = hyperparameters.lengthscales;
   let sum = 0;
@@ -55,15 +55,15 @@ export function predicted({ hyperparameters, weights: [weights], offset, scale }
   return offset + scale * hyperparameters.signal_variance * sum;
 }
 
-/** Allocation of who holds nothing yet, at unscaled features in the order of `names`: where trading costs, the lower end of
- * the band. Processes know it as a share of total wealth, of which the share `inHand` can be held. */
+/** Returns the allocation for an investor who holds nothing yet, at unscaled features in the order of `names`; with trading costs, the lower
+ * end of the band. Processes predict it as a share of total wealth, of which the share `inHand` can be held. */
 export function allocation(solution, features, highest, inHand = 1) {
   const { centre, spread } = solution.scaling;
   const x = features.map((value, index) => (value - centre[index]) / spread[index]);
   return Math.max(0, Math.min(highest, predicted(solution.policy, solution.inputs, x) / inHand));
 }
 
-/** One step of an exported policy over laws of its history's `shape`; null where the step holds a single state. */
+/** Returns one step of an exported policy over laws of its history's `shape`; null if the step has a single state. */
 export function stepSurface(policy, shape, step) {
   const { solution, diagnostics } = policy.steps[step];
   if (solution.kind === "single") return null;
@@ -99,7 +99,7 @@ export function stepSurface(policy, shape, step) {
   return { at, middle, ranges: ranges(level, middle, toCome), dots };
 }
 
-/** At the initial wealth, with what is to come. */
+/** Returns the relative risk aversion at the initial wealth plus the present value of later contributions. */
 function relativeRiskAversion(problem) {
   const { utility, initial_wealth } = problem;
   if (utility.kind === "log") return 1;
@@ -109,7 +109,7 @@ function relativeRiskAversion(problem) {
 
 const features = (names, state) => names.map((name) => feature(name, state));
 
-/** The design's centre, as wealth, mean, standard deviation and radius. */
+/** Returns the design's centre, as wealth, mean, standard deviation and radius. */
 function centres(level, problem, step, own) {
   const of = (name) => level[name]?.centre;
   const mean = of("mean") ?? of("moment_1") ?? own.mean;
@@ -127,7 +127,7 @@ function centres(level, problem, step, own) {
   };
 }
 
-/** Radius where it follows from the effective sample size alone. */
+/** Returns the radius if it follows from the effective sample size alone, otherwise 0. */
 function ruledRadius({ framework, learning, centre, radius, history }, step) {
   const n = effectiveSize(learning, history.length + step);
   const share = shareSeen(centre, n);
@@ -146,7 +146,7 @@ function ruledRadius({ framework, learning, centre, radius, history }, step) {
   }
 }
 
-/** Two and a half standard deviations of the design around its centre, for each axis the step depends on. */
+/** Returns two and a half standard deviations of the design around its centre, for each axis that the step depends on. */
 function ranges(level, middle, toCome) {
   const WIDE = 2.5;
   const plain = (name, lowest = -Infinity) =>
@@ -165,7 +165,7 @@ function ranges(level, middle, toCome) {
   return Object.fromEntries(Object.entries(found).filter(([, range]) => range));
 }
 
-/** Values of one axis over the design points. */
+/** Returns the values of one axis at the design points. */
 function designValues(axis, { scaling, inputs }, names) {
   const choices = {
     wealth: ["log_wealth", "wealth"],

@@ -8,8 +8,8 @@ const DOTS = 300;
 const AXES = ["wealth", "mean", "deviation", "radius"];
 
 /**
- * The picture of `step`: `across` is the axis wanted beside the mean, `radius` a share of the way from the least radius of
- * the design to the largest. `surfaces` keeps what is found of a step for the next picture.
+ * Returns the picture of `step`: `across` is the axis wanted besides the mean, `radius` a share of the way from the least radius of the design
+ * to the largest. `surfaces` caches the surface of a step for the next picture.
  */
 export function picture(policy, shape, surfaces, { step, across, radius }) {
   if (!surfaces.has(step)) surfaces.set(step, stepSurface(policy, shape, step));
@@ -25,7 +25,7 @@ export function picture(policy, shape, surfaces, { step, across, radius }) {
   return over(found, choices, choices.includes(across) ? across : choices[0], radius, itself);
 }
 
-/** What a session holds that starts with the policy's own record and wealth: `{band, isExact}`, exact where the first step knows no other state. */
+/** Returns what a session with the policy's own record and wealth holds at the start: `{band, isExact}`, exact if the first step has a single state. */
 export function heldNow(policy, shape) {
   const { solution } = policy.steps[0];
   if (solution.kind === "single") return { band: solution.band, isExact: true };
@@ -34,7 +34,7 @@ export function heldNow(policy, shape) {
   return { band: [held, held], isExact: false };
 }
 
-/** What is held after `step` periods at each of `means`, everything else at the middle of the design. */
+/** Returns what is held after `step` periods at each of `means`, with everything else in the middle of the design. */
 export function curve(policy, shape, { step, means }) {
   const found = stepSurface(policy, shape, step);
   if (found === null) return means.map(() => policy.steps[step].solution.band[0]);
@@ -50,7 +50,7 @@ function over(found, choices, across, share, itself) {
   const range = across === "radius" ? undefined : found.ranges.radius;
   const radius = range ? range[0] * (range[1] / range[0]) ** share : found.middle.radius;
   const [xs, ys] = [spread(found.ranges[across], COLUMNS), spread(found.ranges.mean, ROWS)];
-  // Column by column, for all laws of a column have one standard deviation.
+  // Goes column by column, because all laws of a column share one standard deviation.
   const columns = xs.map((value) => ys.map((mean) => found.at({ radius, mean, [across]: value })));
   return {
     kind: "field",
@@ -70,7 +70,7 @@ function over(found, choices, across, share, itself) {
 
 const spread = ([low, high], count) => Array.from({ length: count }, (_, k) => low + ((high - low) * k) / (count - 1));
 
-/** Pairs, evenly taken. */
+/** Returns evenly spaced pairs, `DOTS` at most. */
 function thinned(xs, ys) {
   const stride = Math.max(1, Math.ceil(xs.length / DOTS));
   return xs.flatMap((x, index) => (index % stride === 0 ? [[x, ys[index]]] : []));

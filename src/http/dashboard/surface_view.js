@@ -8,7 +8,7 @@ import { shown } from "./key.js";
 import { unitOf } from "./periods.js";
 
 const WORKER = "/dashboard/surface_worker.js";
-/** Radii to choose from the least of the design to the largest. */
+/** Steps of the slider from the least radius of the design to the largest. */
 const RADII = 20;
 
 const AXES = {
@@ -20,7 +20,7 @@ const AXES = {
 
 let trusted;
 
-/** The page's one worker script, as browsers with trusted types ask for it; no other address gets through. */
+/** Returns the address of the page's only worker script, as a trusted type if the browser needs one; every other address is refused. */
 function workerAddress() {
   if (!globalThis.trustedTypes) return WORKER;
   trusted ??= trustedTypes.createPolicy("ballast-worker", {
@@ -32,7 +32,7 @@ function workerAddress() {
   return trusted.createScriptURL(WORKER);
 }
 
-/** The surface of policy `id`, computed in a worker that lives until `leaving`; `told({band, isExact})` hears what it holds now. */
+/** Shows the surface of policy `id`, computed in a worker that lives until `leaving`; `told({band, isExact})` is called with what the policy holds now. */
 export function surfaceView({ id, problem, leaving, told }) {
   const status = h("p", { role: "status" }, "Reading the policy\u2026");
   const holder = h("div", {}, status);
@@ -54,7 +54,7 @@ export function surfaceView({ id, problem, leaving, told }) {
   return holder;
 }
 
-/** What policy `id` holds after `step` periods at each of `means`, everything else at the middle of its design. */
+/** Resolves to what policy `id` holds after `step` periods at each of `means`, with everything else in the middle of its design. */
 export function surfaceCurve(id, { step, means }, leaving) {
   const worker = new Worker(workerAddress(), { type: "module" });
   leaving.addEventListener("abort", () => worker.terminate());
@@ -70,7 +70,7 @@ export function surfaceCurve(id, { step, means }, leaving) {
   });
 }
 
-/** The controls and the drawing. One wish is out at a time; the latest of those made meanwhile follows it. */
+/** Returns the controls and the drawing. One request is pending at a time; the latest one made meanwhile follows it. */
 function explorer({ horizon, periods_per_year }, ask) {
   const unit = unitOf(periods_per_year);
   const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: Math.min(1, horizon - 1), step: 1 });
@@ -164,7 +164,7 @@ function overTwo({ across, xs, ys, cells, dots, own, rest }) {
   });
 }
 
-/** The range of the allocations shown, out to the next tenth, so that noise stays pale. */
+/** Returns the range of the allocations shown, widened to full tenths, so that noise stays pale. */
 function rounded(values) {
   const low = Math.floor(10 * Math.min(...values)) / 10;
   const high = Math.ceil(10 * Math.max(...values)) / 10;

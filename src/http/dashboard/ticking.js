@@ -4,13 +4,13 @@ import { h } from "./dom.js";
 import { pressed } from "./form.js";
 import { count } from "./format.js";
 
-/** So many are named where it is asked whether they are meant. */
+/** Most names listed in the question before a deletion. */
 const NAMED = 20;
 
 /**
- * `{box(id, name), link}` of a list of `kind`, "sessions" or "policies": the tick of a row, and what can be done with those ticked. Two
- * may be ticked, or any number where there is something for `many`: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, links
- * to the addresses `at`, and what is asked before each is removed and done afterwards.
+ * Returns `{box(id, name), link}` for a list of `kind`, "sessions" or "policies": the checkbox of a row, and the actions for the ticked rows. Two
+ * rows may be ticked, or any number if `many` is given: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, with links to
+ * the addresses `at`, the question before a deletion, the deletion of one row, and what to do afterwards.
  */
 export function ticking(kind, many = null) {
   let ticked = [];
@@ -38,7 +38,7 @@ export function ticking(kind, many = null) {
     const control = h("input", { type: "checkbox", class: "tickbox", "aria-label": `${many ? "Tick" : "Compare"} ${name}` });
     control.checked = ticked.includes(id);
     control.addEventListener("change", () => {
-      // Where two are all, a third tick takes the place of the first.
+      // If at most two may be ticked, a third tick replaces the first.
       ticked = control.checked ? [...ticked, id].slice(many ? 0 : -2) : ticked.filter((one) => one !== id);
       tell();
     });
@@ -48,7 +48,7 @@ export function ticking(kind, many = null) {
   };
   const removeAll = async () => {
     const asked = [...ticked];
-    /** Those that stay, by why. */
+    /** The rows that could not be deleted, by the reason. */
     const kept = new Map();
     for (const id of asked) {
       const error = await many.remove(id).then(() => null, (error) => error);

@@ -1,7 +1,7 @@
 // A track record: how far wealth lay below its highest, the worst falls, and returns by year, by month and over rolling
 // years.
 
-/** How far each level lies below the highest so far, 0 or less. */
+/** Returns how far each level lies below the highest so far, 0 or less. */
 export function belowHighest(levels) {
   let highest = 0;
   return levels.map((level) => {
@@ -11,8 +11,8 @@ export function belowHighest(levels) {
 }
 
 /**
- * The worst `most` of `falls`, the deepest first: `{depth, from, to, back}`, the positions at which each began, was deepest
- * and was made good; `back` is null where it was not.
+ * Returns the worst `most` of `falls`, the deepest first: `{depth, from, to, back}`, with the positions at which each began, was deepest and
+ * was recovered; `back` is null if it was not.
  */
 export function worstFalls(falls, most) {
   const found = [];
@@ -29,18 +29,18 @@ export function worstFalls(falls, most) {
   return found.sort((one, other) => one.depth - other.depth).slice(0, most);
 }
 
-/** The return of each period, of levels one more than there are periods. */
+/** Returns the return of each period, from levels that number one more than the periods. */
 export const returnsOf = (levels) => levels.slice(1).map((level, index) => level / levels[index] - 1);
 
-/** At each level the return a year since `years` before, of levels `a_year` to the year; null where there is nothing so long before. */
+/** Returns at each level the yearly return over the `years` before, with `a_year` levels a year; null if the record is too short there. */
 export const rolling = (levels, years, a_year) =>
   levels.map((level, at) => (at < Math.round(years * a_year) ? null : (level / levels[at - Math.round(years * a_year)]) ** (1 / years) - 1));
 
-/** Returns one after the other, as one. */
+/** Compounds successive returns into one. */
 export const compounded = (returns) => returns.reduce((level, back) => level * (1 + back), 1) - 1;
 
 /**
- * Where each period belongs: `{year, part}`, the part such as its month, or null where years have none that have names. Without
+ * Returns where each period belongs: `{year, part}`. The part is, for example, the month, or null if the years have no named parts. Without
  * dates years are counted from 1.
  */
 export function places(dates, length, periods_per_year) {
@@ -52,7 +52,7 @@ export function places(dates, length, periods_per_year) {
   }));
 }
 
-/** Indices of the periods that have the same `key`, in their order: `[[key, indices], ...]`. */
+/** Groups the indices of the periods by `key`, in their order: `[[key, indices], ...]`. */
 export function grouped(places, key) {
   const groups = new Map();
   places.forEach((place, index) => {

@@ -9,7 +9,7 @@ import { returnsField } from "./returns_field.js";
 import { hasBall, meant } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
-/** What the form starts from; what is null is to be filled in, or may be left out. */
+/** The form's initial request; null fields are to be filled in or may be left out. */
 const initial = () => ({
   problem: {
     framework: "adaptive",
@@ -28,10 +28,10 @@ const initial = () => ({
   seed: 1,
 });
 
-/** What changes which fields there are, or what they are called. */
+/** Paths whose change alters which fields are shown, or their labels. */
 const REDRAWN = ["problem.framework", "problem.periods_per_year"];
 
-/** The request that a policy was trained by; of several assets by their names. */
+/** Returns the request that trained a policy; for several assets with their names. */
 export function requestOf(specification) {
   const { levels, ...asked } = specification.problem;
   if (!specification.fund) return structuredClone({ ...specification, problem: asked });
@@ -42,7 +42,7 @@ export function requestOf(specification) {
   return structuredClone({ problem: { ...problem, ...named, radius: { ...radius, ...scale } }, design: { accuracy, count }, seed: specification.seed });
 }
 
-/** Takes returns into a request: those of several columns are of assets by these names. None are there yet where nothing is read. */
+/** Puts returns into a request; several columns are assets with the columns' names. Without a reading there are none. */
 function taken({ problem }, series) {
   problem.history = [];
   if (series.length === 0) return;
@@ -60,7 +60,7 @@ function taken({ problem }, series) {
   if (problem.radius?.rule === "chi_square") problem.radius = radiusFor("adaptive", problem.radius);
 }
 
-/** `query`: `from=POLICY` fills the form with what that policy was trained by, `newer=POLICY` likewise to be given newer returns. */
+/** `query`: `from=POLICY` fills the form with the request that trained the policy, and so does `newer=POLICY`, for newer returns. */
 export async function view(query, leaving) {
   const asked = new URLSearchParams(query ?? "");
   const origin = asked.get("from") ?? asked.get("newer");
@@ -69,7 +69,7 @@ export async function view(query, leaving) {
   let request = origin ? requestOf((await get(`/policies/${origin}`, leaving)).specification) : initial();
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
-  // Whether the periods a year that stand there are those of a record's dates.
+  // Whether the periods a year in the form come from the dates of a record.
   let isOfDates = false;
   const source = returnsField({
     name: "problem.history",
@@ -122,7 +122,7 @@ export async function view(query, leaving) {
     try {
       request = JSON.parse(text);
     } catch {
-      // It was left in the midst of being edited.
+      // The JSON was left half edited.
       advanced.open = true;
     }
     fields.choose(choices);
@@ -188,7 +188,7 @@ export async function view(query, leaving) {
     });
   };
   sending(form, send, ask, { otherwise: json, told: (error) => error.field === "body" && (advanced.open = true) });
-  // A policy of no calendar is cloned as one.
+  // A policy without a calendar is cloned without one.
   if (origin && !request.problem.periods_per_year) fields.choose({ told: "period", periods: "none" });
   fields.show(request);
   if (origin) showRecord();
@@ -201,7 +201,7 @@ export async function view(query, leaving) {
   return { title: newer ? "Train on newer returns" : "Train a policy", trail, body: [origin ? told(newer) : "", kept ? drafts.note(again) : "", form] };
 }
 
-/** What a form that is filled from a policy asks for. */
+/** Says what to do with a form that is filled from a policy. */
 function told(newer) {
   const words = newer
     ? "Everything is as that policy was trained, including its returns. Replace them with newer ones, then train."
@@ -209,7 +209,7 @@ function told(newer) {
   return h("p", { class: "lead" }, words);
 }
 
-/** JSON with a line a field, numbers of the history side by side. */
+/** Returns JSON with one field a line and the numbers of the history side by side. */
 function compact(request) {
   return JSON.stringify(request, null, 2).replace(
     /\[\s*([-\d.e+,\s]*?)\s*\]/g,

@@ -8,21 +8,21 @@ import { fraction, typed } from "./number_text.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, INVESTORS, investorChoices, investorNote, isParametric, presetOf } from "./specification.js";
 
-/** Each kind of utility with a usual risk aversion, in multiples of one over the initial wealth where that is meant. */
+/** Each kind of utility with a usual risk aversion; that of the exponential is relative to the initial wealth. */
 export const UTILITY = {
   exponential: { kind: "exponential", risk_aversion_relative: 3 },
   power: { kind: "power", risk_aversion: 3 },
   log: { kind: "log" },
 };
 const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
-/** What is offered; the law that is known has to be given as JSON. */
+/** The frameworks offered; a known law must be given as JSON. */
 const OFFERED = Object.fromEntries(Object.entries(FRAMEWORKS).filter(([framework]) => framework !== "known_law"));
-/** What weighs less with age, if anything does. */
+/** The path of the half-life of returns. */
 const HALF_LIFE = "problem.learning.half_life";
-/** What proposes the shares of several assets. */
+/** The path of the rule that splits the total between assets. */
 const COMPOSITION = "problem.composition";
 const COMPOSITIONS = { one_step: "Chosen each period, against the worst market", inverse_volatility: "Less of what varies more", equal: "Equal shares" };
-/** How much of the statistical doubt is acted on. */
+/** The path of the level of caution. */
 const CAUTION = "problem.caution";
 const CAUTIONS = {
   balanced: "Balanced: least regret, whatever the premium is",
@@ -30,7 +30,7 @@ const CAUTIONS = {
   cautious: "Cautious: closer to no premium",
   paper: "Full: everything that the confidence implies",
 };
-/** The choice of an investor that no preset is. */
+/** The choice of an investor that is not a preset. */
 const OWN = "own";
 
 export const at = (object, path) => path.split(".").reduce((value, key) => value?.[key], object);
@@ -42,14 +42,14 @@ export function put(object, path, value) {
   parent[last] = value;
 }
 
-/** One number, or several that semicolons keep apart. */
+/** Reads one number, or several separated by semicolons. */
 function amounts(text) {
   const each = text.split(";").map((part) => typed(part)).filter((part) => part !== null);
   return each.length > 1 ? each : (each[0] ?? 0);
 }
 
 const short = (value) => String(Number(value.toPrecision(12)));
-/** How a field shows what the request holds, and reads it: as it is, in percent, or as what is left of 100 %. */
+/** How a field shows and reads a value of the request: as it is, in percent, or as 100 % minus it. */
 const READING = {
   plain: { read: typed, show: (value) => value },
   percent: { read: (text) => fraction(text) ?? typed(text), show: (value) => (typeof value === "number" ? short(100 * value) : value) },
@@ -66,12 +66,12 @@ const capital = (word) => word[0].toUpperCase() + word.slice(1);
 
 const PERIODS = "problem.periods_per_year";
 const RATE = "problem.rate_per_step";
-/** How often there is a period. */
+/** The choices of periods a year. */
 const CALENDARS = [["", "Choose one"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: other periods"]];
 
-/** `{elements, show(request), periods(count), trouble(), choices(), choose(choices)}`; `changed(path, value)` at every edit. `periods` takes how
- * many periods a year the dates of a record tell, or null; `trouble()` is what is still to be chosen, as a refusal, or null; `choices()` is
- * what was chosen that the request does not say. */
+/** Returns `{elements, show(request), periods(count), trouble(), choices(), choose(choices)}`; `changed(path, value)` is called at every edit.
+ * `periods` takes the periods a year from the dates of a record, or null. `trouble()` returns a missing choice as a refusal, or null.
+ * `choices()` returns the choices that the request does not contain. */
 export function trainFields(changed) {
   const readings = {};
   const field = (path, label, note, unit = "plain") => {
@@ -180,7 +180,7 @@ export function trainFields(changed) {
     for (const part of parts) {
       const found = at(request, part.name);
       const value = found === undefined && part.name === HALF_LIFE && !request.problem?.assets ? "" : found;
-      // A share in the place of a level.
+      // The caution may be a share instead of a level.
       const share = part === caution ? value?.scale : undefined;
       if (share !== undefined) caution.control.append(h("option", { value: share }, `${short(100 * share)} % of what the confidence implies`));
       const shown = [share ?? value ?? ""].flat().map(readings[part.name]?.show ?? ((each) => each));
@@ -216,7 +216,7 @@ export function trainFields(changed) {
   return { elements, show, periods, trouble, choices, choose };
 }
 
-/** The rule of caution that goes with a kind of policy. */
+/** Returns the default radius of a kind of policy. */
 export function radiusFor(framework, radius) {
   const { alpha = 0.1 } = radius ?? {};
   return isParametric(framework) ? { rule: "chi_square", alpha } : { rule: "bridge", alpha, scale: 1 };

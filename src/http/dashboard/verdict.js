@@ -4,10 +4,10 @@ import { percent, tick } from "./format.js";
 
 export const ordinal = (place) => `${place}${{ 1: "st", 2: "nd", 3: "rd" }[place % 100 > 10 && place % 100 < 14 ? 0 : place % 10] ?? "th"}`;
 
-/** An estimate with its range. */
+/** Formats an estimate with its range. */
 export const interval = ({ value, low, high }, format) => `${format(value)} (${format(low)} to ${format(high)})`;
 
-/** Whether changing the share held earned anything beside holding its average all along; `beyond` is an estimate, `shown` what would show it, such as "the record does". */
+/** Says whether changing the share held earned more than holding its average throughout. `beyond` is an estimate, `shown` the evidence, such as "the record does". */
 export function changing({ name, allocation, beyond, shown }) {
   const { value, low, high } = beyond;
   const size = interval(value < 0 ? { value: -value, low: -high, high: -low } : beyond, (amount) => tick(amount, 0.01));

@@ -6,10 +6,10 @@ import { h, section } from "./dom.js";
 import { allocation, percentTick, points, significant, tick, wealth } from "./format.js";
 import { colourOf } from "./strategies.js";
 
-/** From trusting the returns seen to twice the caution; every point is a robust step solved. */
+/** From no caution to twice the caution; every point needs a robust step. */
 const SWEEP = { from: 0, to: 2, points: 21 };
 
-/** `{element, ask()}`: what is held and what it is worth, against how much caution. */
+/** Returns `{element, ask()}`: the section that draws what is held and its worth by the amount of caution, and the function that loads it. */
 export function conservatism({ id, leaving, calendar, cautionScale }, action) {
   const holder = h("div", {}, h("p", { class: "note" }, "Solving the step for other amounts of caution\u2026"));
   const ask = () =>
@@ -24,7 +24,7 @@ function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
   const times = (value) => `\u00d7 ${significant(value, 2)}`;
   const x = { values: solved.map(({ radius_scale }) => radius_scale), label: "Caution", format: times, tick };
   const own = solved.findIndex(({ radius_scale }) => Math.abs(radius_scale - 1) < 1e-9);
-  // One advice on the page: at its own caution it is the one that stands above.
+  // The page gives one advice: at the session's own caution the chart repeats it.
   const held = (point, index) => (index === own ? advised : point.allocation);
   const line = (name, read, more) => ({ name, kind: "line", values: solved.map(read), ...more });
   return [

@@ -5,12 +5,12 @@ import { disclosure, h, section } from "./dom.js";
 import { figures, minus, oneIn, percent, significant } from "./format.js";
 import { lawChart } from "./law_chart.js";
 
-/** A move to within this of the deepest one is as deep, in log-return. */
+/** Moves within this distance of the deepest one count as equally deep, in log-return. */
 const NEAR = 0.01;
-/** What moves besides is told from this share on. */
+/** Other moves are mentioned from this share on. */
 const LITTLE = 5e-4;
 
-/** What the market assumes beyond the returns seen, a sentence. `unit` is what a period is called, `cautious` whether it might. */
+/** Says what the market assumes beyond the returns seen. `unit` is the name of a period, `cautious` whether the policy guards against worse markets. */
 export function assumed({ transport }, unit, cautious = true) {
   const moves = transport.filter(({ atom, moved_to, mass }) => atom !== moved_to && mass > 0);
   const share = (some) => some.reduce((sum, { mass }) => sum + mass, 0);
@@ -30,7 +30,7 @@ export function assumed({ transport }, unit, cautious = true) {
   return `It assumes that ${often(mass)} ${verb(mass, "lose")} ${size(lowest)}${more}.`;
 }
 
-/** Why nothing is held: what the returns seen paid beyond the bank, how well `size` of them tell that, and what the market leaves of it. */
+/** Says why nothing is held: what the returns paid beyond the bank, the standard error with `size` returns, and what the worst market leaves of it. */
 export function whyNothing({ transport }, rate, size, unit) {
   const mean = (of) => transport.reduce((sum, move) => sum + move.mass * of(move), 0);
   const paid = mean(({ atom }) => Math.expm1(atom));
@@ -42,7 +42,7 @@ export function whyNothing({ transport }, rate, size, unit) {
   return `The record beat the bank by ${told(beyond)} a ${unit}, with a standard error of ${told(error)}. In this market it ${left > 0 ? `beats the bank by ${told(left)}` : `pays ${told(left)} less than the bank`}.`;
 }
 
-/** The section; the robust step takes a while, so it comes after the rest of the page stands. `then()` when it has. */
+/** Returns the section. The robust step takes a while, so it is loaded after the rest of the page; `then()` is called afterwards. */
 export function worstMarket({ id, policy, cautious, calendar: { unit }, leaving }, advice, then) {
   const paper = h("div", { class: "words quant" }, advice.quant);
   const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step again\u2026"));
@@ -72,7 +72,7 @@ export function worstMarket({ id, policy, cautious, calendar: { unit }, leaving 
   return section(cautious ? "The worst market it guards against" : "The market it assumes", holder, disclosure("For the quant", () => paper));
 }
 
-/** Of a market whose returns are a bell curve: its average and its spread beside those seen. */
+/** Describes a market whose returns are a bell curve: its average and spread, beside those seen. */
 function assumedNormal({ normal, sentence }, unit) {
   if (!normal) return minus(sentence);
   const [average, spread, seenAverage, seenSpread] = [normal.mean, Math.sqrt(normal.variance), normal.estimated_mean, Math.sqrt(normal.estimated_variance)].map((value) => percent(value, 2));
@@ -84,7 +84,7 @@ function paperWords({ worst_case, radius, sample_size, certainty_equivalent, flo
   const moves = transport.filter(({ atom, moved_to }) => atom !== moved_to);
   const moved = moves.reduce((sum, { mass }) => sum + mass, 0);
   const law = transport.length === 0 ? "" : `The worst law within Wasserstein distance ${figures(radius, 3)} of the ${sample_size} returns seen moves ${percent(moved)} of the probability. `;
-  // The worth is convex in the radius, and never below the floor.
+  // The worth is convex in the radius and never below the floor.
   const most = Math.max(0, Math.min(10 * radius_cost, 1e4 * Math.log(certainty_equivalent / floor)));
   const words = `${law}Widening the ball of this ${unit} alone by 0.001 would cost at most ${significant(most, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(duality_gap), 2)} bp.`;
   return h("p", { class: "note" }, words);
