@@ -1,4 +1,4 @@
-"""A real service over a temporary folder, and a network that fails on demand."""
+"""A real service with a temporary folder, and a network that fails on demand."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RETURNS = [0.041, -0.014, 0.032, 0.053, 0.012, 0.037, -0.021, 0.028, 0.019, 0.04
 
 
 class Service:
-    """The binary under test, on one port from its first start on."""
+    """The binary under test, which keeps its port across restarts."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._port = folder, 0
@@ -41,7 +41,7 @@ class Service:
         self._port = httpx.URL(self.url).port or 0
 
     def stop(self) -> None:
-        """As an operator does: it drains and exits."""
+        """Stops the service as an operator does: it finishes its requests and exits."""
         self._process.send_signal(signal.SIGTERM)
         try:
             assert self._process.wait(timeout=60) == 0
@@ -51,7 +51,7 @@ class Service:
 
 
 class Network(httpx.BaseTransport):
-    """Connections that fail as told, and remember what went over them."""
+    """Connections that fail on demand and record the requests."""
 
     def __init__(self) -> None:
         self._inner = httpx.HTTPTransport()
@@ -63,7 +63,7 @@ class Network(httpx.BaseTransport):
         return self._faults.pop(0)(request) if self._faults else self._inner.handle_request(request)
 
     def lose_answers(self, count: int) -> None:
-        """The next requests arrive; their answers do not."""
+        """Loses the answers of the next requests, which do arrive."""
 
         def lose(request: httpx.Request) -> httpx.Response:
             self._inner.handle_request(request).read()
@@ -72,7 +72,7 @@ class Network(httpx.BaseTransport):
         self._faults += [lose] * count
 
     def refuse(self, count: int) -> None:
-        """The next connections cannot be made."""
+        """Refuses the next connections."""
 
         def fail(request: httpx.Request) -> httpx.Response:
             raise httpx.ConnectError("connection refused", request=request)
@@ -80,7 +80,7 @@ class Network(httpx.BaseTransport):
         self._faults += [fail] * count
 
     def answer(self, status: int, headers: dict[str, str] | None = None, text: str = "") -> None:
-        """Something in between answers the next request."""
+        """Answers the next request like a proxy."""
         self._faults.append(lambda request: httpx.Response(status, headers=headers, text=text, request=request))
 
     def close(self) -> None:
@@ -107,19 +107,19 @@ def ballast(service: Service, network: Network) -> Iterator[Ballast]:
 
 
 def train(ballast: Ballast, **changes: object) -> Training:
-    """A small training: three periods, 20 design points."""
+    """Queues a small training with three periods and 20 design points."""
     settings = {"horizon": 3, "rate_per_step": 0.001, "design": {"count": 20}, **changes}
     return ballast.train(RETURNS, kind="log", **settings)  # type: ignore[arg-type]
 
 
 def compare(ballast: Ballast) -> Evaluation:
-    """Constant mixes alone, which need no training."""
+    """Queues an evaluation of constant mixes, which need no training."""
     problem: wire.ProblemSpecification = {"history": RETURNS, "rate_per_step": 0.002, "horizon": 2}
     return ballast.evaluate({"problem": problem, "frameworks": [], "constant_mixes": [0.0, 0.5], "paths": 200})
 
 
 def walk(ballast: Ballast, **more: Any) -> WalkForward:
-    """Three years of quarters, the last of them lived through."""
+    """Queues a walk-forward over three years of quarters, of which the last year is tested."""
     dates = [datetime.date(2020 + quarter // 4, 3 * (quarter % 4) + 1, 1) for quarter in range(12)]
     simple = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(12)]
     return ballast.backtest(simple, kind="simple", rate=0.002, dates=dates, window=8, count=10, **more)
@@ -127,13 +127,13 @@ def walk(ballast: Ballast, **more: Any) -> WalkForward:
 
 @pytest.fixture
 def session(ballast: Ballast) -> Session:
-    # The same key and body: every test but the first finds the job done.
+    # The key and the body never change, so every test but the first finds the finished job.
     return train(ballast, idempotency_key="the policy of the tests").session()
 
 
 @pytest.fixture
 def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The pauses between repetitions, which then take no time."""
-    taken: list[float] = []
-    monkeypatch.setattr("time.sleep", taken.append)
-    return taken
+    """Records the pauses between retries instead of waiting."""
+    seconds: list[float] = []
+    monkeypatch.setattr("time.sleep", seconds.append)
+    return seconds

@@ -1,4 +1,4 @@
-"""The asynchronous twin: the same names, answers, repetitions and errors, awaited and side by side."""
+"""The asynchronous client has the same names, answers, retries and errors, and sends requests concurrently."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ def test_the_twins_have_the_same_names_and_arguments() -> None:
             assert one.__doc__ == other.__doc__ and one.__doc__, name
             assert inspect.signature(one).parameters == inspect.signature(other).parameters, name
             assert not inspect.iscoroutinefunction(one) and not inspect.isasyncgenfunction(one), name
-            assert told(one) == told(other).removeprefix("Async"), name
+            assert answer_name(one) == answer_name(other).removeprefix("Async"), name
 
 
-def told(call: Callable[..., object]) -> str:
-    """What the signature says of the answer, with names alone."""
+def answer_name(call: Callable[..., object]) -> str:
+    """Returns the name of the answer in the signature."""
     answer = inspect.signature(call).return_annotation
     if isinstance(answer, GenericAlias):
         return f"Iterator[wire.{answer.__args__[0].__name__}]"
@@ -86,7 +86,7 @@ def test_what_a_call_makes_is_shown_in_its_signature() -> None:
 
 
 async def lived(service: Service, network: AsyncNetwork) -> tuple[list[float], pd.DataFrame]:
-    """The story of the README, awaited."""
+    """Runs the example of the README with the asynchronous client."""
     async with AsyncBallast(service.url, transport=network) as ballast:
         assert (await ballast.health())["status"] == "ok"
         queued = await ballast.train(
@@ -128,12 +128,12 @@ def test_an_investor_lives_as_in_the_twin(service: Service, ballast: Ballast) ->
 def test_reports_are_the_same(service: Service, ballast: Ballast) -> None:
     queued = walk(ballast, alpha=[0.5])
 
-    async def asked() -> tuple[Any, pd.DataFrame]:
+    async def ask() -> tuple[Any, pd.DataFrame]:
         async with AsyncBallast(service.url) as other:
             found = await other.walk_forward(queued.id)
             return await found.report(), await found.periods("allocation")
 
-    report, allocations = asyncio.run(asked())
+    report, allocations = asyncio.run(ask())
     assert report == queued.report()
     pd.testing.assert_frame_equal(allocations, queued.periods("allocation"))
 
@@ -163,7 +163,7 @@ def test_lost_answers_are_asked_for_again_and_count_once(service: Service, monke
 
 
 def test_questions_go_out_side_by_side(service: Service) -> None:
-    async def asked() -> None:
+    async def ask() -> None:
         network = AsyncNetwork()
         async with AsyncBallast(service.url, transport=network) as ballast:
             scales = [0.0, 0.5, 1.0, 2.0]
@@ -182,7 +182,7 @@ def test_questions_go_out_side_by_side(service: Service) -> None:
         worths = [answer["certainty_equivalent"] for answer in answers]
         assert worths == sorted(worths, reverse=True) and worths[0] > worths[-1]
 
-    asyncio.run(asked())
+    asyncio.run(ask())
 
 
 def test_a_job_is_cancelled_while_it_is_watched(service: Service) -> None:
@@ -201,12 +201,12 @@ def test_a_job_is_cancelled_while_it_is_watched(service: Service) -> None:
 
 
 def test_the_waiting_client_works_where_a_loop_runs(ballast: Ballast) -> None:
-    """As in a notebook."""
+    """A notebook has a running loop."""
 
-    async def asked() -> str:
+    async def ask() -> str:
         return ballast.health()["status"]
 
-    assert asyncio.run(asked()) == "ok"
+    assert asyncio.run(ask()) == "ok"
 
 
 def test_a_call_that_suspends_is_a_mistake_of_the_transport() -> None:

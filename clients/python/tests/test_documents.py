@@ -1,4 +1,4 @@
-"""What the READMEs and the example say is run, and what it prints is true."""
+"""The code of the READMEs and the examples runs, and prints what the documents show."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def test_the_readme_of_the_client_runs(service: Service) -> None:
     assert lines[0].endswith(" 100.0") and lines[3].count("'log_return'") == 3
     together = json.loads(run(quick_start + awaited, service).stdout.splitlines()[-1])
     assert len(together) == 2 and all(0.0 <= allocation <= 1.0 for allocation in together)
-    said = error.split("#")[1].strip()
-    assert run(quick_start + error, service).stdout.splitlines()[-1] == said
+    expected = error.split("#")[1].strip()
+    assert run(quick_start + error, service).stdout.splitlines()[-1] == expected
 
 
 def test_the_readme_of_the_repository_runs(service: Service) -> None:
@@ -49,27 +49,27 @@ def test_the_example_prints_the_table_of_the_demo(service: Service) -> None:
     count = ["--count", "20"]
     script = HERE / "examples/us_market.py"
     example = [sys.executable, "-W", "error", str(script), "--url", service.url, *count]
-    told = subprocess.run(example, text=True, capture_output=True, check=True).stdout
+    printed = subprocess.run(example, text=True, capture_output=True, check=True).stdout
     demo = subprocess.run([str(BINARY), "demo", *count], text=True, capture_output=True, check=True).stdout
-    assert table(told) == table(demo)
+    assert table(printed) == table(demo)
 
 
 def test_the_pictures_of_the_concepts_are_those_that_are_drawn(service: Service, tmp_path: Path) -> None:
     command = [sys.executable, "-W", "error", str(HERE / "examples/concepts.py")]
     arguments = ["--url", service.url, "--out", str(tmp_path)]
-    told = subprocess.run(command + arguments, text=True, capture_output=True, check=True).stdout
-    assert f"```text\n{told}```" in (REPOSITORY / "docs/concepts.md").read_text()
+    printed = subprocess.run(command + arguments, text=True, capture_output=True, check=True).stdout
+    assert f"```text\n{printed}```" in (REPOSITORY / "docs/concepts.md").read_text()
     drawn = {path.name: parts(path) for path in tmp_path.iterdir()}
     kept = {path.name: parts(path) for path in (REPOSITORY / "docs/images").glob("*.svg")}
     assert len(drawn) == 4 and drawn.keys() == kept.keys()
     for name, (marks, places) in drawn.items():
         assert marks == kept[name][0]
-        # Places are written with one decimal, and sums of another processor may be rounded the other way.
+        # Positions have one decimal, and another processor may round a sum the other way.
         assert places == pytest.approx(kept[name][1], abs=0.11)
 
 
 def parts(picture: Path) -> tuple[list[str], list[float]]:
-    """What a picture is made of without its numbers, and these."""
+    """Splits a picture into its text without the numbers, and the numbers."""
     pieces = re.split(r"(-?\d+(?:\.\d+)?)", picture.read_text())
     return pieces[::2], [float(number) for number in pieces[1::2]]
 
@@ -80,12 +80,12 @@ def test_the_first_advice_runs(service: Service, tmp_path: Path) -> None:
     (tmp_path / "data").symlink_to(REPOSITORY / "data")
     subprocess.run(cut, shell=True, cwd=tmp_path, check=True)
     (code,) = blocks(page)
-    told = run(code, service, tmp_path).stdout.splitlines()
-    assert told[0].startswith("1109 monthly simple returns as fractions, ")
-    said = re.search(r"band +(\S+) % to (\S+) %", page)
-    assert said is not None
-    allocation, low, high = (float(number) for number in re.findall(r"[\d.]+", told[1]))
-    assert (round(100 * low, 1), round(100 * high, 1)) == (float(said[1]), float(said[2])) and allocation == low
+    printed = run(code, service, tmp_path).stdout.splitlines()
+    assert printed[0].startswith("1109 monthly simple returns as fractions, ")
+    quoted = re.search(r"band +(\S+) % to (\S+) %", page)
+    assert quoted is not None
+    allocation, low, high = (float(number) for number in re.findall(r"[\d.]+", printed[1]))
+    assert (round(100 * low, 1), round(100 * high, 1)) == (float(quoted[1]), float(quoted[2])) and allocation == low
 
 
 def table(text: str) -> list[str]:
@@ -96,7 +96,7 @@ def table(text: str) -> list[str]:
     return found
 
 
-#: What a user may write, and what the types keep him from.
+#: Calls of a user, with the error that the types report for each wrong one.
 CALLS = [
     ('session.action()["allocation"] + 1.0', None),
     ('session.action()["alocation"]', "typeddict-item"),
@@ -121,20 +121,20 @@ CALLS = [
 
 
 def test_types_reach_those_who_install_it(tmp_path: Path) -> None:
-    """In another folder, where mypy finds the package as installed, by its py.typed."""
+    """Checks in another folder, in which mypy finds the installed package by its py.typed."""
     lines = [
         "from ballast import AsyncBallast, Ballast, Session, wire",
         "async def use(ballast: Ballast, session: Session, other: AsyncBallast) -> None:",
     ]
     first = len(lines) + 1
     (tmp_path / "use.py").write_text("\n".join(lines + [f"    {call}" for call, _ in CALLS]) + "\n")
-    # The types of pandas and matplotlib are theirs, and take long to read.
+    # Skips the types of pandas and matplotlib, which take long to read.
     (tmp_path / "mypy.ini").write_text(
         "[mypy]\n[mypy-pandas.*,matplotlib.*]\nfollow_imports = skip\nfollow_imports_for_stubs = true\n"
     )
     command = [sys.executable, "-m", "mypy", "--strict", "--hide-error-context", "use.py"]
-    said = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True).stdout
-    errors = re.findall(r"^use\.py:(\d+): error: .*\[([a-z-]+)\]$", said, re.MULTILINE)
-    # Of several on one line the first.
+    output = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True).stdout
+    errors = re.findall(r"^use\.py:(\d+): error: .*\[([a-z-]+)\]$", output, re.MULTILINE)
+    # If a line has several errors, keeps the first.
     found = {int(line): code for line, code in reversed(errors)}
-    assert found == {number: code for number, (_, code) in enumerate(CALLS, start=first) if code}, said
+    assert found == {number: code for number, (_, code) in enumerate(CALLS, start=first) if code}, output

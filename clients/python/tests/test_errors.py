@@ -1,4 +1,4 @@
-"""Refusals carry what the problem document says."""
+"""Exceptions carry the fields of the problem document."""
 
 from __future__ import annotations
 

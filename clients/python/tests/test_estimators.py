@@ -1,4 +1,4 @@
-"""Estimators of scikit-learn and skfolio: their weights are the advice of the service on the rows fitted."""
+"""Estimators of scikit-learn and skfolio: their weights are the advice of the service for the fitted rows."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from ballast.sklearn import RobustAllocation
 
 ASSETS = ["utilities", "health", "energy"]
 BANK = "risk_free_return"
-#: What the tests ask for: a radius at which something is held.
+#: The radius of the tests, small enough that something is held.
 RADIUS: wire.RadiusRule = {"rule": "bridge", "alpha": 0.5, "scale": 0.25}
 
 
 @pytest.fixture(scope="module")
 def returns() -> pd.DataFrame:
-    """Three industries and the bank, twelve years."""
+    """Twelve years of three industries and the bank."""
     whole = pd.read_csv(REPOSITORY / "data/us_industries_monthly.csv", index_col="date", parse_dates=True)
     return whole.loc["1985":"1996", [*ASSETS, BANK]]  # type: ignore[misc]
 
 
 def advised(service: Service, record: pd.DataFrame) -> dict[str, Any]:
-    """The advice on a record, asked for without this package."""
+    """Requests the advice for a record without this package."""
     problem = {
         "assets": ASSETS,
         "history": [[math.log1p(value) for value in row] for row in record[ASSETS].to_numpy()],
@@ -56,10 +56,10 @@ def test_the_weights_are_the_advice(service: Service, returns: pd.DataFrame) -> 
     with pytest.raises(NotFittedError):
         estimator.predict(coming)
     assert estimator.fit(past) is estimator
-    told = advised(service, past)
-    assert dict(zip(ASSETS, estimator.weights_, strict=False)) == told["allocation"]
-    assert 0.1 < told["total"] < 1.0 and estimator.weights_[-1] == pytest.approx(1.0 - told["total"])
-    assert estimator.advice_["bound"] == told["bound"] and estimator.rate_per_step_ == past[BANK].iloc[-1]
+    advice = advised(service, past)
+    assert dict(zip(ASSETS, estimator.weights_, strict=False)) == advice["allocation"]
+    assert 0.1 < advice["total"] < 1.0 and estimator.weights_[-1] == pytest.approx(1.0 - advice["total"])
+    assert estimator.advice_["bound"] == advice["bound"] and estimator.rate_per_step_ == past[BANK].iloc[-1]
     assert list(estimator.feature_names_in_) == [*ASSETS, BANK]
     assert estimator.predict(coming).tolist() == [estimator.weights_.tolist()] * 6
     with pytest.raises(ValueError, match="feature names"):
@@ -113,8 +113,8 @@ def test_skfolio_walks_forward_with_it(service: Service, returns: pd.DataFrame) 
     assert len(path.portfolios) == len(folds) == 7
     expected = []
     for start, portfolio in zip(folds, path.portfolios, strict=True):
-        told = advised(service, returns[start - 60 : start])
-        weights = [*(told["allocation"][name] for name in ASSETS), 1.0 - told["total"]]
+        advice = advised(service, returns[start - 60 : start])
+        weights = [*(advice["allocation"][name] for name in ASSETS), 1.0 - advice["total"]]
         assert portfolio.weights.tolist() == pytest.approx(weights, abs=1e-15)
         expected += (returns[start : start + 12].to_numpy() @ weights).tolist()
     assert path.returns.tolist() == pytest.approx(expected, abs=1e-15)

@@ -1,4 +1,4 @@
-"""Answers as pandas objects and pictures: every number is the one of the JSON, under the name that the docs give it."""
+"""Answers as pandas objects and pictures. Every number is that of the JSON, under its documented name."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_worst_case_is_a_transport(ballast: Ballast, session: Session) -> No
     for advice in answers:
         moves = frames.worst_case(advice)
         assert moves["mass"].sum() == pytest.approx(1.0)
-        # Every return seen has its mass, 1 of 10, wherever that goes, and the mean distance fits in the ball.
+        # Every observed return has the mass 1/10, wherever that moves, and the mean distance is within the radius.
         seen = moves.groupby("atom")["mass"].sum()
         assert sorted(seen.index) == sorted(RETURNS) and seen.tolist() == pytest.approx([0.1] * 10)
         distance = (moves["mass"] * (moves["atom"] - moves["moved_to"]).abs()).sum()
@@ -77,7 +77,7 @@ def test_allocations_have_the_names_of_the_assets(ballast: Ballast) -> None:
     assert held.sum() == pytest.approx(advised["total"]) and held["stocks"] > 0.0
     figures = frames.figures(advised)
     assert figures["total"] == advised["total"] and figures["sample_size"] == len(RETURNS)
-    # Part of the caution is for a crash that nobody has seen.
+    # Part of the caution is for a crash that is not in the record.
     assert (
         figures["without_crash"] == advised.get("without_crash") and figures["without_crash"] > figures["total"] - 1e-6
     )
@@ -106,9 +106,9 @@ def test_a_session_of_several_assets_is_a_frame_for_each_figure(ballast: Ballast
     )
     assert then.loc[1].tolist() == pytest.approx([0.1, -0.01]) and then.loc[2].isna().all()
     assert fund.assets_frame("executed_allocation").loc[1].tolist() == [0.25, 0.5]
-    told = fund.history()["observations"][0]["assets"]
-    assert fund.assets_frame("holding").loc[1].to_dict() == told["holdings"]  # type: ignore[index]
-    assert fund.assets_frame("advised_allocation").loc[1].to_dict() == told["advised_allocations"]  # type: ignore[index]
+    row = fund.history()["observations"][0]["assets"]
+    assert fund.assets_frame("holding").loc[1].to_dict() == row["holdings"]  # type: ignore[index]
+    assert fund.assets_frame("advised_allocation").loc[1].to_dict() == row["advised_allocations"]  # type: ignore[index]
     fund.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0}, confirm=True)
     assert fund.assets_frame("log_return").loc[1].tolist() == pytest.approx([math.log(1.2), 0.0])
     pd.testing.assert_frame_equal(fund.assets_frame(as_of="then"), then)
@@ -137,7 +137,7 @@ def test_a_walk_forward_is_frames(ballast: Ballast) -> None:
     assert walked.periods("allocation")["All in stocks"].tolist() == [1.0] * 4
     with pytest.raises(ValueError, match="figure is 'return': must be one of wealth, allocation"):
         walked.periods("return")  # type: ignore[arg-type]
-    # A report as `ballast backtest` writes it, of periods without dates.
+    # A report of periods without dates, as `ballast backtest` writes it.
     undated = json.loads(json.dumps({**report, "dates": None}))
     assert frames.periods(undated).index.tolist() == [1, 2, 3, 4]
 
@@ -167,7 +167,7 @@ def test_a_frontier_is_a_frame(ballast: Ballast) -> None:
                 point["beyond_own_mix"]["high"],
                 point["total"],
             )
-    # At the best scale of each law nothing more is lost than at the best.
+    # At the best scale of each law there is no excess loss.
     least = table["beyond_least"].isna()
     assert least.groupby(level="law").sum().tolist() == [1, 1, 1]
     assert table.loc[least, "lost"].tolist() == table.groupby(level="law", sort=False)["lost"].min().tolist()
@@ -198,13 +198,13 @@ def test_pictures_show_the_frames(ballast: Ballast) -> None:
     advice = ballast.advise(RETURNS, kind="log", rate_per_step=0.002)
     seen, worst = plots.worst_case(advice).collections
     assert len(seen.get_paths()) == len(RETURNS)
-    # Upwards and downwards, all of the probability.
+    # The lines upwards and those downwards each sum to 1.
     for law, sign in ((seen, 1.0), (worst, -1.0)):
         assert sum(np.asarray(path.vertices)[1, 1] for path in law.get_paths()) == pytest.approx(sign)
 
 
 def missing(package: str, call: str) -> str:
-    """What a call says where a package is not installed."""
+    """Returns the error message of a call while a package is not installed."""
     code = f"import sys; sys.modules[{package!r}] = None\nfrom ballast import frames, plots\n{call}"
     return subprocess.run([sys.executable, "-c", code], text=True, capture_output=True).stderr.splitlines()[-1]
 
@@ -218,8 +218,8 @@ def missing(package: str, call: str) -> str:
     ],
 )
 def test_what_to_install_is_said(package: str, call: str, message: str) -> None:
-    said = missing(package, call)
-    assert said.startswith("ImportError: ") and said.endswith(message)
+    output = missing(package, call)
+    assert output.startswith("ImportError: ") and output.endswith(message)
 
 
 def test_every_frame_says_what_it_needs() -> None:

@@ -1,4 +1,4 @@
-"""A table is read as the file that it came from, whatever holds it; and what was read comes back."""
+"""A table is read like the file it came from, in every type that holds it, and each answer says what was read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from conftest import RETURNS, Service, train
 from ballast import AsyncBallast, Ballast, ReportConflict, UnclearReturns, wire
 
 MONTHS = 30
-#: Months' ends, newest first, and prices that rise over time.
+#: Ends of months, newest first, and prices that rise over time.
 DAYS = [(datetime.date(2022, 7, 1) - datetime.timedelta(1))] + [
     datetime.date(2022 - (6 + month) // 12, 12 - (6 + month) % 12, 1) - datetime.timedelta(1) for month in range(MONTHS)
 ]
@@ -29,8 +29,8 @@ FORMS = ["%d.%m.%Y", "%m/%d/%Y", "%b %d, %Y", "%Y/%m/%d", "%Y-%m-%d", "%Y%m%d", 
 ONCE: dict[str, Any] = {"radius": {"rule": "fixed", "radius": 0.004}}
 
 
-def told(reading: Any) -> tuple[Any, ...]:
-    """What does not depend on how a record was written."""
+def content(reading: Any) -> tuple[Any, ...]:
+    """Returns the part of a reading that does not depend on how the record was written."""
     assert reading["outcome"] == "read", reading
     series = reading["series"][0]
     return reading.get("dates"), series["kind"], series["log_returns"], reading["newest_first"], reading["remarks"]
@@ -40,16 +40,16 @@ def told(reading: Any) -> tuple[Any, ...]:
 def test_an_index_of_dates_is_read_as_in_the_file(ballast: Ballast, form: str, tmp_path: Path) -> None:
     text = "Date;Price\n" + "".join(f"{day:{form}};{price}\n" for day, price in zip(DAYS, PRICES, strict=True))
     file = ballast.read_returns(text)
-    whole = told(file)
+    whole = content(file)
     assert whole[0][0] == "2020-01" and whole[3] and sum(whole[2]) > 0.0
     read = pd.read_csv(io.StringIO(text), sep=";", index_col=0)["Price"]
-    assert told(ballast.read_returns(read)) == whole
-    assert told(ballast.read_returns(read.to_frame())) == whole
-    assert told(ballast.read_returns(pd.read_csv(io.StringIO(text), sep=";"))) == whole
+    assert content(ballast.read_returns(read)) == whole
+    assert content(ballast.read_returns(read.to_frame())) == whole
+    assert content(ballast.read_returns(pd.read_csv(io.StringIO(text), sep=";"))) == whole
     advised = ballast.advise(read, rate_per_step=0.001, **ONCE)
     assert advised["allocation"] == ballast.advise(text, rate_per_step=0.001, **ONCE)["allocation"] > 0.0
     (tmp_path / "record.csv").write_bytes(text.encode("cp1252"))
-    assert told(ballast.read_returns(tmp_path / "record.csv")) == whole
+    assert content(ballast.read_returns(tmp_path / "record.csv")) == whole
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_an_index_of_dates_is_read_as_in_the_file(ballast: Ballast, form: str, t
     ids=lambda index: f"{type(index).__name__} {index.dtype}",
 )
 def test_whatever_holds_the_dates_they_are_read(ballast: Ballast, index: Any) -> None:
-    dates, kind, *_, newest_first, remarks = told(ballast.read_returns(pd.Series(PRICES, index, name="Price")))
+    dates, kind, *_, newest_first, remarks = content(ballast.read_returns(pd.Series(PRICES, index, name="Price")))
     assert (dates[0], dates[-1], kind, newest_first) == ("2020-01", "2022-06", "price", True)
     assert remarks == ["The rows came newest first and are reversed."]
 
@@ -78,16 +78,16 @@ def test_an_index_is_read_or_refused_and_never_dropped(ballast: Ballast) -> None
     for index in (falling.index, [f"week {day}" for day in range(31)], np.arange(31) ** 2, np.linspace(0.0, 1.0, 31)):
         reading: Any = ballast.read_returns(falling.set_axis(index))
         assert reading["outcome"] == "asked" and [each["asks"] for each in reading["questions"]] == ["newest_first"]
-    # What numbers the rows of a part says no more than from 0 on.
+    # Row numbers of a part of a record mean no more than row numbers from 0.
     later = pd.Series(PRICES * 2, name="Price").iloc[20:45]
-    assert told(ballast.read_returns(later)) == told(ballast.read_returns(later.reset_index(drop=True)))
-    # As does what is left of it where the rows have a column of dates.
+    assert content(ballast.read_returns(later)) == content(ballast.read_returns(later.reset_index(drop=True)))
+    # The same holds for shuffled row numbers if the rows have a column of dates.
     table = pd.DataFrame({"date": [str(day) for day in DAYS], "Price": PRICES})
-    assert told(ballast.read_returns(table.sort_values("date")))[:3] == told(ballast.read_returns(table))[:3]
+    assert content(ballast.read_returns(table.sort_values("date")))[:3] == content(ballast.read_returns(table))[:3]
     years = pd.Series([0.05, -0.03, 0.08, 0.02], [1990, 1991, 1992, 1993], name="return")
-    assert told(ballast.read_returns(years))[0] == ["1990", "1991", "1992", "1993"]
+    assert content(ballast.read_returns(years))[0] == ["1990", "1991", "1992", "1993"]
     counted = pd.Series(years.to_list(), range(1990, 1994), name="return")
-    assert told(ballast.read_returns(counted.rename_axis("year")))[0] == ["1990", "1991", "1992", "1993"]
+    assert content(ballast.read_returns(counted.rename_axis("year")))[0] == ["1990", "1991", "1992", "1993"]
     several = pd.DataFrame({"Price": PRICES}, pd.MultiIndex.from_product([["A"], DAYS]))
     hours = pd.Series([0.01, -0.02, 0.03], pd.period_range("2024-01-01 10:00", periods=3, freq="h"), name="return")
     assert "2024-01-01 11:00" in str(ballast.read_returns(hours))
@@ -116,7 +116,9 @@ def test_what_stands_beside_a_record_is_turned_round_with_it(ballast: Ballast) -
     advised = [ballast.advise_assets(table, **ONCE)["allocation"] for table in (two, two.iloc[::-1])]
     assert advised[0] == advised[1] and set(advised[0]) == {"fund", "bonds"}
     orders: list[tuple[list[float], wire.Choices]] = [(PRICES, {"newest_first": True}), (PRICES[::-1], {})]
-    lists = [ballast.advise(prices, kind="price", choices=said, rate_per_step=0.001, **ONCE) for prices, said in orders]
+    lists = [
+        ballast.advise(prices, kind="price", choices=choices, rate_per_step=0.001, **ONCE) for prices, choices in orders
+    ]
     assert lists[0]["allocation"] == lists[1]["allocation"]
 
 
@@ -137,14 +139,14 @@ def test_frames_of_polars_and_tables_of_pyarrow_keep_their_headings_and_dates(ba
     for held in holders:
         assert ballast.read_returns(held(one)) == ballast.read_returns(one)
         assert ballast.advise_assets(held(assets), **ONCE) == expected
-    # A gap is a gap, however it is written.
+    # A gap is read alike in every notation.
     gap = one.assign(**{"return": [math.nan, *returns[1:]]})
     with_null = pl.DataFrame(gap).with_columns(pl.col("return").fill_nan(None))
     for held in (pl.DataFrame(gap), with_null, pa.Table.from_pandas(gap), pa.table(with_null)):
-        assert told(ballast.read_returns(held)) == told(ballast.read_returns(gap))
-    # What was an index in pandas is one still.
+        assert content(ballast.read_returns(held)) == content(ballast.read_returns(gap))
+    # A former index of pandas is still read as one.
     indexed = pa.Table.from_pandas(pd.DataFrame({"Price": PRICES}, [f"{day:%d.%m.%Y}" for day in DAYS]))
-    assert told(ballast.read_returns(indexed))[0][0] == "2020-01"
+    assert content(ballast.read_returns(indexed))[0][0] == "2020-01"
     series = ballast.read_returns(pl.Series("Price", PRICES))
     assert series["outcome"] == "read" and series["series"][0]["kind"] == "price"
 
@@ -183,12 +185,12 @@ def test_what_was_read_comes_back_in_every_answer(ballast: Ballast, service: Ser
         assert read is not None and expected in read
     assert training.session().read is None and ballast.training(training.id).read is None
 
-    async def asked() -> None:
+    async def ask() -> None:
         async with AsyncBallast(service.url) as awaited:
             assert of_one in (await awaited.advise(one, **ONCE))["read"]
             assert of_two in ((await awaited.train_assets(two, **small)).read or "")
 
-    asyncio.run(asked())
+    asyncio.run(ask())
 
 
 def test_numbers_without_a_heading_are_asked_for_their_kind(ballast: Ballast) -> None:
@@ -202,21 +204,21 @@ def test_numbers_without_a_heading_are_asked_for_their_kind(ballast: Ballast) ->
         lambda: ballast.backtest(pl.Series(plain), rate=0.001, dates=[f"2020-{month:02}" for month in range(1, 11)]),
         lambda: ballast.advise_assets([[value, -value] for value in plain], assets=["a", "b"], rate_per_step=0.001),
         lambda: policy.session(history=plain),
-        # The service calls log-returns a history, whatever they came to be held in.
+        # Histories of the service are log-returns, even after conversion to another type.
         lambda: policy.session(history=pd.Series(session.history()["history"], name="fund")),
         lambda: policy.session(history=named),
     ]
     for call in calls:
-        with pytest.raises(UnclearReturns, match=r"more than one way: say which by kind\.\nAre these simple") as caught:
+        with pytest.raises(UnclearReturns, match=r"way: choose one with kind\.\nAre these simple") as caught:
             call()
         assert [question["asks"] for question in caught.value.questions] == ["kind"]
         assert "\n  kind='simple': 10 simple returns as fractions" in str(caught.value)
         assert "\n  kind='log': 10 log-returns as fractions" in str(caught.value)
-    # Numbers that may be percent as well are asked about both at once.
-    with pytest.raises(UnclearReturns, match="say which by kind and choices") as caught:
+    # If numbers may also be percent, both questions come at once.
+    with pytest.raises(UnclearReturns, match="choose one with kind and choices") as caught:
         ballast.advise([0.4, -0.3, 0.8, 0.1], rate_per_step=0.001)
     assert [question["asks"] for question in caught.value.questions] == ["kind", "unit"]
-    # Prices are none, and a heading says as much as in a file.
+    # Prices raise no question, and a heading counts as in a file.
     assert "returns of prices" in ballast.advise(PRICES[::-1], rate_per_step=0.001, **ONCE)["read"]
     assert "simple returns" in ballast.advise(named, rate_per_step=0.001, **ONCE)["read"]
     assert "log-returns" in ballast.advise(named.rename("log_return"), rate_per_step=0.001, **ONCE)["read"]
@@ -235,15 +237,17 @@ def test_a_history_of_the_service_is_taken_bit_for_bit(ballast: Ballast) -> None
     for session in (first, *copies):
         session.observe(simple_return=0.0371, flow=12.5).observe(simple_return=-0.0117, rate=0.0021)
     for copy in copies:
-        assert copy.read == "17 log-returns as fractions, as the service told them."
+        assert copy.read == "17 log-returns as fractions, as the service returned them."
         assert (copy.wealth, copy.holding) == (first.wealth, first.holding)
         assert copy.history()["history"] == known
         pd.testing.assert_frame_equal(copy.frame(), first.frame(), check_exact=True)
-    # What is given beside it counts, and what a policy was trained on is known as well.
+    # Other arguments override the history, and the history of a policy is known too.
     assert policy.session(history=past, wealth=7.0).wealth == 7.0
     problem = policy.detail()["specification"]["problem"]
     assert ballast.advise(problem["history"], rate_per_step=0.001)["read"].startswith("10 log-returns")
-    with pytest.raises(ValueError, match="kind is 'simple': must be 'log' or left out, as history are log-returns"):
+    with pytest.raises(
+        ValueError, match="kind is 'simple': must be 'log' or left out, because history are log-returns"
+    ):
         policy.session(history=past, kind="simple")
 
 
@@ -317,7 +321,7 @@ def test_an_object_behind_its_session_says_so(ballast: Ballast) -> None:
         (r"correction 1 was made at .* UTC, which", lambda: stale[1].correct(1, "another", log_return=0.04)),
         (
             r"renewal 1 was made at .* UTC \(the service renews the session every 2 periods\), which this object "
-            r"has not seen; refresh\(\) catches up",
+            r"has not seen: call refresh\(\)",
             lambda: stale[2].renew(policy.id),
         ),
     ]

@@ -1,4 +1,4 @@
-"""A service that asks for keys."""
+"""A service that requires keys."""
 
 from __future__ import annotations
 

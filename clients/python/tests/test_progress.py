@@ -1,4 +1,4 @@
-"""Progress by server-sent events: whole, in order, across breaks and restarts."""
+"""Progress by server-sent events: complete and in order, across lost connections and restarts."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_restart_in_the_middle_is_bridged(service: Service, ballast: Ballast) 
             service.start()
     assert seen[2]["state"] == "running" and seen[2]["progress"]["steps_done"] < LONG
     assert seen[-1]["state"] == "succeeded" and seen[-1]["progress"]["steps_done"] == LONG
-    # The step that the restart cut off is solved anew, the finished ones are not; no event comes twice in a row.
+    # Only the step that the restart interrupted is solved again, and no event comes twice in a row.
     steps = [job["progress"]["steps_done"] for job in seen]
     assert steps == sorted(steps)
     assert all(before != after for before, after in pairwise(seen))

@@ -1,4 +1,4 @@
-"""A record through a session: each period reported once, the answers as a frame."""
+"""Replays a record through a session: each period is reported once, and the answers are a frame."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_replay_that_broke_off_is_taken_up_by_the_same_call(
     again = ballast.session(session.id).replay(log_returns, kind="log")
     pd.testing.assert_frame_equal(lived, again)
     assert [row["period"] for row in session.history()["observations"]] == [1, 2, 3]
-    # Other content under the same number is refused, and a record goes on where it is told to.
+    # Other content under the same number is refused, and `period` says where a record continues.
     with pytest.raises(ReportConflict):
         session.replay([0.01], kind="log")
     with pytest.raises(SessionCompleted):
@@ -82,13 +82,13 @@ def test_what_cannot_be_replayed_is_refused_before_anything_is_sent(session: Ses
 
 
 def test_a_record_is_meant_as_it_is(session: Session) -> None:
-    """Neither a return far from the record nor a gap in its dates is doubted."""
+    """Neither an unusual return nor a gap in the dates needs a confirmation."""
     lived = session.replay([0.3, 0.01, 0.02], kind="log", dates=["2008-01-31", "2008-02-29", "2008-07-31"])
     assert lived["log_return"].tolist() == [0.3, 0.01, 0.02]
 
 
 def test_a_session_that_renews_itself_is_replayed_as_the_walk_forward_walks(ballast: Ballast) -> None:
-    """Four years on the bundled returns: the allocations and the wealth of `backtest`, to the bit."""
+    """Replays four years of the bundled returns: allocations and wealth equal those of `backtest`, bit for bit."""
     market = pd.read_csv(REPOSITORY / "data/us_market_monthly.csv", index_col="month")
     market = market[(market.index >= "1988-01") & (market.index <= "1994-12")]
     window, every, count, seed = 36, 12, 12, 5

@@ -1,4 +1,4 @@
-"""Lost requests, lost answers, refusals for the moment: repeated where that is safe, and done once."""
+"""Lost requests, lost answers and temporary refusals are retried if that is safe, and take effect once."""
 
 from __future__ import annotations
 
@@ -117,18 +117,18 @@ def test_a_service_that_stays_away_is_unreachable_and_a_restart_is_bridged(servi
 
 def test_the_first_loss_is_told_and_no_other(ballast: Ballast, network: Network, pauses: list[float]) -> None:
     network.refuse(3)
-    with pytest.warns(Repeating) as told:
+    with pytest.warns(Repeating) as caught:
         ballast.health()
-    (refused,) = (str(warning.message) for warning in told)
-    assert told[0].filename == __file__
+    (refused,) = (str(warning.message) for warning in caught)
+    assert caught[0].filename == __file__
     address = str(ballast._transport.http.base_url)
     assert refused.startswith(f"nothing answers at {address} yet (connection refused): trying again for up to 13 s.")
     assert "Start a service with 'ballast serve --data ballast-data'" in refused and len(pauses) == 3
     training = train(ballast, seed=22)
     network.refuse(2)
-    with pytest.warns(Repeating) as told:
+    with pytest.warns(Repeating) as caught:
         training.policy()
-    assert len(told) == 1
+    assert len(caught) == 1
     network.lose_answers(1)
     with pytest.warns(Repeating, match=r"^an answer was lost \(the connection was reset\): trying again"):
         ballast.health()

@@ -1,4 +1,4 @@
-"""Returns come in whatever holds numbers; what cannot be meant is refused here, before it is sent."""
+"""Returns in every type that holds numbers. The client refuses invalid ones before it sends them."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_kinds_agree() -> None:
         (pd.Series(SIMPLE, index=["2008-02", "2008-01", "2008-03"]), "log", "has 2008-01 after 2008-02"),
         (pd.DataFrame({"a": SIMPLE}, index=INDEX[[1, 0, 2]].to_period("M")), "log", "has 2008-01-31 after 2008-02-29"),
         ([100 * value for value in SIMPLE], "log", r"a standard deviation of 2\.94 a period: must be at most 0\.3"),
-        ([2.0, -0.5, 0.0], "simple", r"must be at most 0\.3, as fractions are, 0\.01 for 1 %"),
+        ([2.0, -0.5, 0.0], "simple", r"must be at most 0\.3; give fractions, 0\.01 for 1 %"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(returns: Any, kind: Kind, message: str) -> None:
@@ -85,18 +85,18 @@ def test_what_cannot_be_meant_is_refused(returns: Any, kind: Kind, message: str)
 
 def test_what_cannot_be_meant_of_several_assets_is_refused(ballast: Ballast) -> None:
     months = pd.DataFrame({"stocks": [*SIMPLE, 0.03], "bonds": [0.01, 0.0, -0.01, 0.02]}, index=MONTHS[:4])
-    said: dict[str, Any] = {"kind": "simple", "rate_per_step": 0.0}
+    given: dict[str, Any] = {"kind": "simple", "rate_per_step": 0.0}
     refused = {
         r"line 3: date is \"2005-01-31\": must be later than 2005-03-31": months.iloc[[2, 0, 1, 3]],
         r"line 3: bonds is \"\": there is no number in 1 of 4 rows": months.assign(bonds=[0.01, math.nan, 0.02, 0.01]),
         "assets has 'stocks' twice": months.set_axis(["stocks", "stocks"], axis="columns"),
         r"returns\[1\] has 1 numbers: must have one for each of \['stocks', 'bonds'\]": [[0.1, 0.2], [0.1]],
-        "assets is None: must name the columns where returns is no DataFrame, text or file": months.to_numpy(),
+        "assets is None: must name the columns because returns is no DataFrame, text or file": months.to_numpy(),
     }
     for message, wrong in refused.items():
         names = ["stocks", "bonds"] if isinstance(wrong, list) else None
         with pytest.raises(ValueError, match=message):
-            ballast.advise_assets(wrong, assets=names, **said)
+            ballast.advise_assets(wrong, assets=names, **given)
 
 
 def test_what_a_vendor_writes_beside_a_price_is_no_asset(ballast: Ballast) -> None:
@@ -112,11 +112,11 @@ def test_what_a_vendor_writes_beside_a_price_is_no_asset(ballast: Ballast) -> No
 
 def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: Ballast, tmp_path: Path) -> None:
     rows = [[value, 0.002 - 0.3 * value] for value in RECORD]
-    # Names that are numbers, such as those of deciles, are no row of numbers.
+    # Column names that are numbers, such as those of deciles, are not read as a row of numbers.
     table = pd.DataFrame(rows, index=MONTHS, columns=["1", "2"])
-    # The dates say how many periods make a year, and the column of the bank what it pays.
-    said: dict[str, Any] = {"kind": "simple", "rate_per_step": BANK[-1], "periods_per_year": 12.0, **ONCE}
-    plain = ballast.advise_assets(rows, assets=["1", "2"], **said)
+    # The dates show how many periods make a year, and the column of the bank shows its rates.
+    given: dict[str, Any] = {"kind": "simple", "rate_per_step": BANK[-1], "periods_per_year": 12.0, **ONCE}
+    plain = ballast.advise_assets(rows, assets=["1", "2"], **given)
     assert set(plain["allocation"]) == {"1", "2"} and plain["sample_size"] == 24
     assert plain.pop("read").startswith("24 simple returns as fractions, as in columns asset 1, asset 2")  # type: ignore[misc]
     assert unread(ballast.advise_assets(table, rate_per_step=BANK[-1], **ONCE)) == plain
@@ -125,8 +125,8 @@ def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: B
     named = table.set_axis(["one", "two"], axis="columns").assign(rf=BANK)
     named.to_csv(tmp_path / "named.csv")
     for held in (pl.DataFrame(rows, schema=["1", "2"], orient="row"), pa.table({"1": table["1"], "2": table["2"]})):
-        assert unread(ballast.advise_assets(held, **said)) == plain
-    # Dates and the rates of the bank are no assets, wherever they stand.
+        assert unread(ballast.advise_assets(held, **given)) == plain
+    # Dates and the rates of the bank are no assets, in whichever column they are.
     for returns in (
         named,
         named.rename_axis("month").reset_index(),
@@ -138,10 +138,10 @@ def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: B
             assert found["allocation"] == {"one": plain["allocation"]["1"], "two": plain["allocation"]["2"]}
     with pytest.raises(FileNotFoundError):
         ballast.advise_assets("missing.csv")
-    # Nor is the bank a second asset of a frontier.
-    asked: list[tuple[Any, float | None]] = [(named[["one", "rf"]], None), (named["one"], BANK[-1])]
+    # The bank is no second asset of a frontier either.
+    inputs: list[tuple[Any, float | None]] = [(named[["one", "rf"]], None), (named["one"], BANK[-1])]
     ends = [
-        ballast.frontier(returns, rate_per_step=rate, scales=[0.0], resamples=20).report() for returns, rate in asked
+        ballast.frontier(returns, rate_per_step=rate, scales=[0.0], resamples=20).report() for returns, rate in inputs
     ]
     assert ends[0]["resampled"] == ends[1]["resampled"]
     with pytest.raises(UnclearReturns, match="or all of them as several assets: advise_assets"):
@@ -184,7 +184,7 @@ def test_a_walk_forward_takes_dates_and_rates_from_pandas(ballast: Ballast) -> N
         prices.to_list(), kind="price", rate=rate.to_list(), dates=[str(date) for date in quarters], **choices
     ).report()
     assert plain == report
-    # The first change of a price is none, and neither it nor what the bank paid beside it is a period.
+    # The first price has no change, so neither it nor the rate of the bank beside it is a period.
     changes = prices.pct_change()
     later = ballast.backtest(changes.dropna(), kind="simple", rate=rate[1:], **choices).report()
     assert ballast.backtest(changes, kind="simple", rate=rate, **choices).report() == later
@@ -207,12 +207,12 @@ def test_a_text_a_file_and_a_table_are_read_alike(ballast: Ballast, tmp_path: Pa
         assert reading["series"][0]["log_returns"] == pytest.approx(LOGS, abs=1e-15)
     percent: Any = ballast.read_returns("0.2 -0.15 0.3", unit="percent")
     assert percent["series"][0]["log_returns"][0] == pytest.approx(math.log(1.002), abs=1e-15)
-    asked: Any = ballast.read_returns("0.2 -0.15 0.3")
-    assert [question["asks"] for question in asked["questions"]] == ["unit"]
+    unclear: Any = ballast.read_returns("0.2 -0.15 0.3")
+    assert [question["asks"] for question in unclear["questions"]] == ["unit"]
 
 
 def unread(answer: Any) -> dict[str, Any]:
-    """An answer without the sentence of what was read, which tells how it was given."""
+    """Returns an answer without the sentence that says how the returns were read."""
     assert answer["read"]
     return {name: value for name, value in answer.items() if name != "read"}
 
@@ -230,23 +230,23 @@ def test_what_a_quant_has_is_read_by_the_service(ballast: Ballast, tmp_path: Pat
     table = pd.DataFrame({"fund": RECORD, "rf": BANK}, index=MONTHS)
     path = tmp_path / "fund.csv"
     table.to_csv(path)
-    said = {"rate_per_step": BANK[-1], **ONCE}
-    plain = ballast.advise(RECORD, kind="simple", **said)
+    given = {"rate_per_step": BANK[-1], **ONCE}
+    plain = ballast.advise(RECORD, kind="simple", **given)
     held = [RECORD, tuple(RECORD), np.array(RECORD), np.array(RECORD)[:, None], pd.Series(RECORD), pl.Series(RECORD)]
     held += [pd.Series(RECORD, MONTHS), pa.array(RECORD), pd.DataFrame(RECORD)]
     for returns in held:
         with pytest.raises(UnclearReturns, match=r"kind='log': 24 (monthly )?log-returns as fractions"):
-            ballast.advise(returns, **said)
-        found = ballast.advise(returns, kind="simple", **said)
+            ballast.advise(returns, **given)
+        found = ballast.advise(returns, kind="simple", **given)
         assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-6), returns
     for returns in (table["fund"], pd.Series(RECORD, MONTHS.to_timestamp(), name="fund"), pl.Series("fund", RECORD)):
-        found = ballast.advise(returns, **said)
+        found = ballast.advise(returns, **given)
         assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-6), returns
     days = pd.period_range("2004-12", periods=25, freq="M")
     for priced in (prices, pd.Series(prices, days, name="close")):
-        found = ballast.advise(priced, choices={"kind": "price"}, **said)
+        found = ballast.advise(priced, choices={"kind": "price"}, **given)
         assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-6)
-    # The column of the bank says what it pays.
+    # The column of the bank gives its rates.
     for source in (table, path, path.read_text()):
         assert ballast.advise(source, **ONCE)["allocation"] == pytest.approx(plain["allocation"], abs=1e-6)
     specification = ballast.train(path, horizon=2, design={"count": 20}, **ONCE).policy().detail()["specification"]
@@ -265,12 +265,12 @@ def test_what_can_be_read_in_two_ways_is_asked_by_name(ballast: Ballast) -> None
             call(calm, rate_per_step=0.001)
         assert caught.value.argument == "returns"
         assert [question["asks"] for question in caught.value.questions] == ["unit"]
-        told = str(caught.value)
-        assert told.startswith("returns can be read in more than one way: say which by choices.")
-        assert "choices={'unit': 'fraction'}: 24 monthly simple returns as fractions" in told
-        assert "choices={'unit': 'percent'}: 24 monthly simple returns in percent" in told
-    taken = ballast.advise(calm, choices={"unit": "percent"}, rate_per_step=0.0, **ONCE)
-    assert taken["sample_size"] == 24
+        text = str(caught.value)
+        assert text.startswith("returns can be read in more than one way: choose one with choices.")
+        assert "choices={'unit': 'fraction'}: 24 monthly simple returns as fractions" in text
+        assert "choices={'unit': 'percent'}: 24 monthly simple returns in percent" in text
+    advised = ballast.advise(calm, choices={"unit": "percent"}, rate_per_step=0.0, **ONCE)
+    assert advised["sample_size"] == 24
     refused: dict[str, Any] = {
         r"returns: line 1: column 2 is \"x\": must be a number": "0.1 x 0.3",
         "returns: The numbers do not vary": [-0.01, -0.01, -0.01],
@@ -289,18 +289,18 @@ def test_what_can_be_read_in_two_ways_is_asked_by_name(ballast: Ballast) -> None
 
 
 def test_a_calm_record_in_percent_is_asked_about_though_its_kind_is_said(ballast: Ballast) -> None:
-    """0.4 % and 40 % look alike, whoever says that they are simple returns."""
+    """0.4 % and 40 % look alike, even if the caller says that they are simple returns."""
     percent = [0.4, -0.3, 0.8, 0.1, -0.2, 0.5, 0.3, -0.1]
     table = pd.DataFrame({"one": percent, "two": percent[::-1]})
-    said: dict[str, Any] = {"rate_per_step": 0.0005}
+    given: dict[str, Any] = {"rate_per_step": 0.0005}
     calls: list[Callable[..., Any]] = [
-        lambda **more: ballast.advise(percent, **said, **more),
-        lambda **more: ballast.train(percent, design={"count": 20}, horizon=2, **said, **more),
-        lambda **more: ballast.frontier(percent, scales=[0.0], resamples=20, **said, **more),
+        lambda **more: ballast.advise(percent, **given, **more),
+        lambda **more: ballast.train(percent, design={"count": 20}, horizon=2, **given, **more),
+        lambda **more: ballast.frontier(percent, scales=[0.0], resamples=20, **given, **more),
         lambda **more: ballast.backtest(percent, rate=0.0005, window=4, periods_per_year=12, **more),
-        lambda **more: ballast.advise_assets(table, **said, **more),
-        lambda **more: ballast.train_assets(table, design={"count": 20}, horizon=2, **said, **more),
-        lambda **more: ballast.frontier(table, scales=[0.0], resamples=20, **said, **more),
+        lambda **more: ballast.advise_assets(table, **given, **more),
+        lambda **more: ballast.train_assets(table, design={"count": 20}, horizon=2, **given, **more),
+        lambda **more: ballast.frontier(table, scales=[0.0], resamples=20, **given, **more),
     ]
     for call in calls:
         for kind in ("simple", "log"):
@@ -308,26 +308,26 @@ def test_a_calm_record_in_percent_is_asked_about_though_its_kind_is_said(ballast
                 call(kind=kind)
             assert [question["asks"] for question in caught.value.questions] == ["unit"]
             assert "choices={'unit': 'percent'}: " in str(caught.value)
-    taken = ballast.advise(percent, kind="simple", choices={"unit": "percent"}, **said)
-    fractions = ballast.advise([value / 100.0 for value in percent], kind="simple", **said)
-    assert unread(taken) == unread(fractions)
-    of_both = ballast.advise_assets(table, kind="simple", choices={"unit": "percent"}, **said)
+    in_percent = ballast.advise(percent, kind="simple", choices={"unit": "percent"}, **given)
+    fractions = ballast.advise([value / 100.0 for value in percent], kind="simple", **given)
+    assert unread(in_percent) == unread(fractions)
+    of_both = ballast.advise_assets(table, kind="simple", choices={"unit": "percent"}, **given)
     assert of_both["allocation"] == pytest.approx(
-        ballast.advise_assets(table / 100.0, kind="simple", **said)["allocation"], abs=1e-9
+        ballast.advise_assets(table / 100.0, kind="simple", **given)["allocation"], abs=1e-9
     )
     # Prices have no unit.
-    assert ballast.advise([100.4, 100.1, 100.9, 101.0], kind="price", **said)["sample_size"] == 3
+    assert ballast.advise([100.4, 100.1, 100.9, 101.0], kind="price", **given)["sample_size"] == 3
 
 
 def test_it_is_read_alike_where_it_is_awaited(service: Service) -> None:
-    async def asked() -> None:
+    async def ask() -> None:
         async with AsyncBallast(service.url) as ballast:
             table = pd.DataFrame({"fund": RECORD, "rf": BANK}, index=MONTHS)
             assert (await ballast.advise(table, **ONCE))["sample_size"] == 24
             with pytest.raises(UnclearReturns):
                 await ballast.advise(0.022 + table[["fund"]], rate_per_step=0.0)
 
-    asyncio.run(asked())
+    asyncio.run(ask())
 
 
 def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:
@@ -340,7 +340,7 @@ def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:
     count = pd.Series([3]).iloc[0]
     assert not isinstance(count, int)
     from_series = ballast.train(series, kind="log", horizon=count, rate_per_step=0.001, design={"count": 20})
-    # Its dates say that these are months.
+    # Its dates show that the periods are months.
     assert from_series.policy().id == train(ballast, periods_per_year=12).policy().id
 
 
@@ -359,6 +359,6 @@ def test_what_is_learned_from_is_read_everywhere_by_one_rule(ballast: Ballast) -
     assert {"kind", "choices"} <= Opening.__optional_keys__
     policy = train(ballast).policy()
     kinds: list[tuple[Kind, list[float]]] = [("simple", [math.log1p(value) for value in RETURNS]), ("log", RETURNS)]
-    for kind, told in kinds:
+    for kind, expected in kinds:
         known = policy.session(history=RETURNS, kind=kind).history()["history"]
-        np.testing.assert_allclose(known, told, atol=1e-15)
+        np.testing.assert_allclose(known, expected, atol=1e-15)

@@ -1,4 +1,4 @@
-"""Several assets: a table walked forward, and what is supposed of a session, by the names of pandas."""
+"""Several assets: the walk-forward of a table, and what-if scenarios of a session, by the names of pandas."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
 
     names = [line.get_label() for line in job.plot(strategies=["Equal shares", strategies.index[0]]).get_lines()]
     assert names == ["Equal shares", strategies.index[0]]
-    with pytest.raises(ValueError, match="'adaptive': must be of Robust, balanced, knows 2 years; Robust"):
+    with pytest.raises(ValueError, match="'adaptive': must be one of Robust, balanced, knows 2 years; Robust"):
         job.plot(strategies=["adaptive"])
     lines = {line.get_label(): line for line in job.plot().get_lines()}
     assert len(lines) == 10
@@ -117,6 +117,6 @@ def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Balla
 
     assert asyncio.run(awaited()) == supposed["wealth"]
     session.observe(simple_returns=returns.to_dict())
-    told = session.assets_action()
-    pd.testing.assert_series_equal(frames.allocation(supposed), frames.allocation(told))
-    assert (supposed["wealth"], supposed["period"]) == (session.wealth, told["period"])
+    action = session.assets_action()
+    pd.testing.assert_series_equal(frames.allocation(supposed), frames.allocation(action))
+    assert (supposed["wealth"], supposed["period"]) == (session.wealth, action["period"])

@@ -1,4 +1,4 @@
-"""The whole way: train, open a session, ask, report, look back."""
+"""The whole workflow: train, open a session, get advice, report, and read the history."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_what_was_reported_is_put_right(session: Session) -> None:
     now = first.get("now")
     assert now is not None and now["log_return"] == 0.02
     assert history["corrections"][0]["told"] == corrected
-    # An answer from before the correction does not bring back what was wrong.
+    # An answer from before the correction does not restore the wrong wealth.
     session.observe(missing=True, period=2)
     assert session.wealth == corrected["wealth"]
 
@@ -253,7 +253,7 @@ def test_many_sessions_report_at_once(ballast: Ballast, session: Session) -> Non
 
 
 def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, session: Session) -> None:
-    """Compares what goes over the network with api/openapi.json: an operation the service gains is missed here."""
+    """Compares the requests with api/openapi.json, so that it fails for an operation that the client lacks."""
     ballast.advise(RETURNS, kind="log", rate_per_step=0.001)
     ballast.read_returns("1.5 -2 3")
     training = train(ballast, seed=8)
@@ -314,7 +314,7 @@ def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
     report = compare(ballast).report()
     bank, half = report["strategies"]
     assert bank["strategy"] == "All in the bank"
-    # Every path of the bank ends alike, up to rounding.
+    # All paths of the bank have the same end, up to rounding.
     assert bank["utility"]["variance"]["value"] == pytest.approx(0.0, abs=1e-20)
     assert half["utility"]["mean"]["low"] <= half["utility"]["mean"]["value"] <= half["utility"]["mean"]["high"]
 
@@ -352,8 +352,8 @@ def test_every_field_of_a_walk_forward_is_an_argument() -> None:
 
 
 def test_every_hypothesis_is_an_argument() -> None:
-    asked = (Session.what_if, Session.assets_what_if)
-    arguments = {name for call in asked for name in inspect.signature(call).parameters} - {"self"}
+    calls = (Session.what_if, Session.assets_what_if)
+    arguments = {name for call in calls for name in inspect.signature(call).parameters} - {"self"}
     assert arguments == set(wire.WhatIf.__annotations__) - {"session"}
 
 

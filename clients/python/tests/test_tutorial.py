@@ -1,4 +1,4 @@
-"""The tutorial runs from the first cell to the last, and shows what it promises."""
+"""The tutorial runs from the first cell to the last and shows what its text describes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FOLDER = REPOSITORY / "clients/python/examples"
 
 @pytest.fixture(scope="module")
 def cells(service: Service) -> list[Any]:
-    """The cells of the notebook after it ran, in the folder where it lies."""
+    """Runs the notebook in its folder and returns its code cells."""
     stored = nbformat.read(FOLDER / "first_advice.ipynb", as_version=4)  # type: ignore[no-untyped-call]
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in stored.cells), "stored with outputs"
     sources = [cell.source for cell in stored.cells]
@@ -46,9 +46,9 @@ def test_its_advice_is_that_of_the_service(cells: list[Any], service: Service) -
     with Ballast(service.url) as ballast:
         rate = float(past["risk_free_return"].iloc[-1])
         simple = past["market_return"].to_list()
-        asked = ballast.advise([math.log1p(value) for value in simple], kind="log", rate_per_step=rate)
+        direct = ballast.advise([math.log1p(value) for value in simple], kind="log", rate_per_step=rate)
     first = shown(advice, "text/plain")[0].splitlines()[0].split()
-    assert first[0] == "allocation" and float(first[1]) == pytest.approx(asked["allocation"], abs=1e-6)
+    assert first[0] == "allocation" and float(first[1]) == pytest.approx(direct["allocation"], abs=1e-6)
 
 
 def test_it_says_nothing_that_it_should_not(cells: list[Any]) -> None:

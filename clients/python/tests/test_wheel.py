@@ -1,4 +1,4 @@
-"""What is tested is what is installed, and what is installed came out of the wheel that was built."""
+"""The tests run on the installed package, which comes from the built wheel."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def test_what_the_package_needs_is_little_and_the_rest_is_chosen() -> None:
 
 
 def test_one_wheel_brings_the_program_and_the_client(tmp_path: Path) -> None:
-    """Into an environment with nothing but Python, as on a machine without Rust."""
+    """Installs it into an environment with only Python, as on a machine without Rust."""
     program = tmp_path / "ballast"
     shutil.copy(BINARY, program)
     if strip := shutil.which("strip"):
-        # What is packed here is the build of the tests, whose symbols weigh more than the program.
+        # The build of the tests has symbols that are larger than the program.
         subprocess.run([strip, program], check=True)
     environment = {**os.environ, "BALLAST_PROGRAM": str(program)}
     build = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(HERE)]
@@ -60,7 +60,7 @@ def test_one_wheel_brings_the_program_and_the_client(tmp_path: Path) -> None:
     scripts = tmp_path / "empty/bin"
     subprocess.run([scripts / "pip", "install", "--quiet", wheel], check=True)
     advise: list[str | Path] = [scripts / "ballast", "advise", REPOSITORY / "data/us_market_monthly.csv", "--json"]
-    told = json.loads(subprocess.run(advise, check=True, capture_output=True, text=True).stdout)
+    advice = json.loads(subprocess.run(advise, check=True, capture_output=True, text=True).stdout)
     code = (
         "import subprocess, sys\n"
         "from ballast import Ballast\n"
@@ -77,8 +77,8 @@ def test_one_wheel_brings_the_program_and_the_client(tmp_path: Path) -> None:
         tmp_path / "data",
         REPOSITORY / "data/us_market_monthly.csv",
     ]
-    # Nothing is there but what the wheel brought.
-    asked = subprocess.run(
+    # The environment contains only what the wheel brought.
+    from_python = subprocess.run(
         arguments, check=True, capture_output=True, text=True, env={"PATH": str(scripts)}, cwd=tmp_path
     )
-    assert float(asked.stdout) == told["allocation"]
+    assert float(from_python.stdout) == advice["allocation"]

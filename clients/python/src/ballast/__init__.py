@@ -8,9 +8,9 @@
             allocation = session.action()["allocation"]
             session.observe(simple_return=...)
 
-:class:`AsyncBallast` is the same to be awaited. Requests and answers are the JSON of the service, typed in
-:mod:`ballast.wire`; :mod:`ballast.frames` has them as pandas objects and :mod:`ballast.plots` as pictures; what goes
-wrong is in :mod:`ballast.errors`.
+:class:`AsyncBallast` is the same client for asyncio. Requests and answers are the JSON of the service, typed in
+:mod:`ballast.wire`. :mod:`ballast.frames` converts answers to pandas objects, and :mod:`ballast.plots` draws them.
+:mod:`ballast.errors` has the exceptions.
 """
 
 from . import frames, plots, wire

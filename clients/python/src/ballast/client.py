@@ -33,7 +33,7 @@ from .session import AsyncSession, Session
 from .sheet import Table
 from .transport import RETRIED_STATUS, Awaiting, Transport, Waiting, growing_pause, idempotent
 
-#: What a list of sessions is in the order of; with ``-`` before it descending.
+#: The field by which a list of sessions is sorted; with a leading ``-``, in descending order.
 SessionSort: TypeAlias = Literal[
     "created", "-created", "name", "-name", "wealth", "-wealth", "last_report", "-last_report"
 ]
@@ -43,19 +43,19 @@ T = TypeVar("T")
 
 
 class Advised(wire.Advised):
-    """An advice, and the sentence of what was read for it."""
+    """An advice, with a sentence that says how the returns were read."""
 
     read: str
 
 
 class AssetsAdvised(wire.AssetsAdvised):
-    """An advice on several assets, and the sentence of what was read for it."""
+    """An advice on several assets, with a sentence that says how the returns were read."""
 
     read: str
 
 
 class _Ballast:
-    """The calls of a service, however they wait."""
+    """The calls of a service, for both the blocking and the asynchronous client."""
 
     _transport: Transport
 
@@ -91,18 +91,18 @@ class _Ballast:
     ) -> wire.Job:
         """Queues a training on the returns seen so far, and does not wait for it.
 
-        ``returns`` is a list, an array, a Series, a DataFrame, the ``Path`` of a CSV or its text: returns of any kind,
-        in any unit, or prices. The service reads it (:meth:`read_returns`), with its dates and the column of
-        the bank. ``kind`` (``"simple"``, ``"log"`` or ``"price"``) says what the numbers are where they do not, and
-        ``choices`` all else, such as ``{"unit": "percent"}``. Where they can still be read in two ways,
-        :class:`UnclearReturns` says which those are, and what to add to ``choices`` for each.
+        ``returns`` is a list, an array, a Series, a DataFrame, the ``Path`` of a CSV or its text. It holds returns of
+        any kind and in any unit, or prices. The service reads it (:meth:`read_returns`), with its dates and the column
+        of the bank. If the numbers do not show what they are, ``kind`` (``"simple"``, ``"log"`` or ``"price"``) says
+        so. ``choices`` settles everything else, such as ``{"unit": "percent"}``. If two readings are still possible,
+        :class:`UnclearReturns` lists them and what to add to ``choices`` for each.
 
         ``rate_per_step`` is what the bank pays per period of the returns, as a fraction: 0.00247 a month for 3 % a
-        year; by default what it paid last, where ``returns`` say so. What is left out the service chooses, and
-        ``Policy.detail`` tells. ``name``, ``notes`` and ``tags`` are what the policy is to be called, and no
-        part of what it is. The same ``idempotency_key`` and arguments again, even from another process, give
-        the same job. Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates
-        of an index that do not increase), before anything is queued.
+        year. By default it is the last rate in ``returns``, if they have a column of rates. The service chooses what
+        you leave out, and ``Policy.detail`` shows what it chose. ``name``, ``notes`` and ``tags`` label the policy and
+        do not change it. The same ``idempotency_key`` and arguments again, even from another process, give the same
+        job. Raises ``ValueError`` before anything is queued if ``returns`` cannot be correct, for example if a number
+        is missing or the dates of an index do not increase.
         """
         found = await self._one(returns, kind, choices)
         problem = {
@@ -142,17 +142,17 @@ class _Ballast:
         sensitivity: bool | None = None,
         **problem: Any,
     ) -> Advised:
-        """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
+        """Returns what to hold through one period, given the returns seen so far. Nothing is trained or stored.
 
-        ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``, and so is every other field of the
-        problem that is given by name, such as ``risk_aversion`` or ``trading_cost``. ``wealth`` and ``holding`` are
-        what the investor has, and what share of it is in the asset already. ``sensitivity=True`` also says how
-        near the advice is to changing.
+        ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``. Every other field of the problem
+        can be given by name, such as ``risk_aversion`` or ``trading_cost``. ``wealth`` is what the investor has, and
+        ``holding`` is the share of it that is already in the asset. ``sensitivity=True`` also shows how close the
+        advice is to changing.
         """
         found = await self._one(returns, kind, choices)
-        told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
+        terms = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
         question = {
-            "problem": {"history": found.series[0], **_given(told), **_given(problem)},
+            "problem": {"history": found.series[0], **_given(terms), **_given(problem)},
             "wealth": wealth,
             "holding": holding,
             "sensitivity": sensitivity,
@@ -172,14 +172,14 @@ class _Ballast:
         holdings: Mapping[str, float] | None = None,
         **problem: Any,
     ) -> AssetsAdvised:
-        """What to hold of each of several assets through one period. Nothing is trained or stored.
+        """Returns what to hold of each of several assets through one period. Nothing is trained or stored.
 
         ``returns`` has a column for each asset: a DataFrame, a text or the ``Path`` of a file, or rows of numbers with
-        ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank; ``assets``
-        chooses among them. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what
-        the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
-        as ``ground_norm``, ``risk_aversion``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is
-        what share of wealth is in each asset already, by its name.
+        ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank. ``assets``
+        selects some of them. ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``. The rates of the bank may
+        be in a column that ``assets`` does not name. Every other field of the problem can be given by name, such as
+        ``ground_norm``, ``risk_aversion``, ``caution``, ``radius``, ``support`` or ``trading_cost``. ``holdings`` is
+        the share of wealth that is already in each asset, by its name.
         """
         whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth, "holdings": holdings})
@@ -205,9 +205,9 @@ class _Ballast:
     ) -> wire.Job:
         """Queues the training of a policy for several assets, and does not wait for it.
 
-        ``returns``, ``kind``, ``choices``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so
-        is every other field of the problem that is given by name; also ``horizon``, ``trading_cost``,
-        ``contributions`` and ``composition``. What else is given is as in ``train``.
+        ``returns``, ``kind``, ``choices``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``. Every other
+        field of the problem can be given by name, also ``horizon``, ``trading_cost``, ``contributions`` and
+        ``composition``. The remaining arguments are as in ``train``.
         """
         of_assets, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
@@ -215,10 +215,10 @@ class _Ballast:
         return _having_read(await self._queued("/train", request, idempotency_key), found)
 
     async def _one(self, returns: Returns, kind: Kind | None, choices: wire.Choices | None) -> Read:
-        """Returns of one asset."""
+        """Reads the returns of one asset."""
         found = await read(self._transport, returns, kind, choices)
         if len(found.series) != 1:
-            raise ValueError("returns has several columns: must be one; train_assets and advise_assets take several")
+            raise ValueError("returns has several columns: must have one (train_assets and advise_assets take several)")
         return found
 
     async def _of_assets(
@@ -230,18 +230,18 @@ class _Ballast:
         assets: Sequence[str] | None,
         problem: Mapping[str, Any],
     ) -> tuple[dict[str, Any], Read]:
-        """The problem of several assets, and what was read for it."""
+        """Returns the problem of several assets, and the returns that were read for it."""
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
-        told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
-        return {"assets": names, "history": found.rows, **_given(told), **_given(problem)}, found
+        terms = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
+        return {"assets": names, "history": found.rows, **_given(terms), **_given(problem)}, found
 
     async def _read_returns(self, source: str | os.PathLike[str] | Table, /, **choices: Any) -> wire.Reading:
-        """What a text of returns or prices says: one record, or what must be asked, or where it is wrong.
+        """Reads returns or prices. The result is one record, a list of questions, or the place of a mistake.
 
         ``source`` is a text, the ``Path`` of a file, a table of pandas, polars or pyarrow, an array or a list.
-        ``choices`` say what it does not, or answer what was asked: ``unit="percent"``, ``columns=["fund"]`` (several
-        are several assets). Look at ``reading["outcome"]``: ``"read"`` has a ``sentence`` to check it by, and
-        ``series``.
+        ``choices`` answer the questions or add what the source does not show: ``unit="percent"``, ``columns=["fund"]``
+        (several columns are several assets). Look at ``reading["outcome"]``: ``"read"`` comes with the ``series`` and
+        with a ``sentence`` to check them by.
         """
         return await reading_of(self._transport, source, None, cast(wire.Choices, choices), "source")
 
@@ -254,13 +254,13 @@ class _Ballast:
         tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
     ) -> wire.Job:
-        """Queues the training of a whole specification, such as ``Policy.detail`` shows. Its policy is to be called as
-        in ``train``."""
+        """Queues the training of a whole specification, such as the one in ``Policy.detail``. ``name``, ``notes`` and
+        ``tags`` label its policy as in ``train``."""
         request = {**specification, **relabelled(name, notes, tags)}
         return await self._queued("/train", request, idempotency_key)
 
     async def _job(self, job: str) -> wire.Job:
-        """A training, an evaluation, a walk-forward or a frontier that was queued before."""
+        """Returns a training, an evaluation, a walk-forward or a frontier that was queued before."""
         return cast(wire.Job, await self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
 
     async def _evaluate(self, request: wire.EvaluationRequest, *, idempotency_key: str | None = None) -> wire.Job:
@@ -293,11 +293,11 @@ class _Ballast:
     ) -> wire.Job:
         """Queues a walk-forward through a record of returns, as ``ballast backtest`` does, and does not wait for it.
 
-        ``returns``, ``kind`` and ``choices`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all
-        periods or one for each, by default as ``returns`` say. ``dates`` are texts or dates, one for each
-        number, by default those of the index of a pandas object, and tell how many periods make a year;
-        ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
-        Raises ``ValueError`` where ``returns``, ``rate`` or ``dates`` cannot be meant, before anything is queued.
+        ``returns``, ``kind`` and ``choices`` are as in ``train``. ``rate`` is what the bank paid: one fraction for all
+        periods or one for each. By default it is the column of rates in ``returns``. ``dates`` are texts or dates, one
+        for each number, by default those of the index of a pandas object. They show how many periods make a year;
+        without dates, give ``periods_per_year``. The service chooses what you leave out, and the report shows what it
+        chose. Raises ``ValueError`` before anything is queued if ``returns``, ``rate`` or ``dates`` cannot be correct.
         """
         found = await self._one(returns, kind, choices)
         request = {
@@ -342,15 +342,15 @@ class _Ballast:
         """Queues a walk-forward through a table of several assets, as ``ballast backtest`` does, and does not wait for
         it.
 
-        ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``; ``rate`` and ``dates`` as in
-        ``backtest``, and dates are needed. ``windows`` are how many of the last periods strategies know, ``None`` for
-        all. What is left out the service chooses, and the report tells. Raises ``ValueError`` where ``returns``,
-        ``rate`` or ``dates`` cannot be meant, before anything is queued.
+        ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``. ``rate`` and ``dates`` are as in
+        ``backtest``, but dates are required. ``windows`` says how many of the last periods each strategy learns from,
+        with ``None`` for all. The service chooses what you leave out, and the report shows what it chose. Raises
+        ``ValueError`` before anything is queued if ``returns``, ``rate`` or ``dates`` cannot be correct.
         """
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
         beside = _beside(found, returns, rate, dates)
         if beside["dates"] is None:
-            raise ValueError("dates is None: must be given where returns has none")
+            raise ValueError("dates is None: must be given because returns have no dates")
         request = {
             "assets": names,
             "log_returns": found.rows,
@@ -385,19 +385,20 @@ class _Ballast:
         idempotency_key: str | None = None,
         **problem: Any,
     ) -> wire.Job:
-        """Queues the frontier of caution: what multiples of the radius lose on records like this one.
+        """Queues the frontier of caution: what each multiple of the radius loses on records like this one.
 
         ``returns`` are of one asset as in ``advise``, or, with more than one column, of several as in
-        ``advise_assets``. Every other field of the problem is given by name, such as ``risk_aversion`` or ``radius``.
+        ``advise_assets``. Every other field of the problem can be given by name, such as ``risk_aversion`` or
+        ``radius``.
         """
         if assets is None and len(getattr(returns, "columns", ())) < 2:
             found = await self._one(returns, kind, choices)
-            told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
-            whole = {"history": found.series[0], **_given(told), **_given(problem)}
+            terms = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
+            whole = {"history": found.series[0], **_given(terms), **_given(problem)}
         else:
             whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
             if len(whole["assets"]) == 1:
-                # Of two columns one was of dates or of the bank.
+                # One of the two columns held dates or the rates of the bank.
                 del whole["assets"]
                 whole["history"] = [log_return for (log_return,) in whole["history"]]
         request = {
@@ -410,22 +411,22 @@ class _Ballast:
         return _having_read(await self._queued("/frontier", _given(request), idempotency_key), found)
 
     async def _import_policy(self, document: bytes) -> str:
-        """Stores an exported policy; one that the service knows already stays as it is."""
+        """Stores an exported policy. A policy that the service already has does not change."""
         imported: wire.Imported = await self._transport.json("POST", "/policies/import", body=document)
         return imported["policy"]
 
     async def _session(self, session: str) -> wire.Session:
-        """A session that was opened before, at the period it has come to."""
+        """Returns a session that was opened before, at its current period."""
         return cast(wire.Session, await self._transport.json("GET", f"/sessions/{quote(session, safe='')}"))
 
     async def _observe(self, reports: Iterable[wire.Observe]) -> list[wire.ElementAnswered]:
-        """Reports a period of each of many sessions at once, and answers what became of each, in their order.
+        """Reports one period of each of many sessions, and returns one answer for each report, in the same order.
 
-        A report is what :meth:`Session.observe <ballast.Session.observe>` sends: ``session``, ``period`` and how the
-        period went. Each is recorded, answered and refused by itself: ``status`` is 200 beside an ``answer``, and
-        another beside a ``problem``, where ``Session.observe`` would raise. A thousand go in one request. What is
-        refused for the moment is sent again by itself, as a lost request is; the same reports again are answered as
-        they were. Objects of these sessions learn of it by ``refresh``.
+        A report is what :meth:`Session.observe <ballast.Session.observe>` sends: ``session``, ``period`` and what
+        happened in the period. The service accepts or refuses each report separately. ``status`` is 200 with an
+        ``answer``; any other status comes with a ``problem``, for which ``Session.observe`` would raise. One request
+        carries a thousand reports. The client retries lost requests and reports that are refused temporarily. The same
+        reports again get the same answers. Call ``refresh`` on objects of these sessions to update them.
         """
         reports = list(reports)
         answered: dict[int, wire.ElementAnswered] = {}
@@ -442,11 +443,11 @@ class _Ballast:
         return [answered[index] for index in range(len(reports))]
 
     def _jobs(self) -> AsyncIterator[wire.Job]:
-        """All jobs, newest first."""
+        """Iterates over all jobs, newest first."""
         return self._listed("/jobs", "jobs")
 
     def _policies(self) -> AsyncIterator[wire.PolicyEntry]:
-        """All policies, newest first."""
+        """Iterates over all policies, newest first."""
         return self._listed("/policies", "policies")
 
     def _sessions(
@@ -457,20 +458,20 @@ class _Ballast:
         state: Literal["active", "waiting", "completed"] | None = None,
         sort: SessionSort | None = None,
     ) -> AsyncIterator[wire.SessionEntry]:
-        """All sessions, or those that match, each with what it is called and where it stands; newest first unless told.
+        """Iterates over all sessions, or those that match, with their labels and state; newest first by default.
 
-        ``search`` is words, each the beginning of a word of the session's or its policy's name or tags, or eight digits
-        or more with which an identifier begins, whatever the case; ``tag`` is one that they have.
-        :func:`ballast.frames.sessions` makes a table of them.
+        ``search`` matches words, ignoring case. Each word must be the beginning of a word in the name or the tags of
+        the session or its policy, or at least the first eight digits of an identifier. ``tag`` selects the sessions
+        that have this tag. :func:`ballast.frames.sessions` makes a table of them.
         """
         return self._listed("/sessions", "sessions", search=search, tag=tag, state=state, sort=sort)
 
     def _audit(self, *, tenant: str | None = None, object: str | None = None) -> AsyncIterator[wire.AuditEntry]:
-        """Who did what, newest first, of all tenants and things unless told; for keys with the role ``admin``."""
+        """Lists who did what, newest first, by default for all tenants and objects. Needs the role ``admin``."""
         return self._listed("/audit", "entries", tenant=tenant, object=object)
 
     async def _health(self) -> wire.Health:
-        """The service in a few words. Raises :class:`Overloaded` where it is draining."""
+        """Returns the state of the service. Raises :class:`Overloaded` while it is shutting down."""
         return cast(wire.Health, await self._transport.json("GET", "/health"))
 
     async def _close(self) -> None:
@@ -499,11 +500,12 @@ class _Ballast:
 class Ballast(_Ballast):
     """A service at ``url``.
 
-    ``key`` is shown with every request: ``BALLAST_KEY`` of the environment unless given.
-    ``timeout`` bounds each wait for the network, in seconds. A request that is lost or put off is sent again up to
-    ``retries`` times, after 0.2 s, 0.4 s and so on (``ballast.transport`` says which, and why that is safe).
-    ``headers`` go with every request, and ``transport`` replaces the connections themselves (proxies, certificates).
-    Safe to share between threads; as a context manager it closes its connections at the end.
+    ``key`` is sent with every request; by default it is ``BALLAST_KEY`` of the environment.
+    ``timeout`` bounds each wait for the network, in seconds. If a request is lost or refused temporarily, the client
+    retries it up to ``retries`` times, after 0.2 s, 0.4 s and so on (``ballast.transport`` says which requests, and why
+    that is safe). ``headers`` are sent with every request, and ``transport`` replaces the connections themselves
+    (proxies, certificates). You can share one object between threads. As a context manager it closes its connections
+    at the end.
     """
 
     def __init__(
@@ -545,7 +547,7 @@ class Ballast(_Ballast):
     audit = Answering(wire.AuditEntry).iterating(_Ballast._audit)
 
     def policy(self, policy: str) -> Policy:
-        """A policy by its name. Asks nothing of the service yet."""
+        """Returns a policy by its name, without a request to the service."""
         return Policy(self._transport, policy)
 
     def __enter__(self) -> Self:
@@ -558,12 +560,12 @@ class Ballast(_Ballast):
 
 
 class AsyncBallast(_Ballast):
-    """A :class:`Ballast` whose calls are awaited: the same names, arguments, answers and errors, for asyncio.
+    """A :class:`Ballast` for asyncio, with the same names, arguments, answers and errors.
 
-    ``jobs()``, ``policies()``, ``sessions()``, ``audit()`` and ``events()`` are for ``async for``, ``async with``
-    closes the connections at the end, and objects that come out of calls (:class:`AsyncTraining`,
-    :class:`AsyncSession`) are awaited likewise. For the tasks of one event loop. The arguments are those of
-    :class:`Ballast`, but ``transport``, which is an asynchronous one.
+    Use ``async for`` with ``jobs()``, ``policies()``, ``sessions()``, ``audit()`` and ``events()``. ``async with``
+    closes the connections at the end. The calls of the objects it returns (:class:`AsyncTraining`,
+    :class:`AsyncSession`) are awaited too. Use one object in one event loop only. The arguments are those of
+    :class:`Ballast`, except that ``transport`` is an asynchronous one.
     """
 
     def __init__(
@@ -605,7 +607,7 @@ class AsyncBallast(_Ballast):
     audit = _Ballast._audit
 
     def policy(self, policy: str) -> AsyncPolicy:
-        """A policy by its name. Asks nothing of the service yet."""
+        """Returns a policy by its name, without a request to the service."""
         return AsyncPolicy(self._transport, policy)
 
     async def __aenter__(self) -> Self:
@@ -617,11 +619,11 @@ class AsyncBallast(_Ballast):
         await self.close()
 
 
-#: Entries asked for at a time.
+#: Entries requested at a time.
 _PAGE = 200
 #: Reports sent at a time.
 _REPORTS = 1000
-#: The pause before elements of a list that were refused for the moment are sent again: rates are by the second.
+#: The pause before the elements of a list that were refused temporarily are retried. Rate limits are per second.
 _SECOND = 1.0
 
 
@@ -629,16 +631,16 @@ def _last_rate(found: Read, rate_per_step: float | None) -> float:
     if rate_per_step is not None:
         return rate_per_step
     if not found.rates:
-        raise ValueError("rate_per_step is missing: must be given, as returns do not say what the bank paid")
+        raise ValueError("rate_per_step is missing: must be given because returns have no rates of the bank")
     return found.rates[-1]
 
 
 def _beside(
     found: Read, returns: Returns, rate: float | Sequence[float] | None, dates: Iterable[object] | None
 ) -> dict[str, Any]:
-    """What the bank paid through a record and the dates of its periods: as given, or else as they were read.
+    """Returns the rates of the bank and the dates of the periods: those given, or else those that were read.
 
-    Raises ``ValueError`` that names the argument and the rule.
+    Raises ``ValueError``, which names the argument and the rule.
     """
     count = len(found.series[0])
     days = found.dates
@@ -649,12 +651,12 @@ def _beside(
         rate = [float(each) for each in paid]
     rate = found.rates if rate is None else rate
     if rate is None:
-        raise ValueError("rate is missing: must be given, as returns do not say what the bank paid")
+        raise ValueError("rate is missing: must be given because returns have no rates of the bank")
     return {"rate": rate, "dates": days}
 
 
 def _having_read(answer: T, found: Read) -> T:
-    """The answer with the sentence of what was read for it."""
+    """Returns the answer with the sentence that says how the returns were read."""
     return cast(T, {**cast(Mapping[str, Any], answer), "read": found.sentence})
 
 
@@ -667,6 +669,6 @@ def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _headers(key: str | None, more: Mapping[str, str] | None) -> dict[str, str]:
-    """What goes with every request: the key, from the environment unless given, and ``more``."""
+    """Returns the headers of every request: the key, by default from the environment, and ``more``."""
     key = os.environ.get("BALLAST_KEY") if key is None else key
     return {**({"authorization": f"Bearer {key}"} if key else {}), **(more or {})}

@@ -1,11 +1,10 @@
-"""One core, two drivers: calls are written once, as coroutines, and become those that wait and those to be awaited.
+"""Makes a blocking and an asynchronous call from each coroutine, so that every call is written once.
 
-What a call does (what it sends, what it repeats, what it makes of the answer) is a coroutine of a class whose name
-begins with an underscore, such as ``_Session._observe``. It suspends nowhere but in a :class:`Transport
-<ballast.transport.Transport>`. Over a :class:`Waiting <ballast.transport.Waiting>` transport, which waits on the
-spot, it does not suspend at all, so that :func:`run` gets its result in one go and needs no event loop, not even
-where one runs already, as in a notebook. Over an :class:`Awaiting <ballast.transport.Awaiting>` transport it is an
-ordinary coroutine.
+A call is a coroutine of a class whose name begins with an underscore, such as ``_Session._observe``. The coroutine
+decides what to send, what to retry and what to make of the answer. It suspends only in a :class:`Transport
+<ballast.transport.Transport>`. A :class:`Waiting <ballast.transport.Waiting>` transport blocks and never suspends, so
+:func:`run` gets the result at once and needs no event loop. It also works inside a running loop, as in a notebook. Over
+an :class:`Awaiting <ballast.transport.Awaiting>` transport the call is an ordinary coroutine.
 """
 
 from __future__ import annotations
@@ -26,24 +25,24 @@ class _Driven(Protocol):
 S = TypeVar("S")
 D = TypeVar("D", bound=_Driven)
 P = ParamSpec("P")
-#: What comes over the wire, and what is made of it.
+#: The answer on the wire, and the object made from it.
 W = TypeVar("W")
 R = TypeVar("R")
 
 
 def run(awaitable: Awaitable[R]) -> R:
-    """The result of something that never suspends."""
+    """Returns the result of an awaitable that never suspends."""
     steps = awaitable.__await__()
     try:
         next(steps)
     except StopIteration as end:
         result: R = end.value
         return result
-    raise RuntimeError("a call over a transport that waits was suspended")
+    raise RuntimeError("a call over a blocking transport was suspended")
 
 
 def blocking(method: Callable[Concatenate[S, P], Coroutine[Any, Any, R]]) -> Callable[Concatenate[S, P], R]:
-    """The call that waits."""
+    """Returns the blocking call of a coroutine."""
 
     @functools.wraps(method)
     def call(self: S, /, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -53,20 +52,23 @@ def blocking(method: Callable[Concatenate[S, P], Coroutine[Any, Any, R]]) -> Cal
 
 
 class Answering(Generic[R]):
-    """Calls that wait and answer with this TypedDict, which mypy otherwise shows without its name: it forgets that of
-    one that it infers beside a ParamSpec. ``tests/test_async.py`` compares it with what the coroutine says."""
+    """Makes blocking calls that return this TypedDict.
+
+    mypy loses the name of a TypedDict that it infers together with a ParamSpec, so it is given here.
+    ``tests/test_async.py`` compares it with the annotation of the coroutine.
+    """
 
     def __init__(self, answer: type[R]) -> None:
         self._answer = answer
 
     def blocking(self, method: Callable[Concatenate[S, P], Coroutine[Any, Any, Any]]) -> Callable[Concatenate[S, P], R]:
-        """The call that waits."""
+        """Returns the blocking call of a coroutine."""
         return _answering(blocking(method), method, self._answer)
 
     def iterating(
         self, method: Callable[Concatenate[S, P], AsyncIterator[Any]]
     ) -> Callable[Concatenate[S, P], Iterator[R]]:
-        """The iterator that waits; where it is left early, what it holds open is closed."""
+        """Returns the blocking iterator. If it is abandoned early, it closes what it holds open."""
 
         @functools.wraps(method)
         def call(this: S, /, *args: P.args, **kwargs: P.kwargs) -> Iterator[R]:
@@ -87,7 +89,7 @@ class Answering(Generic[R]):
 def blocking_into(
     method: Callable[Concatenate[D, P], Coroutine[Any, Any, W]], made: Callable[[Transport, W], R]
 ) -> Callable[Concatenate[D, P], R]:
-    """The call that waits, and makes an object of what it gets."""
+    """Returns the blocking call, which makes an object of the answer."""
 
     @functools.wraps(method)
     def call(self: D, /, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -99,7 +101,7 @@ def blocking_into(
 def awaiting_into(
     method: Callable[Concatenate[D, P], Coroutine[Any, Any, W]], made: Callable[[Transport, W], R]
 ) -> Callable[Concatenate[D, P], Coroutine[Any, Any, R]]:
-    """The call to be awaited that makes an object of what it gets."""
+    """Returns the asynchronous call, which makes an object of the answer."""
 
     @functools.wraps(method)
     async def call(self: D, /, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -109,6 +111,6 @@ def awaiting_into(
 
 
 def _answering(call: S, method: Callable[..., object], made: object) -> S:
-    """Shows what is made in the place of what the coroutine says."""
+    """Annotates the call with what it makes instead of what the coroutine returns."""
     setattr(call, "__signature__", inspect.signature(method).replace(return_annotation=made))  # noqa: B010
     return call

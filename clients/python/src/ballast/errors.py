@@ -1,8 +1,8 @@
-"""What can go wrong, as exceptions.
+"""The exceptions of this package.
 
-A refusal of the service is a :class:`ProblemError` with the parts of its problem document (RFC 9457); the kinds that a
-program may want to tell apart have a class of their own, found by the last part of the document's ``type``. A kind that
-this client does not know yet is a plain :class:`ProblemError`.
+If the service refuses a request, the client raises a :class:`ProblemError` with the parts of the problem document
+(RFC 9457). Kinds that a program may want to distinguish have their own class, chosen by the last part of the document's
+``type``. A kind that this client does not know yet is a plain :class:`ProblemError`.
 """
 
 from __future__ import annotations
@@ -16,25 +16,28 @@ from . import wire
 
 
 class BallastError(Exception):
-    """Everything this package raises, but for arguments that cannot be sent at all (``ValueError``, ``TypeError``)."""
+    """Base of all exceptions of this package, except ``ValueError`` and ``TypeError`` for arguments it cannot send."""
 
 
 class Unreachable(BallastError):
-    """No answer came, and the request may have been carried out all the same. Where it can be sent again without harm,
-    the method that sent it says so."""
+    """No answer came. The service may have carried out the request nevertheless. The method that sent it says whether
+    it is safe to send it again."""
 
 
 class Repeating(RuntimeWarning):
-    """Warns, once a call, that no answer has come and that the request is sent again: why, and for how long."""
+    """Warns, once per call, that no answer came and the request is being retried. It says why and for how long."""
 
 
 class DamagedPolicy(BallastError):
-    """The bytes of an exported policy do not hash to its name."""
+    """The SHA-256 of an exported policy differs from its name."""
 
 
 class UnclearReturns(BallastError, ValueError):
-    """Returns that can be read in more than one way. ``argument`` is the one that they were given as, and ``questions``
-    what the service asks, each with its ``options``, whose ``choices`` settle it."""
+    """Returns that can be read in more than one way.
+
+    ``argument`` is the name of the argument. ``questions`` are the questions of the service. Each has ``options``, and
+    the ``choices`` of an option answer the question.
+    """
 
     def __init__(self, argument: str, questions: list[wire.Question]) -> None:
         super().__init__(argument, questions)
@@ -56,12 +59,12 @@ class UnclearReturns(BallastError, ValueError):
                     "  or all of them as several assets: advise_assets, train_assets, backtest_assets, frontier"
                 )
         return "\n".join(
-            [f"{self.argument} can be read in more than one way: say which by {' and '.join(by)}.", *lines]
+            [f"{self.argument} can be read in more than one way: choose one with {' and '.join(by)}.", *lines]
         )
 
 
 class JobEnded(BallastError):
-    """A job that was waited for failed or was cancelled. ``job`` is its last state."""
+    """The job that the call waited for failed or was cancelled. ``job`` is its last state."""
 
     def __init__(self, job: wire.Job) -> None:
         super().__init__(job)
@@ -72,8 +75,8 @@ class JobEnded(BallastError):
 
 
 class ProblemError(BallastError):
-    """The service refused: ``type``, ``title``, ``status``, ``detail`` and, where a field is at fault, ``field``,
-    ``value`` and ``rule``. ``retry_after`` is the pause the service asked for, in seconds."""
+    """The service refused the request. It has ``type``, ``title``, ``status`` and ``detail``, and if a field is wrong,
+    also ``field``, ``value`` and ``rule``. ``retry_after`` is the pause that the service requests, in seconds."""
 
     kinds: ClassVar[dict[str, type[ProblemError]]] = {}
 
@@ -105,7 +108,7 @@ class InvalidQuery(ProblemError, slug="invalid-query"):
 
 
 class Unauthenticated(ProblemError, slug="unauthenticated"):
-    """The service asks for a key, and was shown none that is in force."""
+    """The service requires a key, and the request has no valid one."""
 
 
 class Forbidden(ProblemError, slug="forbidden"):
@@ -117,11 +120,11 @@ class NotFound(ProblemError, slug="not-found"):
 
 
 class InUse(ProblemError, slug="in-use"):
-    """Sessions live by the policy."""
+    """Sessions still use the policy."""
 
 
 class JobNotEnded(ProblemError, slug="job-not-ended"):
-    """The job is queued or runs: cancel it before it is deleted."""
+    """The job is queued or running: cancel it before you delete it."""
 
 
 class IdempotencyConflict(ProblemError, slug="idempotency-conflict"):
@@ -137,8 +140,8 @@ class ReportGap(ProblemError, slug="report-gap"):
 
 
 class Unconfirmed(ProblemError, slug="unconfirmed"):
-    """The report is most likely a slip: ``doubts`` says all that is doubted in it. If it is meant, send it with
-    ``confirm=True``. A doubt of missing periods lists their last days as ``missing``: report each of them with
+    """The report is probably a mistake, and ``doubts`` lists the reasons. If it is correct, send it with
+    ``confirm=True``. If periods are missing, ``missing`` lists their last days. Report each of them with
     ``missing=True`` and its ``date``, and then the period itself."""
 
     def __init__(self, problem: wire.Problem, retry_after: float | None = None) -> None:
@@ -151,11 +154,11 @@ class SessionCompleted(ProblemError, slug="session-completed"):
 
 
 class BodyTooLarge(ProblemError, slug="body-too-large"):
-    """The body is larger than the service takes."""
+    """The body is larger than the service accepts."""
 
 
 class QuotaExceeded(ProblemError, slug="quota-exceeded"):
-    """The tenant keeps as much as it may; ``rule`` says how much that is and what to delete."""
+    """The tenant's quota is used up; ``rule`` gives the quota and says what to delete."""
 
 
 class InvalidHeader(ProblemError, slug="invalid-header"):
@@ -163,19 +166,19 @@ class InvalidHeader(ProblemError, slug="invalid-header"):
 
 
 class Misdirected(ProblemError, slug="misdirected"):
-    """The service does not answer to the host name it was asked by; ``rule`` says which it answers to."""
+    """The service does not accept the host name of the request; ``rule`` lists those it accepts."""
 
 
 class QueueFull(ProblemError, slug="queue-full"):
-    """The tenant has as many jobs queued as it may, and still did at the last of the repetitions."""
+    """The tenant has as many queued jobs as it is allowed, even after the last retry."""
 
 
 class TooManyRequests(ProblemError, slug="too-many-requests"):
-    """The tenant of the key calls too often, and still did at the last of the repetitions."""
+    """The tenant of the key exceeds its rate limit, even after the last retry."""
 
 
 class Overloaded(ProblemError, slug="overloaded"):
-    """The service cannot answer now, and could not at the last of the repetitions."""
+    """The service cannot answer now, even after the last retry."""
 
 
 class StorageFull(ProblemError, slug="storage-full"):
@@ -187,7 +190,7 @@ class Internal(ProblemError, slug="internal"):
 
 
 def of_response(response: httpx.Response, retry_after: float | None) -> ProblemError:
-    """The exception of an answer that is not a success, be it of the service or of something in between."""
+    """Returns the exception for an unsuccessful answer, whether the service sent it or a proxy did."""
     problem: wire.Problem = {
         "type": "about:blank",
         "title": response.reason_phrase or "Error",

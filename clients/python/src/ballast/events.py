@@ -1,4 +1,4 @@
-"""Server-sent events, as far as this service sends them: https://html.spec.whatwg.org/multipage/server-sent-events.html"""
+"""Server-sent events, as this service sends them: https://html.spec.whatwg.org/multipage/server-sent-events.html"""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Event:
-    """One event. ``id`` is what a reader that comes back shows as ``Last-Event-ID``."""
+    """One event. A client that reconnects sends its ``id`` as ``Last-Event-ID``."""
 
     id: str
     name: str
@@ -16,14 +16,14 @@ class Event:
 
 
 class Parser:
-    """The events in a stream of bytes, fed as they come; one that is cut off is left out."""
+    """Parses the events of a stream of bytes as they arrive. It leaves out an event that is cut off."""
 
     def __init__(self) -> None:
         self._rest = b""
         self._fields: dict[str, str] = {}
 
     def feed(self, chunk: bytes) -> Iterator[Event]:
-        """The events that end in this chunk."""
+        """Yields the events that end in this chunk."""
         # Split at line feeds alone: str.splitlines would also cut at characters that JSON may hold.
         *whole, self._rest = (self._rest + chunk).split(b"\n")
         for line in whole:
@@ -34,7 +34,7 @@ class Parser:
         if line:
             name, _, value = line.partition(":")
             value = value.removeprefix(" ")
-            # Several lines of data are one text; a line without a name is a comment, here the sign of life.
+            # Several lines of data are one text. A line without a name is a comment, which here is the keep-alive.
             fields[name] = f"{fields['data']}\n{value}" if name == "data" and "data" in fields else value
             return
         self._fields = {}

@@ -1,8 +1,8 @@
-"""Answers of the service as pandas objects.
+"""Converts answers of the service to pandas objects.
 
-Each function takes the JSON as it came, from a call or from a file such as the ``report.json`` that ``ballast
-backtest`` writes, and leaves it as it is. pandas is imported when a function is called, and not before: where it is
-missing, the call raises ``ImportError`` and says what to install.
+Each function takes the JSON of a call, or of a file such as the ``report.json`` that ``ballast backtest`` writes, and
+does not change it. pandas is imported only when a function is called. If it is missing, the call raises ``ImportError``
+and says what to install.
 """
 
 from __future__ import annotations
@@ -17,38 +17,39 @@ from . import wire
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Whatever is robust against a worst law: ``Ballast.advise``, ``Session.action(explain="worst_case")``, a what-if.
+#: The answers that contain a worst law: ``Ballast.advise``, ``Session.action(explain="worst_case")``, a what-if.
 Explained: TypeAlias = wire.Advised | wire.Action | wire.WhatIfPoint
 
-#: The figures of a walk-forward that have a number for each period.
+#: The figures of a walk-forward that have a value for each period.
 Figure: TypeAlias = Literal["wealth", "allocation", "low", "high", "radius", "traded"]
-#: The figures of a session of several assets that have a number for each asset.
+#: The figures of a session of several assets that have a value for each asset.
 AssetsFigure: TypeAlias = Literal["simple_return", "log_return", "advised_allocation", "executed_allocation", "holding"]
 
 
 def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
-    """What ``Session.history`` tells, a row for each period observed, with the period as index.
+    """Returns the result of ``Session.history`` as a table with a row for each observed period, indexed by the period.
 
-    ``date`` is the last day of the period, ``NaT`` where none was reported. ``log_return`` and ``simple_return`` are
-    NaN where the return is missing. ``advised_allocation``, ``executed_allocation`` and ``holding`` are shares of
-    wealth, ``wealth`` is a currency, ``radius`` a log-return, after the period as the last two are. With
-    ``as_of="now"`` all of them have every correction made; with ``"then"`` they are what was told at the time.
-    ``corrected`` says whether the two may differ. Raises ``ImportError`` without pandas.
+    ``date`` is the last day of the period, ``NaT`` if none was reported. ``log_return`` and ``simple_return`` are NaN
+    if the return is missing. ``advised_allocation``, ``executed_allocation`` and ``holding`` are shares of wealth.
+    ``wealth`` is an amount of money, and ``radius`` is a log-return. ``wealth``, ``holding`` and ``radius`` are values
+    after the period. With ``as_of="now"`` all columns include every correction; with ``"then"`` they are what the
+    service answered at the time. ``corrected`` marks the rows where the two may differ. Raises ``ImportError`` without
+    pandas.
     """
     pd = require_pandas()
     rows = []
     for observation in history["observations"]:
         changed = observation.get("now")
-        told: Mapping[str, Any] = observation if as_of == "then" or changed is None else changed
-        reported = told.get("reported") or observation["reported"]
-        log_return = told.get("log_return")
+        row: Mapping[str, Any] = observation if as_of == "then" or changed is None else changed
+        reported = row.get("reported") or observation["reported"]
+        log_return = row.get("log_return")
         rows.append(
             {
                 "period": observation["period"],
                 "date": reported.get("date"),
                 "log_return": math.nan if log_return is None else log_return,
                 "simple_return": math.nan if log_return is None else math.expm1(log_return),
-                **{name: told[name] for name in _STANDING},
+                **{name: row[name] for name in _STANDING},
                 "corrected": changed is not None,
             }
         )
@@ -60,24 +61,25 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
 def assets_history(
     history: wire.History, figure: AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
 ) -> pd.DataFrame:
-    """One figure of a session of several assets, a row for each period observed and a column for each asset.
+    """Returns one figure of a session of several assets, with a row for each observed period and a column for each
+    asset.
 
-    ``simple_return`` and ``log_return`` have every correction made unless ``as_of`` is ``"then"``, and are NaN where
-    they are missing. ``advised_allocation``, ``executed_allocation`` and ``holding``, after the period, are shares of
-    wealth as they were told at the time. Raises ``ValueError`` for another figure and for a session of one asset, and
+    ``simple_return`` and ``log_return`` include every correction unless ``as_of`` is ``"then"``, and are NaN if they
+    are missing. ``advised_allocation``, ``executed_allocation`` and ``holding`` (after the period) are shares of wealth
+    as the service answered at the time. Raises ``ValueError`` for another figure and for a session of one asset, and
     ``ImportError`` without pandas.
     """
     assets = history.get("assets")
     if not assets:
-        raise ValueError("history is of one asset: see frames.history")
+        raise ValueError("history is of one asset: use frames.history")
     if figure not in _ASSETS_FIGURES:
         raise ValueError(f"figure is {figure!r}: must be one of {', '.join(_ASSETS_FIGURES)}")
     rows = []
     for observation in history["observations"]:
-        told = cast(dict[str, Any], observation)
-        if as_of == "now" and figure.endswith("return") and told.get("now") is not None:
-            told = told["now"]
-        rows.append(told["assets"].get(_ASSETS_FIGURES[figure]) or {})
+        row = cast(dict[str, Any], observation)
+        if as_of == "now" and figure.endswith("return") and row.get("now") is not None:
+            row = row["now"]
+        rows.append(row["assets"].get(_ASSETS_FIGURES[figure]) or {})
     pd = require_pandas()
     index = pd.Index([observation["period"] for observation in history["observations"]], name="period")
     frame = pd.DataFrame(rows, index=index, columns=assets, dtype=float)
@@ -95,44 +97,44 @@ _STANDING = ("advised_allocation", "executed_allocation", "wealth", "holding", "
 
 
 def worst_case(advice: Explained) -> pd.DataFrame:
-    """The law that an advice is robust against, as what moves: ``mass``, a probability, goes from the log-return
-    ``atom``, which was seen, to ``moved_to``.
+    """Returns the worst law that an advice is robust against, as a transport of probability.
 
-    So ``moved_to`` with the weights ``mass`` is the worst law, and ``atom`` with the same weights the law that was
-    learned. Raises ``ValueError`` where the advice came without one (``Session.action`` needs
-    ``explain="worst_case"``) or the law is a normal one, which is no transport; and ``ImportError`` without pandas.
+    In each row the probability ``mass`` moves from the observed log-return ``atom`` to ``moved_to``. So ``moved_to``
+    with the weights ``mass`` is the worst law, and ``atom`` with the same weights is the learned law. Raises
+    ``ValueError`` if the advice has no worst law (``Session.action`` needs ``explain="worst_case"``) or if that law is
+    normal, which is no transport; and ``ImportError`` without pandas.
     """
     law = advice.get("worst_case")
     if law is None:
         raise ValueError("the advice has no worst_case: ask for it with explain='worst_case'")
     if not law["transport"]:
-        raise ValueError("the worst law is normal, and no transport: see advice['worst_case']['normal']")
+        raise ValueError("the worst law is normal, not a transport: see advice['worst_case']['normal']")
     return require_pandas().DataFrame(law["transport"], columns=["atom", "moved_to", "mass"])
 
 
 def allocation(advised: wire.AssetsAdvised | wire.AssetsAction | wire.AssetsWhatIfPoint) -> pd.Series[float]:
-    """What ``Ballast.advise_assets``, ``Session.assets_action`` or ``Session.assets_what_if`` advises: the share of
-    wealth in each asset, by its name, in no particular order; the rest is in the bank.
+    """Returns the advised share of wealth in each asset, by its name, in no particular order. The rest is in the bank.
 
+    ``advised`` is an answer of ``Ballast.advise_assets``, ``Session.assets_action`` or ``Session.assets_what_if``.
     Raises ``ImportError`` without pandas.
     """
     return require_pandas().Series(advised["allocation"], name="allocation", dtype=float)
 
 
 def figures(advised: Explained | wire.AssetsAdvised | wire.AssetsAction | wire.AssetsWhatIfPoint) -> pd.Series[float]:
-    """The numbers of an advice that stand alone, by the name of their field: ``certainty_equivalent``, ``floor``,
+    """Returns the single numbers of an advice by the name of their field: ``certainty_equivalent``, ``floor``,
     ``radius`` and so on.
 
-    Of several assets ``total`` is the share of wealth in all together, and ``without_crash``, where
-    ``Ballast.advise_assets`` tells it, what that would be were no return below the lowest seen. Raises ``ImportError``
-    without pandas.
+    For several assets ``total`` is the share of wealth in all of them together. ``without_crash``, if
+    ``Ballast.advise_assets`` returns it, is what ``total`` would be if no return could fall below the lowest observed
+    one. Raises ``ImportError`` without pandas.
     """
     numbers = {name: value for name, value in advised.items() if type(value) in (int, float)}
     return require_pandas().Series(numbers, name="figure", dtype=float)
 
 
 def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
-    """The mean log-return of each asset as it was ``seen`` and under the ``worst`` law, an asset a row.
+    """Returns the mean log-return of each asset, as ``seen`` and under the ``worst`` law, with a row for each asset.
 
     Raises ``ImportError`` without pandas.
     """
@@ -140,11 +142,11 @@ def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
 
 
 def sessions(entries: Iterable[wire.SessionEntry]) -> pd.DataFrame:
-    """What ``Ballast.sessions`` lists, a row for each session in the order of the list, with its identifier as index.
+    """Returns the sessions of ``Ballast.sessions``, a row for each in the order of the list, indexed by the identifier.
 
-    The columns are the fields of an entry but ``notes``: ``wealth`` and ``wealth_change`` are currencies, ``holding`` a
-    share of wealth, ``date`` the last day reported. ``created`` and ``last_report`` are times in UTC. What is not there
-    is NaN or ``NaT``. Raises ``ImportError`` without pandas.
+    The columns are the fields of an entry except ``notes``. ``wealth`` and ``wealth_change`` are amounts of money,
+    ``holding`` is a share of wealth, and ``date`` is the last reported day. ``created`` and ``last_report`` are times
+    in UTC. Missing values are NaN or ``NaT``. Raises ``ImportError`` without pandas.
     """
     pd = require_pandas()
     frame = pd.DataFrame(list(entries), columns=["session", *_LISTED, "date", "created_ms", "last_report_ms"])
@@ -172,11 +174,11 @@ _LISTED = (
 
 
 def walk_forward(report: wire.BacktestReport | wire.AssetsBacktestReport) -> pd.DataFrame:
-    """The strategies of a walk-forward, one a row by its name, the figures of the report as columns.
+    """Returns the strategies of a walk-forward, a row for each by its name, with the figures of the report as columns.
 
-    A figure with an interval has two columns more, its ends, under its name with ``_low`` and ``_high``. Returns,
-    volatilities and shares are fractions, certainty equivalents and wealth are from 100. What was held of each of
-    several assets is told by :func:`held`. Raises ``ImportError`` without pandas.
+    A figure with an interval has two more columns for its ends, with the suffixes ``_low`` and ``_high``. Returns,
+    volatilities and shares are fractions. Certainty equivalents and wealth are for an initial wealth of 100.
+    :func:`held` shows what was held of each of several assets. Raises ``ImportError`` without pandas.
     """
     rows = []
     for figures in report["strategies"]:
@@ -190,39 +192,39 @@ def walk_forward(report: wire.BacktestReport | wire.AssetsBacktestReport) -> pd.
 
 
 def periods(report: wire.BacktestReport | wire.AssetsBacktestReport, figure: Figure = "wealth") -> pd.DataFrame:
-    """One figure of a walk-forward, a row for each period and a column for each strategy.
+    """Returns one figure of a walk-forward, with a row for each period and a column for each strategy.
 
-    ``wealth`` is at the end of the period, from 100; ``allocation``, the ends ``low`` and ``high`` of the band and
-    ``traded`` are shares of wealth; ``radius`` is a log-return. The index has the dates that were given for the
-    periods, a month as its first day, or counts from 1 where there are none. Raises ``ValueError`` for another figure,
-    and ``ImportError`` without pandas.
+    ``wealth`` is at the end of the period, for an initial wealth of 100. ``allocation``, the ends ``low`` and ``high``
+    of the no-trade range and ``traded`` are shares of wealth. ``radius`` is a log-return. The index has the dates of
+    the periods, with a month as its first day, or counts from 1 if there are no dates. Raises ``ValueError`` for
+    another figure, and ``ImportError`` without pandas.
     """
-    told = cast(list[dict[str, Any]], report["periods"])
-    figures = [name for name in _FIGURES if name in told[0]]
+    strategies = cast(list[dict[str, Any]], report["periods"])
+    figures = [name for name in _FIGURES if name in strategies[0]]
     if figure not in figures:
         raise ValueError(f"figure is {figure!r}: must be one of {', '.join(figures)}")
-    return _by_date(report, {strategy["strategy"]: strategy[figure] for strategy in told})
+    return _by_date(report, {strategy["strategy"]: strategy[figure] for strategy in strategies})
 
 
 def held(report: wire.AssetsBacktestReport, strategy: str | None = None) -> pd.DataFrame:
-    """The share of wealth in each of several assets that were walked forward, an asset a column: of one strategy a row
-    for each period, with its date as index, or without one the average of every strategy, a row for each.
+    """Returns the share of wealth in each asset of a walk-forward of several, with a column for each asset.
 
-    Raises ``ValueError`` for a strategy that there is not, and ``ImportError`` without pandas.
+    With ``strategy`` there is a row for each period, indexed by its date. Without it, there is a row for each strategy
+    with its average shares. Raises ``ValueError`` for an unknown strategy, and ``ImportError`` without pandas.
     """
     pd, assets = require_pandas(), report["assets"]
     if strategy is None:
         means = {figures["strategy"]: figures["mean_allocations"] for figures in report["strategies"]}
         return pd.DataFrame.from_dict(means, orient="index", columns=assets).rename_axis("strategy")
-    for told in report["periods"]:
-        if told["strategy"] == strategy:
-            return _by_date(report, told["allocations"])[assets]
-    names = "; ".join(told["strategy"] for told in report["periods"])
+    for line in report["periods"]:
+        if line["strategy"] == strategy:
+            return _by_date(report, line["allocations"])[assets]
+    names = "; ".join(line["strategy"] for line in report["periods"])
     raise ValueError(f"strategy is {strategy!r}: must be one of {names}")
 
 
 def _by_date(report: wire.BacktestReport | wire.AssetsBacktestReport, columns: Mapping[str, Any]) -> pd.DataFrame:
-    """A row for each period, by its date or its number."""
+    """Returns a table with a row for each period, indexed by its date or its number."""
     pd = require_pandas()
     frame = pd.DataFrame(columns)
     dates = report.get("dates")
@@ -235,13 +237,13 @@ _FIGURES = ("wealth", "allocation", "low", "high", "radius", "traded")
 
 
 def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
-    """The strategies of an evaluation, one a row by its name.
+    """Returns the strategies of an evaluation, a row for each by its name.
 
-    ``certainty_equivalent`` and ``wealth_mean`` are currencies; ``utility_mean``, ``utility_variance`` and so on are
-    of terminal utility; ``difference_certainty_equivalent`` and ``difference_utility`` are to the reference, for
-    which they are NaN; ``beyond_own_mix`` is what changing the allocation earned, NaN for constant mixes. Each has
-    its interval in the columns with ``_low`` and ``_high``, but for the extremes ``max`` and ``min``. Raises
-    ``ImportError`` without pandas.
+    ``certainty_equivalent`` and ``wealth_mean`` are amounts of money. ``utility_mean``, ``utility_variance`` and so on
+    are of terminal utility. ``difference_certainty_equivalent`` and ``difference_utility`` are differences to the
+    reference strategy, and NaN in its own row. ``beyond_own_mix`` is what changing the allocation earned, NaN for
+    constant mixes. All except the extremes ``max`` and ``min`` have their interval in the columns with ``_low`` and
+    ``_high``. Raises ``ImportError`` without pandas.
     """
     rows = []
     for strategy in report["strategies"]:
@@ -261,14 +263,15 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
 
 
 def frontier(report: wire.FrontierReport) -> pd.DataFrame:
-    """What caution costs, a row for each law that records were drawn from (``law``) and multiple of the radius
-    (``scale``), which are the index.
+    """Returns what caution costs, indexed by the law that records were drawn from (``law``) and the multiple of the
+    radius (``scale``).
 
-    ``lost`` is in basis points of certainty equivalent behind the best allocation, a year where the report is
-    ``per_year`` and else a period; ``deviation`` is of that from record to record, ``beyond_least`` what more is lost
-    than at the best scale, NaN there, and ``beyond_own_mix`` what is gained over a constant mix of the average advice;
-    each with its interval in ``_low`` and ``_high``. ``total`` is the share of wealth held in all assets on average.
-    Raises ``ImportError`` without pandas.
+    ``lost`` is how far the certainty equivalent is below that of the best allocation. All losses are in basis points,
+    per year if the report is ``per_year`` and otherwise per period. ``deviation`` is the standard deviation of the loss
+    from record to record. ``beyond_least`` is the loss in excess of that at the best scale, where it is NaN.
+    ``beyond_own_mix`` is the gain over a constant mix of the average advice. Each has its interval in the columns with
+    ``_low`` and ``_high``. ``total`` is the average share of wealth held in all assets. Raises ``ImportError`` without
+    pandas.
     """
     rows = []
     for resampled in report["resampled"]:
@@ -281,7 +284,7 @@ def frontier(report: wire.FrontierReport) -> pd.DataFrame:
 
 
 def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
-    """A figure and the ends of its interval, which walk-forwards tell as a list."""
+    """Returns a figure and the ends of its interval, which is a list in reports of walk-forwards."""
     ends = (name, f"{name}_low", f"{name}_high")
     if figure is None:
         return dict.fromkeys(ends, math.nan)
@@ -290,10 +293,10 @@ def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
 
 
 def require_pandas() -> ModuleType:
-    """pandas itself. Raises ``ImportError`` without it."""
+    """Imports pandas. Raises ``ImportError`` if it is missing."""
     try:
         import pandas
     except ImportError as error:
-        raise ImportError("frames are pandas objects: pip install 'ballast-client[pandas]'") from error
+        raise ImportError("frames need pandas: pip install 'ballast-client[pandas]'") from error
     module: ModuleType = pandas
     return module

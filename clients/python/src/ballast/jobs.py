@@ -1,4 +1,4 @@
-"""Jobs: a training ends in a policy, an evaluation or a walk-forward in a report."""
+"""Jobs. A training produces a policy; an evaluation, a walk-forward or a frontier produces a report."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 
 class _Job:
-    """A job of the service. It goes on whether or not anybody waits for it."""
+    """A job of the service. It runs whether or not anybody waits for it."""
 
     def __init__(self, transport: Transport, job: wire.Job) -> None:
         self._transport = transport
         self._path = f"/jobs/{quote(job['job'], safe='')}"
-        #: The job as last seen.
+        #: The last known state of the job.
         self.job = job
-        #: What in the request may be a mistake, as the service said when it took it; empty for a job found again.
+        #: Warnings about probable mistakes in the request. Empty for a job that was looked up by its id.
         self.warnings: list[wire.Warning] = list(cast(wire.AcceptedJob, job).get("warnings", []))
-        #: The sentence of what was read for it; ``None`` where returns were not read, and for a job found again.
+        #: Says how the returns were read; ``None`` without returns and for a job that was looked up by its id.
         self.read: str | None = cast(dict[str, Any], job).get("read")
 
     @property
@@ -42,27 +42,27 @@ class _Job:
         return self.job["job"]
 
     async def _refresh(self) -> Self:
-        """Asks the service how far it is, which ``job`` then says."""
+        """Updates ``job`` from the service."""
         self.job = await self._transport.json("GET", self._path)
         return self
 
     async def _cancel(self) -> Self:
-        """Asks the job to stop, which it does within a second; a job that has ended stays as it is."""
+        """Asks the job to stop, which it does within a second. A job that has ended does not change."""
         self.job = await self._transport.json("POST", f"{self._path}/cancel")
         return self
 
     async def _delete(self) -> None:
-        """Deletes a job that has ended, its report and its idempotency key; a policy that it made stays.
+        """Deletes a job that has ended, its report and its idempotency key, but not the policy that it produced.
 
-        Raises :class:`JobNotEnded` while it is queued or runs, and :class:`NotFound` where there is none.
+        Raises :class:`JobNotEnded` while the job is queued or running, and :class:`NotFound` if there is no such job.
         """
         await self._transport.call("DELETE", self._path)
 
     async def _events(self) -> AsyncIterator[wire.Job]:
-        """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was."""
+        """Yields the job now and at every change until it ends. After a lost connection the stream resumes."""
         last_id, failures = "", 0
         while True:
-            reason, cause = "the service ended them", None
+            reason, cause = "the service closed the stream", None
             try:
                 async with self._transport.stream(f"{self._path}/events", last_id) as chunks:
                     parser = Parser()
@@ -81,11 +81,11 @@ class _Job:
                 if error.status not in RETRIED_STATUS:
                     raise
                 reason = repr(error)
-            # A service that stops ends its streams in good order, and comes back.
+            # A service that stops closes its streams normally, and may start again.
             if failures >= self._transport.retries:
-                told = f"no more events of the job {self.id}"
+                message = f"no more events of the job {self.id}"
                 raise Unreachable(
-                    f"{told}: {reason}" if cause is None else self._transport.silence(told, cause, failures + 1)
+                    f"{message}: {reason}" if cause is None else self._transport.silence(message, cause, failures + 1)
                 ) from cause
             await self._transport.pause(growing_pause(failures))
             failures += 1
@@ -109,12 +109,12 @@ class _Job:
 
 
 class _Training(_Job):
-    """A job that ends in a policy; ``Ballast.training(id)`` finds it again."""
+    """A job that produces a policy; ``Ballast.training(id)`` looks it up."""
 
     async def _policy(self, watch: Watch | None = None) -> str:
-        """Waits for the end of the training, showing each change to ``watch``.
+        """Waits for the end of the training, and calls ``watch`` at each change.
 
-        Raises :class:`JobEnded` where the job fails or is cancelled.
+        Raises :class:`JobEnded` if the job fails or is cancelled.
         """
         policy = (await self._watched(watch)).get("policy")
         if policy is None:
@@ -122,100 +122,118 @@ class _Training(_Job):
         return policy
 
     async def _session(self, *, watch: Watch | None = None, **opening: Unpack[Opening]) -> wire.Session:
-        """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
+        """Waits for the policy and opens a session with it, as :meth:`Policy.session` does."""
         return await _Policy(self._transport, await self._policy(watch))._session(**opening)
 
 
 class _Evaluation(_Job):
-    """A job that ends in a report; ``Ballast.evaluation(id)`` finds it again."""
+    """A job that produces a report; ``Ballast.evaluation(id)`` looks it up."""
 
     async def _report(self, watch: Watch | None = None) -> wire.EvaluationReport:
-        """Waits for the end of the evaluation, showing each change to ``watch``.
+        """Waits for the end of the evaluation, and calls ``watch`` at each change.
 
-        Raises :class:`JobEnded` where the job fails or is cancelled.
+        Raises :class:`JobEnded` if the job fails or is cancelled.
         """
         return cast(wire.EvaluationReport, await self._ended(watch))
 
     async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
-        """The report's strategies, one a row (:func:`ballast.frames.evaluation`). Waits as ``report`` does, and raises
-        what it raises, and ``ImportError`` without pandas."""
+        """Returns the strategies of the report, one per row (:func:`ballast.frames.evaluation`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas.
+        """
         return frames.evaluation(await self._report(watch))
 
     async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
-        """Draws what each strategy is worth for certain (:func:`ballast.plots.evaluation`). Waits as ``report`` does,
-        and raises what it raises, and ``ImportError`` without pandas and matplotlib."""
+        """Draws the certainty equivalent of each strategy (:func:`ballast.plots.evaluation`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas and matplotlib.
+        """
         return plots.evaluation(await self._report(watch), ax)
 
 
 class _Walk(_Job):
-    """What walks of one asset and of several share: strategies, and what they did by period."""
+    """Calls that walk-forwards of one asset and of several share."""
 
     async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
-        """The report's strategies, one a row (:func:`ballast.frames.walk_forward`). Waits as ``report`` does, and
-        raises what it raises, and ``ImportError`` without pandas."""
+        """Returns the strategies of the report, one per row (:func:`ballast.frames.walk_forward`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas.
+        """
         return frames.walk_forward(await self._ended(watch))
 
     async def _periods(self, figure: frames.Figure = "wealth", watch: Watch | None = None) -> pd.DataFrame:
-        """What each strategy did or had, by date: ``"wealth"``, ``"traded"``, ``"radius"`` and, of one asset,
-        ``"allocation"`` and so on (:func:`ballast.frames.periods`). Waits as ``report`` does, and raises what it
-        raises, ``ValueError`` for another figure and ``ImportError`` without pandas."""
+        """Returns one figure of each strategy by date (:func:`ballast.frames.periods`).
+
+        The figure is ``"wealth"``, ``"traded"``, ``"radius"`` or, for one asset, ``"allocation"`` and so on. Waits and
+        raises as ``report`` does, and raises ``ValueError`` for another figure and ``ImportError`` without pandas.
+        """
         return frames.periods(await self._ended(watch), figure)
 
     async def _plot(
         self, ax: Axes | None = None, watch: Watch | None = None, strategies: Sequence[str] | None = None
     ) -> Axes:
-        """Draws the wealth of ``strategies``, or of those worth most, ten at the most
-        (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for a
-        strategy that there is not and ``ImportError`` without pandas and matplotlib."""
+        """Draws the wealth of ``strategies``, by default of the ten with the highest certainty equivalent
+        (:func:`ballast.plots.walk_forward`).
+
+        Waits and raises as ``report`` does, and raises ``ValueError`` for an unknown strategy and ``ImportError``
+        without pandas and matplotlib.
+        """
         return plots.walk_forward(await self._ended(watch), ax, strategies)
 
 
 class _WalkForward(_Walk):
-    """A job that ends in a report; ``Ballast.walk_forward(id)`` finds it again."""
+    """A job that produces a report; ``Ballast.walk_forward(id)`` looks it up."""
 
     async def _report(self, watch: Watch | None = None) -> wire.BacktestReport:
-        """Waits for the end of the walk-forward, showing each change to ``watch``.
+        """Waits for the end of the walk-forward, and calls ``watch`` at each change.
 
-        Raises :class:`JobEnded` where the job fails or is cancelled.
+        Raises :class:`JobEnded` if the job fails or is cancelled.
         """
         return cast(wire.BacktestReport, await self._ended(watch))
 
 
 class _AssetsWalkForward(_Walk):
-    """A job that ends in a report on several assets; ``Ballast.assets_walk_forward(id)`` finds it again."""
+    """A job that produces a report on several assets; ``Ballast.assets_walk_forward(id)`` looks it up."""
 
     async def _report(self, watch: Watch | None = None) -> wire.AssetsBacktestReport:
-        """Waits for the end of the walk-forward, showing each change to ``watch``.
+        """Waits for the end of the walk-forward, and calls ``watch`` at each change.
 
-        Raises :class:`JobEnded` where the job fails or is cancelled.
+        Raises :class:`JobEnded` if the job fails or is cancelled.
         """
         return cast(wire.AssetsBacktestReport, await self._ended(watch))
 
     async def _held(self, strategy: str | None = None, watch: Watch | None = None) -> pd.DataFrame:
-        """The share of wealth in each asset: of one strategy by date, or without one on average, a strategy a row
-        (:func:`ballast.frames.held`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for a
-        strategy that there is not and ``ImportError`` without pandas."""
+        """Returns the share of wealth in each asset (:func:`ballast.frames.held`).
+
+        With ``strategy`` there is a row for each date; without it, a row for each strategy with its average shares.
+        Waits and raises as ``report`` does, and raises ``ValueError`` for an unknown strategy and ``ImportError``
+        without pandas.
+        """
         return frames.held(await self._report(watch), strategy)
 
 
 class _Frontier(_Job):
-    """A job that ends in a report; ``Ballast.frontier_of(id)`` finds it again."""
+    """A job that produces a report; ``Ballast.frontier_of(id)`` looks it up."""
 
     async def _report(self, watch: Watch | None = None) -> wire.FrontierReport:
-        """Waits for the end, showing each change to ``watch``.
+        """Waits for the end of the job, and calls ``watch`` at each change.
 
-        Raises :class:`JobEnded` where the job fails or is cancelled.
+        Raises :class:`JobEnded` if the job fails or is cancelled.
         """
         return cast(wire.FrontierReport, await self._ended(watch))
 
     async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
-        """What is lost at each multiple of the radius (:func:`ballast.frames.frontier`). Waits as ``report`` does, and
-        raises what it raises, and ``ImportError`` without pandas."""
+        """Returns what is lost at each multiple of the radius (:func:`ballast.frames.frontier`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas.
+        """
         return frames.frontier(await self._report(watch))
 
     async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
-        """Draws what is lost with its interval (:func:`ballast.plots.frontier`). Waits as ``report`` does, and raises
-        what it raises, and ``ImportError`` without pandas and matplotlib."""
+        """Draws what is lost with its interval (:func:`ballast.plots.frontier`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas and matplotlib.
+        """
         return plots.frontier(await self._report(watch), ax)
 
 

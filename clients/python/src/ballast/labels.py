@@ -1,4 +1,4 @@
-"""What policies and sessions are called."""
+"""The labels of policies and sessions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .transport import Transport
 
 
 def relabelled(name: str | None, notes: str | None, tags: Sequence[str] | None) -> wire.Relabel:
-    """The labels that are given; one that is ``None`` stays as it is, and one that is empty is cleared."""
+    """Returns the labels that change. ``None`` leaves a label unchanged, and an empty value clears it."""
     change: wire.Relabel = {}
     if name is not None:
         change["name"] = name
@@ -22,7 +22,7 @@ def relabelled(name: str | None, notes: str | None, tags: Sequence[str] | None) 
 
 
 class Labelled:
-    """What has labels at its path."""
+    """An object that has labels at its path."""
 
     _transport: Transport
     _path: str
@@ -30,11 +30,11 @@ class Labelled:
     async def _label(
         self, *, name: str | None = None, notes: str | None = None, tags: Sequence[str] | None = None
     ) -> wire.Labels:
-        """Changes what it is called, and answers what it is called now.
+        """Changes the labels, and returns all of them.
 
-        What is ``None`` stays as it is, and what is empty is cleared. A ``name`` has at most 100 characters and need
-        not be of this one alone, ``notes`` have at most 2,000, and of ``tags`` there are at most 20, each another, of
-        at most 50. Detail and lists show them.
+        ``None`` leaves a label unchanged, and an empty value clears it. A ``name`` has at most 100 characters and need
+        not be unique. ``notes`` have at most 2,000 characters. There are at most 20 ``tags``, all different, of at most
+        50 characters each. The detail and the lists show the labels.
         """
         change = relabelled(name, notes, tags)
         return cast(wire.Labels, await self._transport.json("PATCH", self._path, body=change))

@@ -1,8 +1,8 @@
-"""Pictures of answers, by matplotlib and pandas, which are imported when a function is called, and not before.
+"""Draws answers of the service with matplotlib and pandas, which are imported only when a function is called.
 
 Each function takes the JSON as :mod:`ballast.frames` does, draws on ``ax`` or else on a new figure, and returns the
-axes, which can be changed further. Where one of the two packages is missing, the call raises ``ImportError`` and says
-what to install.
+axes, which you can change further. If one of the two packages is missing, the call raises ``ImportError`` and says what
+to install.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-#: Lines that can be told apart by their colours.
+#: The number of lines that have different colours.
 _LINES = 10
 _STYLES = ("-", "--", ":", "-.")
 
@@ -26,15 +26,18 @@ def walk_forward(
     ax: Axes | None = None,
     strategies: Sequence[str] | None = None,
 ) -> Axes:
-    """The wealth of strategies of a walk-forward from 100, over the periods, on a logarithmic scale: those named, or
-    the ten that are worth most for certain, the best first. Raises ``ValueError`` for one that there is not."""
+    """Draws the wealth of strategies of a walk-forward, which starts at 100, over the periods on a logarithmic scale.
+
+    By default it draws the ten strategies with the highest certainty equivalent, the best first. Raises ``ValueError``
+    for an unknown strategy.
+    """
     worth = frames.walk_forward(report)["yearly_certainty_equivalent"].sort_values(ascending=False, kind="stable")
     wealth, title = frames.periods(report), None
     if strategies is None:
         strategies = list(worth.index[:_LINES])
         title = f"the {_LINES} of {len(worth)} worth most" if len(worth) > _LINES else None
     elif unknown := next((name for name in strategies if name not in wealth), None):
-        raise ValueError(f"strategies has {unknown!r}: must be of {'; '.join(wealth)}")
+        raise ValueError(f"strategies has {unknown!r}: must be one of {'; '.join(wealth)}")
     axes = _axes(ax, (10.0, 5.0))
     for place, name in enumerate(strategies):
         style = _STYLES[place // _LINES % len(_STYLES)]
@@ -48,8 +51,10 @@ def walk_forward(
 
 
 def history(history: wire.History, ax: Axes | None = None) -> Axes:
-    """Wealth after each period of a session, from what it began with, and on a second axis the share that was held,
-    over the last days of the periods where all are known, and else over their numbers."""
+    """Draws the wealth of a session after each period, and on a second axis the share that was held.
+
+    The horizontal axis shows the last days of the periods if all are known, and otherwise the numbers of the periods.
+    """
     axes = _axes(ax)
     lived = frames.history(history)
     over = lived.index if lived.empty or lived["date"].isna().any() else lived["date"]
@@ -69,7 +74,7 @@ def history(history: wire.History, ax: Axes | None = None) -> Axes:
 
 
 def evaluation(report: wire.EvaluationReport, ax: Axes | None = None) -> Axes:
-    """What each strategy of an evaluation is worth for certain, with its interval, the best at the top."""
+    """Draws the certainty equivalent of each strategy of an evaluation, with its interval, the best at the top."""
     axes = _axes(ax)
     table = frames.evaluation(report).sort_values("certainty_equivalent")
     worth = table["certainty_equivalent"]
@@ -81,8 +86,10 @@ def evaluation(report: wire.EvaluationReport, ax: Axes | None = None) -> Axes:
 
 
 def frontier(report: wire.FrontierReport, ax: Axes | None = None) -> Axes:
-    """What caution costs: basis points of certainty equivalent lost over the multiple of the radius, a line for each
-    law that records were drawn from, in the band of its interval."""
+    """Draws what caution costs: basis points of certainty equivalent lost over the multiple of the radius.
+
+    There is a line for each law that records were drawn from, and a band for its interval.
+    """
     axes = _axes(ax)
     for law, points in frames.frontier(report).groupby(level="law", sort=False):
         points = points.droplevel("law")
@@ -95,8 +102,10 @@ def frontier(report: wire.FrontierReport, ax: Axes | None = None) -> Axes:
 
 
 def worst_case(advice: frames.Explained, ax: Axes | None = None) -> Axes:
-    """The law that was learned, upwards, and the worst law that the advice is robust against, downwards: the
-    probability of each log-return. Raises ``ValueError`` as :func:`ballast.frames.worst_case` does."""
+    """Draws the probability of each log-return, under the learned law upwards and under the worst law downwards.
+
+    The advice is robust against the worst law. Raises ``ValueError`` as :func:`ballast.frames.worst_case` does.
+    """
     axes = _axes(ax)
     moves = frames.worst_case(advice)
     for column, sign, colour, label in (("atom", 1.0, "C0", "seen"), ("moved_to", -1.0, "C3", "worst case")):
@@ -115,5 +124,5 @@ def _axes(ax: Axes | None, size: tuple[float, float] | None = None) -> Axes:
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError("plots are drawn by matplotlib: pip install 'ballast-client[plots]'") from error
+        raise ImportError("plots need matplotlib: pip install 'ballast-client[plots]'") from error
     return pyplot.subplots(layout="constrained", figsize=size)[1]

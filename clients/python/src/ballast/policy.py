@@ -20,7 +20,7 @@ from .transport import Transport, idempotent
 
 
 class Opening(TypedDict, total=False):
-    """What a session may be opened with; :meth:`Policy.session` says what each means."""
+    """The arguments that open a session; :meth:`Policy.session` explains them."""
 
     history: Returns | wire.History | None
     kind: Kind | None
@@ -37,7 +37,7 @@ class Opening(TypedDict, total=False):
 
 
 class _Policy(Labelled):
-    """A policy of the service, by its name."""
+    """A policy of the service, known by its name."""
 
     def __init__(self, transport: Transport, policy: str) -> None:
         self._transport = transport
@@ -45,35 +45,35 @@ class _Policy(Labelled):
         self.id = policy
 
     async def _detail(self) -> wire.PolicyDetail:
-        """The completed specification and the diagnostics of every step."""
+        """Returns the completed specification and the diagnostics of every step."""
         detail = cast(wire.PolicyDetail, await self._transport.json("GET", self._path))
         problem = detail["specification"]["problem"]
         problem["history"] = LogReturns(problem["history"])
         return detail
 
     async def _export(self) -> bytes:
-        """The portable document, as ``Ballast.import_policy`` takes it. Raises :class:`DamagedPolicy` where the bytes
-        that arrive do not hash to the policy's name."""
+        """Returns the portable document, which ``Ballast.import_policy`` accepts. Raises :class:`DamagedPolicy` if the
+        SHA-256 of the bytes differs from the policy's name."""
         document = (await self._transport.call("GET", f"{self._path}/export")).content
         if (found := hashlib.sha256(document).hexdigest()) != self.id:
-            raise DamagedPolicy(f"the exported bytes hash to {found}: must be {self.id}")
+            raise DamagedPolicy(f"the SHA-256 of the exported bytes is {found}: must be {self.id}")
         return document
 
     async def _session(self, **opening: Unpack[Opening]) -> wire.Session:
-        """Opens a session of an investor.
+        """Opens a session for an investor.
 
-        ``history`` is what the investor has seen, ``wealth`` what there is; by default both are the policy's own.
-        ``history``, ``kind`` and ``choices`` are read as those of :meth:`Ballast.train <ballast.Ballast.train>`, but
-        ``kind`` must be given of all but files and texts: what the service calls a history is of log-returns. Those
-        that it told itself need no ``kind``, and what ``Session.history`` tells may be given whole: the session starts
-        as that one did, with its returns, its wealth and what it held. Of several assets ``history`` is a table with a
-        column for each, or rows in the order of the policy.
+        ``history`` are the returns that the investor knows, and ``wealth`` is what they have. By default both are those
+        of the policy. ``history``, ``kind`` and ``choices`` are as in :meth:`Ballast.train <ballast.Ballast.train>`,
+        but ``kind`` is required for everything except files and texts, because the service's own histories are of
+        log-returns. Log-returns that the service returned need no ``kind``. If you pass the whole result of
+        ``Session.history``, the session starts as that one did, with its returns, its wealth and its holdings. For
+        several assets ``history`` is a table with a column for each, or rows in the order of the policy.
 
-        ``holding`` is the share of wealth in the risky asset, by default none; of several assets ``holdings`` says it
-        of each by its name. With ``rolling`` the first step of the policy, whose learning must be decay, advises up to
-        5200 periods. ``name``, ``notes`` and ``tags`` are what the session is to be called. The same
-        ``idempotency_key`` and arguments again, even from another process, give the same session, at its first period;
-        ``Session.refresh`` tells how far it is.
+        ``holding`` is the share of wealth in the risky asset, by default 0. For several assets ``holdings`` gives the
+        share of each by its name. With ``rolling`` the first step of the policy, whose learning must be decay, advises
+        up to 5200 periods. ``name``, ``notes`` and ``tags`` label the session. The same ``idempotency_key`` and
+        arguments again, even from another process, give the same session as an object at its first period;
+        ``Session.refresh`` brings it to the current one.
         """
         given: dict[str, Any] = {name: value for name, value in opening.items() if value is not None}
         kind, choices, key = (given.pop(name, None) for name in ("kind", "choices", "idempotency_key"))
@@ -93,7 +93,7 @@ class _Policy(Labelled):
         return cast(wire.Session, session if found is None else {**session, "read": found.sentence})
 
     async def _known(self, history: Returns, kind: Kind | None, choices: wire.Choices | None) -> Read:
-        """Returns known at the start; of several assets the columns in the order of the policy."""
+        """Reads the returns known at the start. For several assets the columns are in the order of the policy."""
         if isinstance(history, LogReturns):
             return await read(self._transport, history, kind, choices, "history")
         held = sheet_of(history, "history")
@@ -103,7 +103,7 @@ class _Policy(Labelled):
         if fund is None:
             found = await read(self._transport, held, kind, choices, "history")
             if len(found.series) != 1:
-                raise ValueError("history has several columns: must be one, as the policy is of one asset")
+                raise ValueError("history has several columns: must have one because the policy is of one asset")
             return found
         names = fund["assets"]
         if isinstance(held, Sheet) and held.names is not None and not set(names) <= set(held.names):
@@ -111,7 +111,7 @@ class _Policy(Labelled):
         return (await read_assets(self._transport, held, kind, choices, names, "history"))[1]
 
     async def _delete(self) -> None:
-        """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""
+        """Deletes the policy. Raises :class:`InUse` while sessions use it, and :class:`NotFound` if there is none."""
         await self._transport.call("DELETE", self._path)
 
     def __repr__(self) -> str:
@@ -119,7 +119,7 @@ class _Policy(Labelled):
 
 
 def _start(history: wire.History) -> dict[str, Any]:
-    """What a session had when it was opened."""
+    """Returns the wealth and the holdings with which a session was opened."""
     composed = history.get("composed")
     wealth = {"wealth": history["initial_wealth"]}
     if composed is None:
@@ -128,7 +128,7 @@ def _start(history: wire.History) -> dict[str, Any]:
 
 
 class Policy(_Policy):
-    """A policy of the service, by its name."""
+    """A policy of the service, known by its name."""
 
     detail = Answering(wire.PolicyDetail).blocking(_Policy._detail)
     export = blocking(_Policy._export)

@@ -1,4 +1,4 @@
-"""How far a job is, for a person to see."""
+"""Shows the progress of a job."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any, TextIO
 
 from . import wire
 
-#: Called with the job at every change of it.
+#: A function that is called with the job at every change.
 Watch = Callable[[wire.Job], object]
 
-#: States in which a job stays.
+#: States that a job does not leave.
 TERMINAL = ("succeeded", "failed", "cancelled")
 
 
 class ProgressPrinter:
-    """A ``watch`` that prints: one line that is rewritten on a terminal, a line for each finished step elsewhere."""
+    """A ``watch`` that prints the progress. On a terminal it rewrites one line; elsewhere it prints a line per step."""
 
     def __init__(self, file: TextIO | None = None) -> None:
         self._file = sys.stderr if file is None else file
@@ -35,7 +35,7 @@ class ProgressPrinter:
 
 
 class ProgressBar:
-    """A ``watch`` that draws a bar of steps by tqdm, in a terminal or a notebook; it ends with the job.
+    """A ``watch`` that draws a bar of steps with tqdm, in a terminal or a notebook, until the job ends.
 
     Raises ``ImportError`` without tqdm.
     """
@@ -44,7 +44,7 @@ class ProgressBar:
         try:
             from tqdm.auto import tqdm as bar
         except ImportError as error:
-            raise ImportError("bars are drawn by tqdm: pip install 'ballast-client[progress]'") from error
+            raise ImportError("progress bars need tqdm: pip install 'ballast-client[progress]'") from error
         self._bar: Any = bar(**{"unit": "step", **tqdm})
 
     def __call__(self, job: wire.Job) -> None:
@@ -57,7 +57,7 @@ class ProgressBar:
 
 
 def progress_line(job: wire.Job) -> str:
-    """A job in a line."""
+    """Describes a job in one line."""
     progress = job["progress"]
     line = f"{job['state']}: {progress['steps_done']} of {progress['steps_total']} steps"
     if (step := progress.get("step")) is not None:

@@ -1,4 +1,4 @@
-"""A record as reports of periods: what is sent is worked out, and refused, before anything is."""
+"""Turns a record into one report for each period. Every report is built and checked before the first is sent."""
 
 from __future__ import annotations
 
@@ -28,8 +28,10 @@ def reports(
     executed_allocation: Numbers | Table | None,
     assets: Sequence[str] | None = None,
 ) -> list[wire.Report]:
-    """The report of each period, of ``assets`` where there are several. Raises ``ValueError`` that names the argument
-    and the rule."""
+    """Returns the report of each period, by the names of ``assets`` if there are several.
+
+    Raises ``ValueError``, which names the argument and the rule.
+    """
     fields: dict[str, list[Any]] = {}
     if assets is None:
         record = log_returns(returns, kind)
@@ -64,7 +66,7 @@ def reports(
 
 
 def has_columns(returns: Returns) -> bool:
-    """Whether there is more than one column."""
+    """Tells whether there is more than one column."""
     if not hasattr(returns, "__len__") or isinstance(returns, str):
         return False
     held = sheet_of(returns)
@@ -72,7 +74,7 @@ def has_columns(returns: Returns) -> bool:
 
 
 def _by_asset(name: str, table: Table, assets: Sequence[str]) -> dict[str, list[Any]]:
-    """The columns of a table by the names of the assets, in their order."""
+    """Returns the columns of a table by the names of the assets, in the order of the assets."""
     held = sheet_of(table, name)
     assert isinstance(held, Sheet)
     names = list(assets) if held.names is None else held.names
@@ -85,8 +87,8 @@ def _by_asset(name: str, table: Table, assets: Sequence[str]) -> dict[str, list[
     return {asset: columns[asset] for asset in assets}
 
 
-def told(history: wire.History, period: int, returns: Returns, kind: Kind, count: int) -> pd.DataFrame:
-    """The rows of a history from ``period`` on, under the index of ``returns`` where that is a pandas object."""
+def replayed_rows(history: wire.History, period: int, returns: Returns, kind: Kind, count: int) -> pd.DataFrame:
+    """Returns the rows of a history from ``period`` on, under the index of ``returns`` if it is a pandas object."""
     rows = frames.history(history, as_of="then").loc[period : period + count - 1].drop(columns="corrected")
     if not hasattr(returns, "iloc"):
         return rows
@@ -94,7 +96,7 @@ def told(history: wire.History, period: int, returns: Returns, kind: Kind, count
 
 
 def _last_day(date: str) -> str:
-    """Of a month; a day is itself."""
+    """Returns the last day of a month, and a day unchanged."""
     year, _, month = date.partition("-")
     return date if len(month) != 2 else f"{date}-{calendar.monthrange(int(year), int(month))[1]}"
 

@@ -1,7 +1,7 @@
-"""Returns in whatever holds numbers, as the log-returns the service takes. Nothing here imports pandas or NumPy.
+"""Converts returns from lists, arrays, tables and files to log-returns. Nothing here imports pandas or NumPy.
 
-What is learned from is read by the service (:func:`read`), so that a file, a paste and a Series mean the same
-everywhere; what is reported of periods that passed is taken as it is said to be (:func:`log_returns`)."""
+The service reads the records that it learns from (:func:`read`), so that a file, a paste and a Series mean the same
+everywhere. Reports of past periods are converted here, as the caller's ``kind`` says (:func:`log_returns`)."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ from .sheet import Sheet, Table, counts_rows, heading, is_years, sheet_of
 if TYPE_CHECKING:
     from .transport import Transport
 
-#: What the numbers are, with the names ``observe`` has for them.
+#: What the numbers are, by the names that ``observe`` uses.
 Kind: TypeAlias = Literal["log", "simple", "price"]
 
 #: A list, a tuple, a NumPy array, a pandas or polars Series, a DataFrame of one column.
 Returns: TypeAlias = Any
 
 
-#: Largest standard deviation of returns, a period, that is taken for what was meant: percents in the place of fractions
-#: have more. So have the years of some single shares; as prices, which cannot be in percent, they have no such bound.
+#: Largest standard deviation of returns per period that is accepted. Percents instead of fractions exceed it. So do the
+#: yearly returns of some single shares. Give those as prices, which cannot be in percent and have no such bound.
 LARGEST_DEVIATION = 0.3
 
 
 def log_returns(returns: Returns, kind: Kind, name: str = "returns") -> list[float]:
-    """``log``: as they are. ``simple``: ln(1 + R). ``price``: ln(P_i / P_(i-1)), oldest first, one fewer than prices.
+    """Returns log-returns. ``log``: unchanged. ``simple``: ln(1 + R). ``price``: ln(P_i / P_(i-1)), oldest first.
 
-    Raises ``ValueError`` that names the argument (``name``), the entry, its value and the rule: numbers are finite,
-    dates of an index increase, and returns do not deviate by more than :data:`LARGEST_DEVIATION`, as percents would.
+    Prices give one fewer return than there are prices. Raises ``ValueError``, which names the argument (``name``), the
+    entry, its value and the rule: numbers are finite, dates of an index increase, and returns have a standard deviation
+    of at most :data:`LARGEST_DEVIATION`, which percents would exceed.
     """
     numbers = [_number(number, f"{name}[{index}]") for index, number in enumerate(_column(returns, name))]
     above = {"log": -math.inf, "simple": -1.0, "price": 0.0}.get(kind)
@@ -51,17 +52,17 @@ def log_returns(returns: Returns, kind: Kind, name: str = "returns") -> list[flo
         return [math.log(later / earlier) for earlier, later in pairwise(numbers)]
     if len(numbers) > 1 and (deviation := pstdev(numbers)) > LARGEST_DEVIATION:
         raise ValueError(
-            f"{name} has a standard deviation of {deviation:.3g} a period: must be at most {LARGEST_DEVIATION}, as "
-            "fractions are, 0.01 for 1 % (give prices with kind='price' where so much is meant)"
+            f"{name} has a standard deviation of {deviation:.3g} a period: must be at most {LARGEST_DEVIATION}; give "
+            "fractions, 0.01 for 1 %, or, if the returns do vary so much, prices with kind='price'"
         )
     return [math.log1p(number) for number in numbers] if kind == "simple" else numbers
 
 
 def dates_of(returns: Returns, name: str = "returns") -> list[str] | None:
-    """The dates in the index of a pandas object, one for each entry, as ``2008-01-31`` or ``2008-01``; of a span in a
-    PeriodIndex the last day. ``None`` where the index only counts rows, or there is none.
+    """Returns the dates in the index of a pandas object, one for each entry, as ``2008-01-31`` or ``2008-01``.
 
-    Raises ``ValueError`` where it is something else: which row is the oldest would be anybody's guess.
+    A span in a PeriodIndex gives its last day. Returns ``None`` if the index only counts rows, or there is none. Raises
+    ``ValueError`` for any other index, because it would not show which row is the oldest.
     """
     index: Any = getattr(returns, "index", None)
     kind = getattr(index, "inferred_type", None)
@@ -88,28 +89,28 @@ _DATE = re.compile(r"\d{4}-\d{2}(-\d{2}([ T].*)?)?$")
 
 
 class LogReturns(list[Any]):
-    """Log-returns as the service told them, a number for each period or, of several assets, a row: they are taken as
-    they are, bit for bit, wherever returns are given."""
+    """Log-returns that the service returned: a number for each period, or a row for several assets. Wherever you pass
+    them as returns, they are used unchanged, bit for bit."""
 
 
 class Read(NamedTuple):
-    """Returns as the service's reader takes them, and what stands beside them."""
+    """Returns as the service read them, with their dates and the rates of the bank."""
 
-    #: What was read, for a person to check.
+    #: A sentence that says what was read, for a person to check.
     sentence: str
     #: Log-returns, a list for each asset.
     series: list[list[float]]
     kind: wire.Kind
     dates: list[str] | None = None
     periods_per_year: int | None = None
-    #: What the bank paid in each period, where a column says so.
+    #: What the bank paid in each period, if there is a column of rates.
     rates: list[float] | None = None
-    #: Whether the newest came first, and the rows are turned round.
+    #: Whether the newest row came first, so that the rows were reversed.
     is_turned: bool = False
 
     @property
     def rows(self) -> list[list[float]]:
-        """A row for each period."""
+        """Returns a row for each period."""
         return [list(row) for row in zip(*self.series, strict=True)]
 
 
@@ -121,14 +122,13 @@ async def read(
     name: str = "returns",
     assets: Sequence[str] | None = None,
 ) -> Read:
-    """What the service reads, where that is one reading.
+    """Returns what the service reads in the source, if there is exactly one reading.
 
-    ``kind`` and ``choices`` say what the source does not, and ``assets`` heads its columns. Raises
-    :class:`UnclearReturns` where it may be several readings, and ``ValueError`` where it is none; both name the
-    argument.
+    ``kind`` and ``choices`` add what the source does not show, and ``assets`` are the headings of its columns. Raises
+    :class:`UnclearReturns` if several readings are possible, and ``ValueError`` if none is. Both name the argument.
     """
     if isinstance(source, LogReturns):
-        return _as_told(source, kind, name)
+        return _as_returned(source, kind, name)
     reading = await reading_of(transport, source, kind, choices, name, assets)
     if reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
@@ -146,14 +146,12 @@ async def read(
     )
 
 
-def _as_told(returns: LogReturns, kind: Kind | None, name: str) -> Read:
+def _as_returned(returns: LogReturns, kind: Kind | None, name: str) -> Read:
     if kind not in (None, "log"):
-        raise ValueError(
-            f"kind is {kind!r}: must be 'log' or left out, as {name} are log-returns that the service told"
-        )
+        raise ValueError(f"kind is {kind!r}: must be 'log' or left out, because {name} are log-returns of the service")
     rows = [row if isinstance(row, list) else [row] for row in returns]
     return Read(
-        f"{len(rows)} log-returns as fractions, as the service told them.",
+        f"{len(rows)} log-returns as fractions, as the service returned them.",
         [list(column) for column in zip(*rows, strict=True)],
         "log",
     )
@@ -167,15 +165,19 @@ async def reading_of(
     name: str = "returns",
     assets: Sequence[str] | None = None,
 ) -> wire.Reading:
-    """What the service makes of it. Of returns that no heading names it is also asked which they are, simple or log:
-    they look alike, and so does a ``history``, which the service tells in log-returns, under any heading."""
+    """Returns the reading of the service.
+
+    If returns have no heading, the reading also contains the question whether they are simple or log-returns, because
+    the two look alike. The same holds for a ``history`` under any heading, because the service's own histories are of
+    log-returns.
+    """
     held = sheet_of(source, name)
     text = held if isinstance(held, str) else held.text(assets)
-    said: wire.Choices = {**(choices or {})}
+    given: wire.Choices = {**(choices or {})}
     if kind is not None:
-        said["kind"] = kind
-    reading = await _reading(transport, text, said)
-    if isinstance(held, str) or "kind" in said or (held.is_headed and name != "history"):
+        given["kind"] = kind
+    reading = await _reading(transport, text, given)
+    if isinstance(held, str) or "kind" in given or (held.is_headed and name != "history"):
         return reading
     if reading["outcome"] == "read":
         questions: list[wire.Question] = []
@@ -185,27 +187,27 @@ async def reading_of(
         is_open = any(question["asks"] == "unit" for question in questions)
     if not is_open:
         return reading
-    options = [await _meaning(transport, text, said, "simple"), await _meaning(transport, text, said, "log")]
-    asked: wire.Question = {
+    options = [await _meaning(transport, text, given, "simple"), await _meaning(transport, text, given, "log")]
+    kind_question: wire.Question = {
         "asks": "kind",
         "question": "Are these simple returns, or log-returns? They look alike.",
         "options": options,
     }
     columns = [] if reading["outcome"] == "refused" else reading["columns"]
-    return {"outcome": "asked", "questions": [asked, *questions], "columns": columns}
+    return {"outcome": "asked", "questions": [kind_question, *questions], "columns": columns}
 
 
-async def _meaning(transport: Transport, text: str, said: wire.Choices, kind: Literal["simple", "log"]) -> wire.Answer:
-    """An answer to what the numbers are, and what would be read then."""
-    reading = await _reading(transport, text, {**said, "kind": kind})
+async def _meaning(transport: Transport, text: str, given: wire.Choices, kind: Literal["simple", "log"]) -> wire.Answer:
+    """Returns one possible answer to the question of the kind, with the reading that would follow."""
+    reading = await _reading(transport, text, {**given, "kind": kind})
     answer: wire.Answer = {"label": {"simple": "Simple", "log": "Logarithms"}[kind], "choices": {"kind": kind}}
     if reading["outcome"] == "read":
         answer["sentence"] = reading["sentence"]
     return answer
 
 
-async def _reading(transport: Transport, text: str, said: wire.Choices) -> wire.Reading:
-    return cast(wire.Reading, await transport.json("POST", "/returns", body={"text": text, "choices": said}))
+async def _reading(transport: Transport, text: str, given: wire.Choices) -> wire.Reading:
+    return cast(wire.Reading, await transport.json("POST", "/returns", body={"text": text, "choices": given}))
 
 
 async def read_assets(
@@ -216,20 +218,20 @@ async def read_assets(
     assets: Sequence[str] | None,
     name: str = "returns",
 ) -> tuple[list[str], Read]:
-    """The names of several assets, and what the service reads of each, as :func:`read`.
+    """Returns the names of several assets, and the reading of their returns as :func:`read` does.
 
-    ``assets`` names the columns of rows, or chooses among those of a table, of a text or of a file; by default all that
-    hold neither dates nor the rates of the bank.
+    ``assets`` names the columns of rows, or selects columns of a table, a text or a file. By default it selects all
+    that hold neither dates nor the rates of the bank.
     """
     held = source if isinstance(source, LogReturns) else sheet_of(source, name)
     columns = held.names if isinstance(held, Sheet) else None
     if assets is None:
         if isinstance(held, LogReturns) or (columns is None and not isinstance(held, str)):
-            raise ValueError(f"assets is None: must name the columns where {name} is no DataFrame, text or file")
+            raise ValueError(f"assets is None: must name the columns because {name} is no DataFrame, text or file")
         assets = await _assets_of(transport, held, kind, choices, name)
     names = [str(each) for each in assets]
     if twice := next((each for place, each in enumerate(names) if each in names[:place]), None):
-        raise ValueError(f"assets has {twice!r} twice: each asset must have a name of its own")
+        raise ValueError(f"assets has {twice!r} twice: must name each asset once")
     if columns is None and not isinstance(held, str):
         for index, row in enumerate(held if isinstance(held, LogReturns) else held.rows):
             if len(row) != len(names):
@@ -247,7 +249,7 @@ async def read_assets(
 async def _assets_of(
     transport: Transport, held: Sheet | str, kind: Kind | None, choices: wire.Choices | None, name: str
 ) -> list[str]:
-    """The columns that hold neither dates nor rates, as the service's reader tells them."""
+    """Returns the columns that, as the service reads them, hold neither dates nor rates."""
     names = None if isinstance(held, str) else held.names
     own = None if names is None else [heading(each) for each in names]
     reading = await reading_of(transport, held, kind, choices, name, own)
@@ -257,7 +259,7 @@ async def _assets_of(
     if not found and reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
     if reading["outcome"] == "read":
-        # A heading that is known says which column is the one asset, as in a file.
+        # A known heading marks one column as the only asset, as in a file.
         read = [one["column"] for one in reading["series"]]
         if len(read) < len(found) and len(read) == 1:
             raise ValueError(f"{name} holds one asset, in column {read[0]}: assets must name several columns")
@@ -265,17 +267,17 @@ async def _assets_of(
 
 
 def day(date: object) -> str:
-    """A date, a time or a text as the service takes it: the day alone."""
+    """Returns the day of a date, a time or a text, as the service accepts it."""
     return str(date)[:10]
 
 
 def per_period(
     name: str, values: Iterable[Any], returns: Returns, periods: int, kind: wire.Kind, is_turned: bool = False
 ) -> list[Any]:
-    """What was given for each entry of the returns, as one for each period, oldest first: the first price has none, and
-    neither have entries before and after the numbers that hold none.
+    """Returns one value for each period, oldest first, from one for each entry of the returns.
 
-    Raises ``ValueError`` that names the argument and the rule: as many entries, and the same index where both have one.
+    The first price has no period, and neither have empty entries before and after the numbers. Raises ``ValueError``,
+    which names the argument and the rule: as many entries, and the same index if both have one.
     """
     found, (before, after) = list(values), _blank(returns)
     last = before + (kind in ("price", "cumulated")) + periods
@@ -286,7 +288,7 @@ def per_period(
 
 
 def check_aligned(name: str, values: Any, returns: Returns) -> None:
-    """The same index, where both have one."""
+    """Raises ``ValueError`` if both have an index and the two differ."""
     own: Any = getattr(values, "index", None)
     index: Any = getattr(returns, "index", None)
     if hasattr(own, "equals") and hasattr(index, "equals") and not own.equals(index):
@@ -294,7 +296,7 @@ def check_aligned(name: str, values: Any, returns: Returns) -> None:
 
 
 def _blank(returns: Returns) -> tuple[int, int]:
-    """How many entries before and after the numbers hold none: the service leaves them out."""
+    """Counts the empty entries before and after the numbers, which the service leaves out."""
     if isinstance(returns, LogReturns) or not hasattr(returns, "__len__"):
         return 0, 0
     held = sheet_of(returns)
@@ -309,7 +311,7 @@ def _number(value: Any, place: str) -> float:
 
 
 def check_order(returns: Returns, name: str = "returns") -> None:
-    """Dates increase, where the index holds them."""
+    """Raises ``ValueError`` if the index holds dates that do not increase."""
     index: Any = getattr(returns, "index", None)
     dates = dates_of(returns, name)
     if dates is None:
@@ -324,7 +326,7 @@ def check_order(returns: Returns, name: str = "returns") -> None:
 
 
 def _column(returns: Returns, name: str) -> Iterable[Any]:
-    """The one column of a table; anything else as it is."""
+    """Returns the only column of a table, and anything else unchanged."""
     shape: tuple[int, ...] = getattr(returns, "shape", (0,))
     if len(shape) == 1:
         values: Iterable[Any] = returns

@@ -1,4 +1,4 @@
-"""A live investor."""
+"""Sessions: one investor each, who gets advice and reports what happened."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-#: What a session counts.
+#: The entries that a session numbers.
 _Counted: TypeAlias = Literal["period", "correction", "renewal"]
-#: Where its history has them, the moment they were made, and what was done.
+#: For each, the list of the history, the field with the time, and the verb for a message.
 _MADE: dict[_Counted, tuple[str, str, str]] = {
     "period": ("observations", "observed_ms", "observed"),
     "correction": ("corrections", "corrected_ms", "made"),
     "renewal": ("renewals", "renewed_ms", "made"),
 }
-#: Longest pause between two looks at a renewal that is due, in seconds.
+#: Longest pause between two requests for the state of a renewal that is due, in seconds.
 _LOOK = 0.5
 
 
 class _Session(Labelled):
-    """A session of the service, and the period it has come to.
+    """A session of the service and its current period.
 
-    ``observe`` numbers its reports, which makes them exactly-once: a report whose answer was lost is sent again under
-    the same number, and the service answers as it did the first time. Where ``observe`` raises :class:`Unreachable`,
-    the period is still the old one here; call it again with the same arguments. One object is one investor's and is not
-    meant for several threads; after somebody else has observed or renewed, be it the service, ``refresh`` catches up.
+    ``observe`` numbers its reports, so each counts exactly once. If an answer is lost, the client sends the report
+    again under the same number, and the service returns its first answer. If ``observe`` raises :class:`Unreachable`,
+    this object keeps the old period: call it again with the same arguments. One object is for one investor and one
+    thread. If another client or the service itself has reported or renewed, ``refresh`` updates this object.
     """
 
     def __init__(self, transport: Transport, session: wire.Session) -> None:
@@ -51,24 +51,23 @@ class _Session(Labelled):
         self.horizon = session["horizon"]
         #: The coming period, from 1; ``horizon + 1`` once completed.
         self.period = session["period"]
-        #: ``waiting`` while its next policy is trained: until then it goes on by the one it has, past the horizon too.
+        #: ``waiting`` while its next policy is trained. Until then it keeps its policy, even past the horizon.
         self.state: wire.SessionState = session["state"]
         self.wealth = session["wealth"]
-        #: Share of it in the risky asset, before trading.
+        #: Share of wealth in the risky asset, before trading.
         self.holding = session["holding"]
-        #: Policies that followed the first.
+        #: The number of renewals, each by another policy.
         self.renewals = session["renewals"]
-        #: Corrections made of what periods reported.
+        #: The number of corrections of past periods.
         self.corrections = session["corrections"]
-        #: The sentence of what was read as ``history``; ``None`` where that was the policy's own, and for a session
-        #: that is found again.
+        #: Says how ``history`` was read; ``None`` if it was that of the policy, and for a session that was looked up.
         self.read: str | None = cast(dict[str, Any], session).get("read")
         #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
         self.observed: wire.Observed | None = None
 
     @property
     def completed(self) -> bool:
-        """Whether the horizon is reached, and no policy is to follow."""
+        """Whether the session has reached its horizon and gets no further policy."""
         return self.state == "completed"
 
     async def _action(
@@ -78,12 +77,12 @@ class _Session(Labelled):
         explain: Literal["worst_case"] | None = None,
         sensitivity: bool | None = None,
     ) -> wire.Action:
-        """The robust allocation for the coming period.
+        """Returns the robust allocation for the coming period.
 
-        ``mode="resolve"`` solves the robust step anew at the exact state; ``explain="worst_case"`` does too, and
-        shows the law it is robust against. ``sensitivity=True`` says how near the allocation is to changing. Raises
-        :class:`SessionCompleted` after the horizon. A session that waits for its next policy is advised by the last
-        step of the one it has, which the answer's ``caution`` says.
+        ``mode="resolve"`` solves the robust step again at the exact state. ``explain="worst_case"`` does so too, and
+        returns the worst law. ``sensitivity=True`` shows how close the allocation is to changing. Raises
+        :class:`SessionCompleted` after the horizon. While a session waits for its next policy, the last step of its
+        current policy gives the advice, and ``caution`` in the answer says so.
         """
         params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
         return cast(wire.Action, await self._transport.json("GET", "/action", params=params))
@@ -91,24 +90,24 @@ class _Session(Labelled):
     async def _assets_action(
         self, *, mode: Literal["surrogate", "resolve"] | None = None, explain: Literal["worst_case"] | None = None
     ) -> wire.AssetsAction:
-        """The same of a session of several assets: what to hold of each by its name, of which
-        :func:`ballast.frames.allocation` makes a Series."""
+        """Returns the robust allocation of a session of several assets, by their names.
+        :func:`ballast.frames.allocation` makes a Series of it."""
         params = {"session": self.id, "mode": mode, "explain": explain}
         return cast(wire.AssetsAction, await self._transport.json("GET", "/action", params=params))
 
     async def _observe(
         self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]
     ) -> Self:
-        """Reports the coming period: its return in exactly one of three ways, or ``missing=True``; the answer is in
-        ``observed``.
+        """Reports the coming period: its return in exactly one of three ways, or ``missing=True``. ``observed`` has
+        the answer.
 
-        :class:`wire.Report <ballast.wire.Report>` names all that can be said: ``executed_allocation`` is what was
-        really held, by default what was advised; ``rate`` what the bank paid, ``flow`` what was added, by default the
-        policy's; ``wealth`` what was really reached; ``date`` the last day. Of several assets ``log_returns``,
-        ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by their names. ``period``
-        is the coming one unless given: an earlier one with the content first reported for it gets its first answer
-        again. Raises :class:`Unconfirmed` for a report that is most likely a slip, unless ``confirm`` says that it is
-        meant, and :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
+        :class:`wire.Report <ballast.wire.Report>` lists all fields. ``executed_allocation`` is the share that was
+        really held, by default the advised one. ``rate`` is what the bank paid and ``flow`` what was added, by default
+        those of the policy. ``wealth`` is the wealth really reached, and ``date`` is the last day. For several assets
+        ``log_returns``, ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by the names
+        of the assets. ``period`` is by default the coming one. An earlier period with the content first reported for it
+        gets its first answer again. Raises :class:`Unconfirmed` for a report that is probably a mistake, unless
+        ``confirm`` is true, and :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
         number = self.period if period is None else period
         body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **_by_name(report)}
@@ -131,24 +130,24 @@ class _Session(Labelled):
         flow: replay.Numbers | None = None,
         executed_allocation: replay.Numbers | Table | None = None,
     ) -> pd.DataFrame:
-        """Reports a record period by period, from ``period`` on, and answers what was advised and what became of
-        wealth, a row for each.
+        """Reports a record period by period, from ``period`` on. Returns a table with a row for each period: what was
+        advised, and the wealth that followed.
 
-        ``returns`` are fractions or prices, oldest first, and ``kind`` says which. Of several assets they are a table
-        with a column for each, or rows in their order, and so is ``executed_allocation``. ``dates`` are the last days
-        of the periods, by default those of the index of a pandas object, as they stand there. ``rate``, ``flow`` and
-        ``executed_allocation`` of one asset are as in :meth:`observe`: one number for all periods, or one for each
-        entry of ``returns``, as ``dates`` are.
+        ``returns`` are fractions or prices, oldest first, and ``kind`` says which. For several assets they are a table
+        with a column for each, or rows in the order of the assets, and so is ``executed_allocation``. ``dates`` are the
+        last days of the periods, by default those of the index of a pandas object. ``rate``, ``flow`` and, for one
+        asset, ``executed_allocation`` are as in :meth:`observe`: one number for all periods, or one for each entry of
+        ``returns``. ``dates`` also has one for each entry.
 
-        What is on record is meant, so no report of it is doubted. Each carries the number of its period, so the same
-        call again, be it after :class:`Unreachable`, reports nothing twice and answers the same. A record that goes
-        on where the session stands has ``period=session.period``. A session that renews itself is waited for wherever
-        a renewal is due: what is advised does not depend on how long trainings take.
+        The service accepts these reports without asking for confirmation. Each carries the number of its period, so
+        the same call again, for example after :class:`Unreachable`, reports nothing twice and returns the same table.
+        To continue at the current period, give ``period=session.period``. If the session renews itself, the call waits
+        for each renewal that is due, so the advice does not depend on how long trainings take.
 
-        The rows have the index of ``returns`` where that is a pandas object, and else the periods. The columns are
-        those of :func:`ballast.frames.history`, as they were told. Raises ``ValueError`` where an argument breaks a
-        rule and ``ImportError`` without pandas, both before anything is sent; :class:`JobEnded` where the training of
-        a renewal fails; and what :meth:`observe` raises.
+        The rows have the index of ``returns`` if it is a pandas object, and otherwise the periods. The columns are
+        those of :func:`ballast.frames.history` with ``as_of="then"``. Raises ``ValueError`` if an argument breaks a
+        rule and ``ImportError`` without pandas, both before anything is sent; :class:`JobEnded` if the training of a
+        renewal fails; and what :meth:`observe` raises.
         """
         frames.require_pandas()
         assets = (await self._history()).get("assets") if replay.has_columns(returns) else None
@@ -158,10 +157,10 @@ class _Session(Labelled):
             if renewing:
                 await self._await_renewal()
             await self._observe(period=number, confirm=True, **report)
-        return replay.told(await self._history(), period, returns, kind, len(reports))
+        return replay.replayed_rows(await self._history(), period, returns, kind, len(reports))
 
     async def _await_renewal(self) -> None:
-        """Waits until no renewal is due. The service looks at those under way twice a second."""
+        """Waits until no renewal is due. The service checks its renewals twice a second."""
         for attempt in itertools.count():
             due = (await self._read()).get("renewal")
             if due is None:
@@ -181,13 +180,13 @@ class _Session(Labelled):
         confirm: bool = False,
         **report: Unpack[wire.Report],
     ) -> wire.Corrected:
-        """Puts right what a period that passed reported: all of it, in the place of what was reported before. With
-        ``change="insert"`` the report is of a period that was skipped before this one, and with ``change="remove"``,
-        without a report, the period is taken out.
+        """Corrects the report of a past period. The new report replaces the whole old one.
 
-        What was reported and told stays on record; every advice from now on rests on the correction. Exactly once as
-        :meth:`observe` is: ``correction`` is the number after the last one made unless given, and one whose answer was
-        lost is sent again under the same number.
+        With ``change="insert"`` the report adds a period that was skipped before this one. With ``change="remove"``,
+        which takes no report, the period is removed. The history keeps the old reports and answers, and all further
+        advice uses the correction. Like :meth:`observe`, a correction counts exactly once. ``correction`` is its
+        number, by default the one after the last. If an answer is lost, the correction is sent again under the same
+        number.
         """
         number = self.corrections + 1 if correction is None else correction
         body: wire.Correct = {
@@ -206,9 +205,10 @@ class _Session(Labelled):
         return corrected
 
     async def _renew(self, policy: str, *, window: int | None = None, renewal: int | None = None) -> wire.Renewed:
-        """Goes on by another policy from the coming period; its law is of the last ``window`` returns seen, or of all.
+        """Switches to another policy from the coming period on.
 
-        Exactly once as :meth:`observe` is: ``renewal`` is the number after the last one made unless given.
+        The new law is that of the last ``window`` observed returns, by default of all. Like :meth:`observe`, a renewal
+        counts exactly once. ``renewal`` is its number, by default the one after the last.
         """
         number = self.renewals + 1 if renewal is None else renewal
         body: wire.Renew = {"renewal": number, "policy": policy, "window": window}
@@ -222,20 +222,23 @@ class _Session(Labelled):
     async def _counted(
         self, path: str, body: wire.Observe | wire.Correct | wire.Renew, counted: _Counted | None, number: int
     ) -> Any:
-        """Sends what has a number. Where this object ``counted`` it, and somebody else has used it since, the refusal
-        says so, and when that was."""
+        """Sends an entry that has a number.
+
+        If this object ``counted`` the number and another client has used it in the meantime, the refusal says so and
+        when that was.
+        """
         try:
             return await self._transport.json("POST", path, body=body)
         except ReportConflict as conflict:
             made = None if counted is None else await self._made(counted, number)
             if made is None:
                 raise
-            told = f"{counted} {number} was {made}, which this object has not seen; refresh() catches up"
-            problem = cast(wire.Problem, {**conflict.args[0], "detail": told})
+            detail = f"{counted} {number} was {made}, which this object has not seen: call refresh()"
+            problem = cast(wire.Problem, {**conflict.args[0], "detail": detail})
             raise ReportConflict(problem, conflict.retry_after) from conflict
 
     async def _made(self, counted: _Counted, number: int) -> str | None:
-        """When an entry of the session was made; of a renewal also whether the service makes them by itself."""
+        """Says when an entry of the session was made, and for a renewal whether the service makes them by itself."""
         history, (name, moment, verb) = await self._history(), _MADE[counted]
         for entry in cast(dict[str, list[dict[str, Any]]], history)[name]:
             if entry[counted] == number:
@@ -257,11 +260,10 @@ class _Session(Labelled):
         explain: Literal["worst_case"] | None = None,
         sweep: wire.Sweep | None = None,
     ) -> wire.WhatIfAnswer:
-        """The advice for a hypothetical wealth, holding, radius or next return, or for a ``sweep`` of one of them.
-
-        Touches nothing: the session stays as it is.
+        """Returns the advice for a hypothetical wealth, holding, radius or next return, or for a ``sweep`` of one of
+        them. The session does not change.
         """
-        supposed: wire.WhatIf = {
+        scenario: wire.WhatIf = {
             "session": self.id,
             "wealth": wealth,
             "holding": holding,
@@ -272,7 +274,7 @@ class _Session(Labelled):
             "explain": explain,
             "sweep": sweep,
         }
-        return cast(wire.WhatIfAnswer, await self._transport.json("POST", "/what-if", body=supposed))
+        return cast(wire.WhatIfAnswer, await self._transport.json("POST", "/what-if", body=scenario))
 
     async def _assets_what_if(
         self,
@@ -287,10 +289,13 @@ class _Session(Labelled):
         previous_prices: Mapping[str, float] | pd.Series[float] | None = None,
         explain: Literal["worst_case"] | None = None,
     ) -> wire.AssetsWhatIfPoint:
-        """The same of a session of several assets, for hypothetical holdings or next returns of each by its name, a
-        dict or a Series: what ``observe`` and then ``assets_action`` would tell. :func:`ballast.frames.allocation`
-        makes a Series of it."""
-        supposed: dict[str, Any] = {
+        """Returns the advice for hypothetical holdings or next returns of a session of several assets.
+
+        Holdings and returns are a dict or a Series by the names of the assets. The answer is the one that ``observe``
+        and then ``assets_action`` would give. :func:`ballast.frames.allocation` makes a Series of it. The session does
+        not change.
+        """
+        scenario: dict[str, Any] = {
             "session": self.id,
             "wealth": wealth,
             "holdings": holdings,
@@ -302,45 +307,45 @@ class _Session(Labelled):
             "previous_prices": previous_prices,
             "explain": explain,
         }
-        body = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in supposed.items()}
+        body = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in scenario.items()}
         return cast(wire.AssetsWhatIfPoint, await self._transport.json("POST", "/what-if", body=body))
 
     async def _history(self) -> wire.History:
-        """Where the session started, what was reported and told, and what would be told now.
+        """Returns the start of the session, all reports and answers, and what the answers would be now.
 
-        ``Policy.session(history=...)`` takes it, and opens a session that starts as this one did."""
+        Pass it to ``Policy.session(history=...)`` to open a session that starts as this one did."""
         history = cast(wire.History, await self._transport.json("GET", f"{self._path}/history"))
         history["history"] = LogReturns(history["history"])
         return history
 
     async def _frame(self, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
-        """The history as a DataFrame, a row for each period observed: dates, returns, what was advised and held, and
-        what wealth became (:func:`ballast.frames.history` names the columns and their units).
+        """Returns the history as a DataFrame, with a row for each observed period: dates, returns, what was advised
+        and held, and wealth (:func:`ballast.frames.history` names the columns and their units).
 
-        ``as_of="now"`` has every correction made, ``"then"`` tells what was told at the time. Raises ``ImportError``
-        without pandas.
+        ``as_of="now"`` includes every correction, and ``"then"`` shows what the service answered at the time. Raises
+        ``ImportError`` without pandas.
         """
         return frames.history(await self._history(), as_of)
 
     async def _assets_frame(
         self, figure: frames.AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
     ) -> pd.DataFrame:
-        """One figure of a session of several assets by period and asset: their returns, or the share advised, executed
-        or held of each (:func:`ballast.frames.assets_history`, which says what it raises)."""
+        """Returns one figure of a session of several assets by period and asset: the returns, or the advised, executed
+        or held shares (:func:`ballast.frames.assets_history`, which says what it raises)."""
         return frames.assets_history(await self._history(), figure, as_of)
 
     async def _worst_case(self) -> pd.DataFrame:
-        """The law that the advice for the coming period is robust against, as what moves where
+        """Returns the worst law that the advice for the coming period is robust against, as a transport of probability
         (:func:`ballast.frames.worst_case`, which says what it raises)."""
         return frames.worst_case(await self._action(explain="worst_case"))
 
     async def _plot(self, ax: Axes | None = None) -> Axes:
-        """Draws wealth after each period reported, and the share held in it (:func:`ballast.plots.history`). Raises
+        """Draws the wealth after each period and the share held through it (:func:`ballast.plots.history`). Raises
         ``ImportError`` without pandas and matplotlib."""
         return plots.history(await self._history(), ax)
 
     async def _refresh(self) -> Self:
-        """Reads from the service where the session stands, and by which policy it lives."""
+        """Updates this object from the service: its period, wealth, holding, state and policy."""
         await self._read()
         return self
 
@@ -353,7 +358,7 @@ class _Session(Labelled):
         return session
 
     async def _delete(self) -> None:
-        """Deletes the session and all that is recorded of it. Raises :class:`NotFound` where there is none."""
+        """Deletes the session and all its records. Raises :class:`NotFound` if there is no such session."""
         await self._transport.call("DELETE", self._path)
 
     def __repr__(self) -> str:
@@ -361,7 +366,7 @@ class _Session(Labelled):
 
 
 def _by_name(report: wire.Report) -> wire.Report:
-    """The report with dicts in the place of Series."""
+    """Returns the report with dicts instead of Series."""
     plain = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in report.items()}
     return cast(wire.Report, plain)
 

@@ -1,8 +1,8 @@
-"""Whatever holds numbers, as text that the service reads: a file as it stands, a table row by row. Nothing here imports
-pandas, polars, pyarrow or NumPy.
+"""Converts tables, rows and files to text that the service reads. A file is passed on unchanged, a table row by row.
+Nothing here imports pandas, polars, pyarrow or NumPy.
 
-An index that is more than the numbers of the rows becomes a column of dates, and is understood by the service, which
-understands those of files: a client that knew dates by itself would drop those that it does not know."""
+An index that does more than number the rows becomes a column of dates. The service parses these dates as it parses
+those of files, so the client drops none that it does not know."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
-#: A DataFrame, a two-dimensional array, a list of rows: a column for each asset. Also a text, or the path of a file.
+#: A DataFrame, a two-dimensional array or a list of rows, with a column for each asset; or a text, or a path of a file.
 Table: TypeAlias = Any
 
-#: How a line ends that is the path of a file, and no returns.
+#: A line with one of these endings is the path of a file, not returns.
 _FILES = (".csv", ".tsv", ".txt")
-#: What holders of numbers write where one is missing.
+#: How the packages write a missing number.
 _MISSING = {"nan", "NaN", "NaT", "<NA>", "None"}
-#: Midnight beside a day, maybe with an offset, says nothing more than the day.
+#: A midnight after a day, with or without an offset, which adds nothing to the day.
 _MIDNIGHT = re.compile(r"(?<=\d)[ T]00:00:00(\.0+)?([+-]\d\d:?\d\d|Z)?$")
 #: Whole numbers that may be years.
 _YEARS = range(1700, 2201)
-#: The heading of dates, which the service knows whatever stands below it.
+#: The heading of a column of dates. The service recognises it whatever the cells contain.
 _DATE = "date"
 
 
@@ -33,28 +33,28 @@ _DATE = "date"
 class Sheet:
     """A table of text, cell by cell."""
 
-    #: A row for each entry; its cells are those of the columns, without the index.
+    #: A row for each entry, with the cells of the columns but without the index.
     rows: list[list[str]]
-    #: Headings of the columns, or the names of unnamed ones; ``None`` where nothing has a name.
+    #: Headings of the columns, or default names; ``None`` if nothing has a name.
     names: list[str] | None
-    #: Whether the columns have headings, which may say what their numbers are.
+    #: Whether the columns have headings, which may show what the numbers are.
     is_headed: bool
-    #: A cell for each row, where the index is more than their numbers.
+    #: A cell for each row, if the index does more than number the rows.
     index: list[str] | None
 
     def blank(self) -> tuple[int, int]:
-        """How many rows before and after the numbers hold none, as the first of ``pct_change()`` does."""
+        """Counts the empty rows before and after the numbers, such as the first row of ``pct_change()``."""
         held = [any(row) for row in self.rows]
         return (held.index(True), held[::-1].index(True)) if any(held) else (0, 0)
 
     def text(self, names: Sequence[str] | None = None) -> str:
-        """Lines of cells parted by tabs, under ``names`` or their own headings."""
+        """Returns lines of cells separated by tabs, under ``names`` or the headings of the table."""
         places = range(1 + (self.index is not None), len(self.rows[0]) + 2) if self.rows else ()
         own = self.names if self.is_headed else None
         if names is None and (own is not None or self.index is not None):
             names = own or [f"column {place}" for place in places]
         if self.index is None:
-            # A blank line would be passed over, and the hole in the record with it.
+            # The service skips blank lines, which would hide a gap in the record.
             before, after = self.blank()
             held = self.rows[before : len(self.rows) - after]
             rows = [row if any(row) else ["NaN"] * len(row) for row in held]
@@ -65,10 +65,11 @@ class Sheet:
 
 
 def sheet_of(source: Table | Sheet | str | PathLike[str], name: str = "returns") -> Sheet | str:
-    """A text as it is, and that of a file (UTF-8, UTF-16 where its first bytes say so, or what Windows writes; a line
-    that ends as the name of a file does is its path); of anything else its rows.
+    """Returns a text unchanged, the text of a file, and the rows of anything else.
 
-    Raises ``ValueError`` that names the argument, where it is none of these, or an index cannot be meant.
+    A file is in UTF-8, in UTF-16 with a byte order mark, or in the encoding of Windows. A single line that ends like
+    the name of a file is a path. Raises ``ValueError``, which names the argument, for other types and for an index that
+    is ambiguous or has several levels.
     """
     if isinstance(source, str) and "\n" not in source and source.lower().endswith(_FILES):
         source = Path(source)
@@ -80,7 +81,7 @@ def sheet_of(source: Table | Sheet | str | PathLike[str], name: str = "returns")
         return _of_pandas(source, name)
     if hasattr(source, "column_names"):
         names, columns = list(source.column_names), [column.to_pylist() for column in source.columns]
-        # What was the index of a DataFrame.
+        # A column that was the index of a DataFrame.
         names = [_DATE if each.startswith("__index_level_") else each for each in names]
     elif hasattr(source, "get_columns"):
         names, columns = list(source.columns), [column.to_list() for column in source.get_columns()]
@@ -98,15 +99,15 @@ def sheet_of(source: Table | Sheet | str | PathLike[str], name: str = "returns")
 
 
 def heading(name: object) -> str:
-    """A name as a heading, which a number alone would not be."""
+    """Returns a name as a heading. A bare number would be read as data, so it gets a prefix."""
     text = str(name)
     return text if any(letter.isalpha() for letter in text) else f"asset {text}"
 
 
 def counts_rows(index: Any, name: str) -> bool:
-    """Whether an index of pandas only numbers the rows, from 0 or, as that of a part of a record, from another number.
+    """Tells whether an index of pandas only numbers the rows, from 0 or, for a part of a record, from another number.
 
-    Raises ``ValueError`` where it may as well be years.
+    Raises ``ValueError`` if the numbers could also be years.
     """
     if getattr(index, "inferred_type", None) != "integer" and len(index):
         return False
@@ -114,17 +115,17 @@ def counts_rows(index: Any, name: str) -> bool:
         return False
     if not is_years(index):
         return True
-    # Years are given as numbers one by one; rows are counted by a range.
+    # Years are given as separate numbers; rows are counted by a range.
     if hasattr(index, "step") and index.name is None:
         raise ValueError(
-            f"the index of {name} goes from {index[0]} to {index[-1]}, which may be years or rows that are counted: "
+            f"the index of {name} goes from {index[0]} to {index[-1]}, which may be years or row numbers: "
             "must have the name 'year', or start from 0 (reset_index(drop=True))"
         )
     return False
 
 
 def is_years(numbers: Any) -> bool:
-    """Whether whole numbers that go up one by one may be years."""
+    """Tells whether consecutive whole numbers may be years."""
     return len(numbers) > 0 and numbers[0] in _YEARS and numbers[-1] == numbers[0] + len(numbers) - 1 in _YEARS
 
 
@@ -150,7 +151,7 @@ def _of_pandas(source: Any, name: str) -> Sheet:
 
 
 def names_of(frame: Any) -> list[str]:
-    """The names of the columns of a DataFrame as texts; of several levels those by which the columns differ."""
+    """Returns the names of the columns of a DataFrame. Of several levels it uses those in which the columns differ."""
     if getattr(frame.columns, "nlevels", 1) == 1:
         return [str(name) for name in frame.columns]
     levels = list(zip(*frame.columns, strict=True))
@@ -164,7 +165,7 @@ def _cell(value: Any) -> str:
 
 
 def _quoted(cell: str) -> str:
-    """A cell that holds what could part cells stands in quotes."""
+    """Quotes a cell that contains a character that could separate cells."""
     return '"' + cell.replace('"', '""').replace("\n", " ") + '"' if re.search(r'[\s,;|"#]', cell) else cell
 
 

@@ -1,5 +1,5 @@
 """The advice on several assets as an optimiser of skfolio. It needs skfolio: ``pip install 'ballast-client[skfolio]'``;
-nothing else of this package imports it."""
+no other module of this package imports it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from .sklearn import URL, Advised
 class RobustAllocation(Advised, BaseOptimization):
     """:class:`ballast.sklearn.RobustAllocation` for skfolio, with the same arguments and attributes.
 
-    ``portfolio_params``, ``fallback``, ``previous_weights`` and ``raise_on_failure`` are skfolio's own, and so is
-    ``predict``, which answers a ``Portfolio``: ``cross_val_predict`` walks forward with it. skfolio counts no interest
-    on what is in none of its columns, so ``bank`` should name the column with the returns of the bank.
+    ``portfolio_params``, ``fallback``, ``previous_weights`` and ``raise_on_failure`` are arguments of skfolio.
+    ``predict`` is skfolio's too and returns a ``Portfolio``, so ``cross_val_predict`` runs a walk-forward. skfolio pays
+    no interest on wealth that is in none of its columns. Therefore ``bank`` should name a column with the returns of
+    the bank.
     """
 
     def __init__(
@@ -63,8 +64,8 @@ class RobustAllocation(Advised, BaseOptimization):
     def fit(self, X: Any, y: object = None) -> Self:
         """Asks the service for the advice on the returns ``X``; ``y`` is not used.
 
-        Raises what :meth:`ballast.sklearn.RobustAllocation.fit` raises, unless ``raise_on_failure`` is ``False`` or a
-        ``fallback`` takes over.
+        Raises what :meth:`ballast.sklearn.RobustAllocation.fit` raises, unless ``raise_on_failure`` is ``False`` or
+        there is a ``fallback``.
         """
         self._fit(X)
         return self

@@ -1,5 +1,5 @@
 """The advice on several assets as a scikit-learn estimator. It needs scikit-learn: ``pip install
-'ballast-client[sklearn]'``; nothing else of this package imports it."""
+'ballast-client[sklearn]'``. Only this module and :mod:`ballast.skfolio` import it."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from typing_extensions import Self
 from . import wire
 from .client import Ballast
 
-#: Where the service listens unless told.
+#: The default address of the service.
 URL = "http://127.0.0.1:8080"
 
 
 class Advised:
-    """What estimators of this package share: they keep the arguments of their constructors and ask the service."""
+    """Base of the estimators of this package. It keeps the arguments of the constructor and calls the service."""
 
     url: str
     rate_per_step: float | None
     bank: str | int | None
     weights_: NDArray[np.float64]
 
-    #: Constructor's arguments that are fields of the problem.
+    #: Arguments of the constructor that are fields of the problem.
     _PROBLEM = (
         "initial_wealth",
         "risk_aversion",
@@ -51,11 +51,12 @@ class Advised:
         assets = [place for place in range(len(columns)) if place != bank]
         problem = {name: getattr(self, name) for name in self._PROBLEM}
         names = [str(columns[asset]) for asset in assets]
-        # Rows without dates: a validation's rows may have gaps, and a calm window is of fractions all the same.
-        said: wire.Choices = {"unit": "fraction"}
+        # Dates are left out, because the rows of a validation may have gaps. The unit is given, because the fractions
+        # of a calm window could be read as percent.
+        choices: wire.Choices = {"unit": "fraction"}
         with Ballast(self.url) as ballast:
             advice = ballast.advise_assets(
-                table[:, assets], kind="simple", choices=said, rate_per_step=rate, assets=names, **problem
+                table[:, assets], kind="simple", choices=choices, rate_per_step=rate, assets=names, **problem
             )
         self.advice_: wire.AssetsAdvised = advice
         self.rate_per_step_ = rate
@@ -67,18 +68,19 @@ class Advised:
 
 
 class RobustAllocation(Advised, BaseEstimator):
-    """What to hold of several assets, robustly, as ``Ballast.advise_assets`` advises.
+    """A robust allocation to several assets, as ``Ballast.advise_assets`` advises.
 
-    ``X`` has the simple returns of an asset in each column, as fractions, the oldest period first. What the bank pays
-    a period is ``rate_per_step``, or the last number of the column ``bank`` of ``X``, which is then no asset: its
-    name in a DataFrame, its place in an array. Exactly one of the two is given. ``url`` is where the service listens;
-    its key comes from ``BALLAST_KEY``. ``initial_wealth``, ``risk_aversion``, ``utility``, ``radius``,
-    ``ground_norm``, ``action_interval``, ``caution``, ``support`` and ``periods_per_year`` are fields of the problem of
-    ``POST /advise``; what is left out the service chooses.
+    ``X`` has the simple returns of an asset in each column, as fractions, the oldest period first. Give either
+    ``rate_per_step``, what the bank pays per period, or ``bank``, a column of ``X`` with the rates of the bank. The
+    column is named in a DataFrame and numbered in an array. It is not an asset, and its last number is used.
 
-    After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: in the assets what is advised, in the
-    column ``bank`` the rest. Without such a column the rest is in the bank all the same, and the weights sum to less
-    than 1. ``advice_`` is the whole answer and ``rate_per_step_`` the rate that was used.
+    ``url`` is the address of the service, and the key comes from ``BALLAST_KEY``. ``initial_wealth``,
+    ``risk_aversion``, ``utility``, ``radius``, ``ground_norm``, ``action_interval``, ``caution``, ``support`` and
+    ``periods_per_year`` are fields of the problem of ``POST /advise``. The service chooses those you leave out.
+
+    After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: the advised share in each asset, and the
+    rest in the column ``bank``. Without that column the rest is also in the bank, but the weights sum to less than 1.
+    ``advice_`` is the whole answer, and ``rate_per_step_`` the rate that was used.
     """
 
     def __init__(
@@ -113,15 +115,16 @@ class RobustAllocation(Advised, BaseEstimator):
     def fit(self, X: Any, y: object = None) -> Self:
         """Asks the service for the advice on the returns ``X``; ``y`` is not used.
 
-        Raises ``ValueError`` where ``X`` or an argument cannot be meant, and what ``Ballast.advise_assets`` raises.
+        Raises ``ValueError`` if ``X`` or an argument is invalid, and what ``Ballast.advise_assets`` raises.
         """
         self._fit(X)
         return self
 
     def predict(self, X: Any) -> NDArray[np.float64]:
-        """The weights to hold through each row of ``X``, which are the same in every row: an array of its shape.
+        """Returns an array of the shape of ``X`` that repeats the weights in every row.
 
-        Raises ``sklearn.exceptions.NotFittedError`` before ``fit``, and ``ValueError`` for other columns than its.
+        Raises ``sklearn.exceptions.NotFittedError`` before ``fit``, and ``ValueError`` if the columns differ from those
+        of ``fit``.
         """
         check_is_fitted(self)
         rows: NDArray[np.float64] = validate_data(self, X, reset=False, dtype=np.float64)
@@ -129,7 +132,7 @@ class RobustAllocation(Advised, BaseEstimator):
 
 
 def _place(bank: str | int, columns: Sequence[Any]) -> int:
-    """Where the column is, from 0; a number counts from the end where it is negative."""
+    """Returns the index of the column, from 0. A negative number counts from the end."""
     places = range(len(columns))
     if isinstance(bank, int) and -len(places) <= bank < len(places):
         return places[bank]

@@ -1,9 +1,9 @@
-"""Requests over one pool of connections, repeated where that is safe: what is repeated is written once, and two
-transports differ in how they wait.
+"""Sends requests over one pool of connections, and retries those that failed. Two transports, blocking and
+asynchronous, share the rules for retries.
 
-Every call of this client can be repeated without harm, for one of four reasons: it reads; it deletes; its content says
-what is to be (an imported policy, labels); or the service knows the request again (the idempotency key of a job or a
-session, the period of an observation).
+Every call of this client is safe to retry, for one of four reasons. It only reads. It deletes. Its content is the whole
+new state (an imported policy, labels). Or the service recognises the request (by the idempotency key of a job or a
+session, or the period of an observation).
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ import httpx
 
 from .errors import Repeating, Unreachable, of_response
 
-#: First pause before a repetition, in seconds; it doubles with each, up to the longest.
+#: Pause before the first retry, in seconds. It doubles with each retry, up to the longest pause.
 FIRST_PAUSE = 0.2
-#: Also the longest ``Retry-After`` that is waited out; beyond it the problem is raised at once.
+#: The longest pause, also for ``Retry-After``. If the service requests a longer one, the problem is raised at once.
 LONGEST_PAUSE = 30.0
-#: The service sends a sign of life every 15 s on a stream of events.
+#: A stream of events counts as lost after this silence, in seconds. The service sends a keep-alive every 15 s.
 STREAM_SILENCE = 60.0
 
-#: What a request holds: JSON to be written, or bytes as they are.
+#: The body of a request: a value to encode as JSON, or bytes that are sent unchanged.
 Body: TypeAlias = Mapping[str, Any] | Sequence[Any] | bytes
 
-#: Refusals for the moment.
+#: Statuses of temporary refusals, which are retried.
 RETRIED_STATUS = (429, 503)
 _HERE = Path(__file__).parent
-#: Nobody listens there, or nobody that lets itself be reached.
+#: Errors that mean that nothing listens at the address, or that it cannot be reached.
 _NOBODY = (httpx.ConnectError, httpx.ConnectTimeout)
 _START = "Start a service with 'ballast serve --data ballast-data', or give its address as Ballast(url)."
 _LOST = (httpx.TimeoutException, httpx.NetworkError, httpx.RemoteProtocolError)
 
 
 def idempotent(key: str | None) -> dict[str, str]:
-    """The header of a request that may be sent twice and is done once.
+    """Returns the header that makes the service carry out a request only once, even if it arrives twice.
 
-    Without a key of the caller's, one of this call's own: a repetition after a lost answer finds what the first made.
+    If the caller gives no key, this call makes one, so that a retry after a lost answer finds the result of the first.
     """
     return {"Idempotency-Key": str(uuid.uuid4()) if key is None else key}
 
@@ -63,15 +63,15 @@ class Transport(ABC):
 
     @abstractmethod
     async def send(self, request: httpx.Request) -> httpx.Response:
-        """The answer, read to its end, whatever its status."""
+        """Returns the complete answer, whatever its status."""
 
     @abstractmethod
     async def pause(self, seconds: float) -> None:
-        """Lets the time pass."""
+        """Waits."""
 
     @abstractmethod
     def stream(self, path: str, last_event_id: str) -> AbstractAsyncContextManager[AsyncIterator[bytes]]:
-        """An open stream of events, from the one after ``last_event_id``, as it comes."""
+        """Opens a stream of events that begins after ``last_event_id``."""
 
     @abstractmethod
     async def close(self) -> None:
@@ -86,9 +86,9 @@ class Transport(ABC):
         params: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> httpx.Response:
-        """A successful answer.
+        """Returns a successful answer.
 
-        Raises :class:`ProblemError` where the service refuses and :class:`Unreachable` where no answer comes.
+        Raises :class:`ProblemError` if the service refuses and :class:`Unreachable` if no answer comes.
         """
         content = body if body is None or isinstance(body, bytes) else encoded(body)
         media = {} if body is None else {"content-type": "application/json"}
@@ -108,30 +108,30 @@ class Transport(ABC):
                     self.warn(error)
                 lost, pause = True, growing_pause(attempt)
             else:
-                # What is not there any more was deleted by the request whose answer was lost.
+                # If the object is gone, the request whose answer was lost has deleted it.
                 deleted = lost and method == "DELETE" and response.status_code == httpx.codes.NOT_FOUND
                 if response.is_success or deleted:
                     return response
-                asked = retry_after(response)
-                if last or response.status_code not in RETRIED_STATUS or asked is None or asked > LONGEST_PAUSE:
-                    raise of_response(response, asked)
-                pause = max(asked, growing_pause(attempt))
+                wait = retry_after(response)
+                if last or response.status_code not in RETRIED_STATUS or wait is None or wait > LONGEST_PAUSE:
+                    raise of_response(response, wait)
+                pause = max(wait, growing_pause(attempt))
             await self.pause(pause)
         raise AssertionError("the last attempt returns or raises")
 
-    def silence(self, asked: str, error: httpx.RequestError, tries: int) -> str:
-        """What is said where no answer came, at the last."""
+    def silence(self, request: str, error: httpx.RequestError, tries: int) -> str:
+        """Returns the message for a request that got no answer after the last retry."""
         if isinstance(error, _NOBODY):
             return f"nothing answers at {self.http.base_url}, tried {tries} times: {error}. {_START}"
-        return f"no answer to {asked}: {error!r}"
+        return f"no answer to {request}: {error!r}"
 
     def warn(self, error: httpx.RequestError) -> None:
-        """Says that an answer is waited for, which may take long."""
+        """Warns that the request is being retried, which may take long."""
         longest = sum(min(FIRST_PAUSE * 2.0**attempt, LONGEST_PAUSE) for attempt in range(self.retries))
         lacking = f"nothing answers at {self.http.base_url} yet" if isinstance(error, _NOBODY) else "an answer was lost"
         advised = f" {_START}" if isinstance(error, _NOBODY) else ""
         text = f"{lacking} ({error}): trying again for up to {longest:.0f} s.{advised}"
-        # At the line of the program, not at one of this package.
+        # Points the warning at the line of the program, not at one of this package.
         own = itertools.takewhile(lambda frame: Path(frame.filename).parent == _HERE, inspect.stack(0))
         warnings.warn(text, Repeating, stacklevel=1 + sum(1 for _ in own))
 
@@ -144,12 +144,12 @@ class Transport(ABC):
         params: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> Any:
-        """What a successful answer holds; as :meth:`call` otherwise."""
+        """Returns the JSON of a successful answer; otherwise as :meth:`call`."""
         response = await self.call(method, path, body=body, params=params, headers=headers)
         try:
             return response.json()
         except ValueError as error:
-            # Something in between, such as a page to sign in at.
+            # The answer came from something in between, such as a sign-in page.
             raise of_response(response, None) from error
 
     def _listening(self, last_event_id: str) -> dict[str, Any]:
@@ -158,7 +158,7 @@ class Transport(ABC):
 
 
 class Waiting(Transport):
-    """Waits on the spot, so that its coroutines never suspend. Safe to share between threads."""
+    """A blocking transport, whose coroutines never suspend. You can share it between threads."""
 
     def __init__(self, http: httpx.Client, retries: int) -> None:
         self.http: httpx.Client = http
@@ -183,7 +183,7 @@ class Waiting(Transport):
 
 
 class Awaiting(Transport):
-    """Waits in asyncio's event loop, beside others. For the tasks of one loop."""
+    """An asynchronous transport. Use it in one event loop of asyncio only."""
 
     def __init__(self, http: httpx.AsyncClient, retries: int) -> None:
         self.http: httpx.AsyncClient = http
@@ -213,7 +213,7 @@ async def _in_turn(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
 
 
 def encoded(body: Mapping[str, Any] | Sequence[Any]) -> bytes:
-    """JSON. NumPy's scalars are numbers; NaN and infinities are not JSON: ``ValueError`` names the first of them."""
+    """Encodes JSON. NumPy scalars become numbers. Raises ``ValueError``, which names the first NaN or infinity."""
 
     def plain(value: Any) -> Any:
         if hasattr(value, "item"):
@@ -230,7 +230,7 @@ def encoded(body: Mapping[str, Any] | Sequence[Any]) -> bytes:
 
 
 def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:
-    """The floating-point numbers of a body, each with its dotted path."""
+    """Iterates over the floating-point numbers of a body, each with its dotted path."""
     if isinstance(value, float):
         yield path, value
     elif isinstance(value, Mapping):
@@ -242,7 +242,7 @@ def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:
 
 
 def retry_after(response: httpx.Response) -> float | None:
-    """The pause an answer asks for, in seconds: RFC 9110 allows a number or a date."""
+    """Returns the pause that an answer requests, in seconds. RFC 9110 allows a number or a date."""
     text = response.headers.get("retry-after")
     if text is None:
         return None
@@ -253,5 +253,5 @@ def retry_after(response: httpx.Response) -> float | None:
 
 
 def growing_pause(attempt: int) -> float:
-    """Seconds before repetition ``attempt`` (from 0), drawn apart so that clients do not come back together."""
+    """Returns the seconds before retry ``attempt`` (from 0), randomised so that clients do not retry all at once."""
     return random.uniform(0.5, 1.0) * min(FIRST_PAUSE * 2.0**attempt, LONGEST_PAUSE)
