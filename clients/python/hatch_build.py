@@ -1,5 +1,5 @@
-"""Puts the program into the wheel where ``BALLAST_PROGRAM`` names its binary: that wheel brings the service and its
-client. Without it the wheel is the client alone, for any platform."""
+"""Adds the program to the wheel if ``BALLAST_PROGRAM`` names its binary. That wheel installs the service and the
+client. Without the variable the wheel contains only the client, for any platform."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ProgramHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def _platform() -> str:
-    """Where the program runs: with the C library of this machine or a later one."""
+    """Returns the platform tag of the program, which needs the C library of this machine or a later one."""
     name, version = platform.libc_ver()
     if name == "glibc":
         return f"manylinux_{version.replace('.', '_')}_{platform.machine()}"

@@ -1,6 +1,6 @@
-"""Draws the pictures of `docs/concepts.md` from the bundled returns, and prints the figures that the page names.
+"""Draws the pictures of `docs/concepts.md` from the bundled returns, and prints the figures that the page quotes.
 
-It wants a service, `ballast serve --data ballast-data`, and writes four SVG files into the folder that is named.
+It needs a running service, `ballast serve --data ballast-data`, and writes four SVG files into the folder of `--out`.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ballast import Ballast, wire
 
 DATA = Path(__file__).resolve().parents[3] / "data"
 WIDTH = 640
-#: Records drawn by chance, and how many of them are shown.
+#: Number of randomly drawn records, and how many of them are shown.
 DRAWN, SHOWN = 1000, 200
-#: Months that lost less are not shown.
+#: Months with a smaller loss are not shown.
 SMALL_LOSS = 0.07
-#: A smaller share of wealth counts as nothing.
+#: A smaller share of wealth counts as 0.
 SMALL_SHARE = 0.0005
-#: Where the columns of the last picture begin.
+#: Left edges of the columns of the last picture.
 MEANS, WITHOUT, WITH = 180, 372, 520
-#: Light, and dark where the reader's screen is; the hues of Okabe and Ito are told apart by the colour-blind.
+#: Light by default and dark on a dark screen. The colours of Okabe and Ito suit colour-blind readers.
 STYLE = """
 .ground { fill: #fff }
 text { font: 15px system-ui, sans-serif; fill: #1c2430 }
@@ -57,7 +57,7 @@ text { font: 15px system-ui, sans-serif; fill: #1c2430 }
 
 
 class Picture:
-    """An SVG: marks and words at places in units of which the picture is 640 wide, y downwards."""
+    """An SVG with marks and texts. The picture is 640 units wide, and y points downwards."""
 
     def __init__(self, title: str, height: float) -> None:
         size = f'viewBox="0 0 {WIDTH} {height:g}" width="{WIDTH}" height="{height:g}"'
@@ -93,7 +93,7 @@ def span(shares: list[float]) -> str:
 
 
 def read(ballast: Ballast, file: str, **choices: Any) -> tuple[dict[str, list[float]], float]:
-    """The log-returns of a bundled file by the name of their column, and what the bank paid last."""
+    """Returns the log-returns of a bundled file by the name of their column, and the last rate of the bank."""
     record = ballast.read_returns(DATA / file, **choices)
     assert record["outcome"] == "read"
     bank = record.get("rate")
@@ -102,7 +102,7 @@ def read(ballast: Ballast, file: str, **choices: Any) -> tuple[dict[str, list[fl
 
 
 def advised(ballast: Ballast, record: list[float], rate: float, trading_cost: float = 0.0) -> wire.Advised:
-    """As `ballast advise --caution paper --support none` asks."""
+    """Returns the advice of `ballast advise --caution paper --support none`."""
     utility: wire.UtilitySpecification = {"kind": "power", "risk_aversion": 3.0}
     return ballast.advise(
         record,
@@ -116,10 +116,10 @@ def advised(ballast: Ballast, record: list[float], rate: float, trading_cost: fl
 
 
 def ball(ballast: Ballast, market: list[float], rate: float) -> Picture:
-    """The balls of the whole record and of its last 20 years, with records that chance draws from each.
+    """Draws the balls of the whole record and of its last 20 years, with random records from each.
 
-    A record lies as far from the centre as its law from that of the centre, and as far right as its mean is higher;
-    above the centre are those with a larger deviation.
+    The distance of a record from the centre is the distance of the two laws. Its horizontal position is the difference
+    of the means. Records with a larger deviation are above the centre.
     """
     picture = Picture("The ball around a long record and around a short one", 400)
     unit, middle = 19500.0, 180.0
@@ -131,7 +131,7 @@ def ball(ballast: Ballast, market: list[float], rate: float) -> Picture:
         inside = 0
         for index in range(DRAWN):
             drawn = generator.choices(record, k=len(record))
-            # Between samples of one size the distance is the mean of what lies between values of the same rank.
+            # For samples of one size the distance is the mean absolute difference of values of the same rank.
             distance = fmean(abs(one - other) for one, other in zip(sorted(drawn), sorted(record), strict=True))
             inside += distance <= radius
             if index >= SHOWN:
@@ -167,13 +167,13 @@ def ball(ballast: Ballast, market: list[float], rate: float) -> Picture:
 
 
 def worst_law(ballast: Ballast, market: list[float], rate: float) -> Picture:
-    """The months of the record that lost most, as they were and as the worst law has them, a dot for each."""
+    """Draws the months with the largest losses, as observed and under the worst law, a dot for each."""
     picture = Picture("The worst months of the record, as seen and under the worst law", 420)
     moves = advised(ballast, market, rate)["worst_case"]["transport"]
     left, unit = 30.0, 2280.0
 
     def stacked(below: float, dots: list[tuple[float, str]]) -> None:
-        """Dots above a line, those of one per cent upon each other."""
+        """Draws dots above a line, and stacks those within one per cent."""
         heights: dict[int, int] = {}
         for log_return, names in sorted(dots):
             column = math.floor(100 * math.expm1(log_return))
@@ -190,7 +190,7 @@ def worst_law(ballast: Ballast, market: list[float], rate: float) -> Picture:
         goes = to < atom
         if goes:
             moved, lowest = moved + mass, min(lowest, math.expm1(to))
-        # Of one month only a part may be moved.
+        # The law may move only a part of the mass of a month.
         if math.expm1(atom) < -SMALL_LOSS and (months := round(mass * len(market))):
             seen += [(atom, "ring" if goes else "blue")] * months
             worst += [(to, "orange" if goes else "blue")] * months
@@ -214,7 +214,7 @@ def worst_law(ballast: Ballast, market: list[float], rate: float) -> Picture:
 
 
 def band(ballast: Ballast, market: list[float], rate: float) -> Picture:
-    """The band of the coming month over what trading costs."""
+    """Draws the no-trade range of the coming month over the trading cost."""
     picture = Picture("The band over the cost of trading", 380)
     costs = [step / 4000 for step in range(21)]
     bands = [advised(ballast, market, rate, cost)["band"] for cost in costs]
@@ -242,12 +242,12 @@ def band(ballast: Ballast, market: list[float], rate: float) -> Picture:
     picture.text(*at(0.0012, 0.14), "less is held: buy up to the edge", "middle")
     for cost, (lowest, highest) in zip(costs[::4], bands[::4], strict=True):
         ends = f"{percent(lowest, 1)} to {percent(highest, 1)}"
-        print(f"Where trading costs {percent(cost, 1)}, nothing is traded from {ends}.")
+        print(f"If trading costs {percent(cost, 1)}, the no-trade range is {ends}.")
     return picture
 
 
 def row_of_shares(picture: Picture, y: float, name: str, names: str, without: float, with_ball: float) -> None:
-    """A row of the shares of wealth without a ball and with it."""
+    """Draws a row with the shares of wealth without a ball and with it."""
     picture.text(MEANS - 15, y + 5, name, "end")
     for x, share in ((WITHOUT, without), (WITH, with_ball)):
         if share >= SMALL_SHARE:
@@ -256,7 +256,7 @@ def row_of_shares(picture: Picture, y: float, name: str, names: str, without: fl
 
 
 def industries(ballast: Ballast) -> Picture:
-    """What twelve industries paid and what the worst law leaves of it; the best shares without a ball and with it."""
+    """Draws the means of twelve industries, seen and under the worst law, and the best shares with and without a ball."""
     columns, rate = read(ballast, "us_industries_monthly.csv", columns=[str(number) for number in range(2, 14)])
     names = list(columns)
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
@@ -316,8 +316,8 @@ def industries(ballast: Ballast) -> Picture:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Draws the pictures of the page of concepts.")
-    parser.add_argument("--url", default="http://127.0.0.1:8080", help="where the service listens")
+    parser = argparse.ArgumentParser(description="Draws the pictures of docs/concepts.md.")
+    parser.add_argument("--url", default="http://127.0.0.1:8080", help="address of the service")
     parser.add_argument("--out", type=Path, default=Path("pictures"), help="folder to write to")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)

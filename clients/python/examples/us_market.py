@@ -1,6 +1,6 @@
-"""Lives through 2008 as `ballast demo` does, from Python: the table it prints is the demo's.
+"""Follows a policy through 2008 as `ballast demo` does, and prints the same table.
 
-It wants a service, `ballast serve --data ballast-data`; `--count 60` gives a quicker, coarser policy.
+It needs a running service, `ballast serve --data ballast-data`; `--count 60` trains a coarser policy faster.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ INITIAL_WEALTH = 100.0
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Lives through 2008 on the bundled returns.")
-    parser.add_argument("--url", default="http://127.0.0.1:8080", help="where the service listens")
+    parser = argparse.ArgumentParser(description="Follows a policy through 2008 on the bundled returns.")
+    parser.add_argument("--url", default="http://127.0.0.1:8080", help="address of the service")
     parser.add_argument("--count", type=int, default=500, help="design points per step")
     arguments = parser.parse_args()
 
@@ -42,7 +42,7 @@ def main() -> None:
         rows = []
         for month, realised in year["market_return"].items():
             action = session.action()
-            session.observe(simple_return=realised, confirm=True)  # October 2008 is far from the record, and meant
+            session.observe(simple_return=realised, confirm=True)  # October 2008 is unusual but correct
             rows.append((month, action["radius"], action["allocation"], realised, session.wealth))
 
     table = pd.DataFrame(rows, columns=["month", "radius", "allocation", "return", "wealth"]).set_index("month")
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def shown(table: pd.DataFrame) -> str:
-    """The table in the columns of the demo."""
+    """Formats the table with the columns of the demo."""
     head = "{:<8} {:>8} {:>11} {:>10} {:>9} {:>16} {:>14}".format(table.index.name, *table.columns)
     line = "{:<8} {:>8.4f} {:>11.3f} {:>8.2f} % {:>9.2f} {:>16.2f} {:>14.2f}"
     in_percent = table.assign(**{"return": 100 * table["return"]})
