@@ -256,7 +256,8 @@ def row_of_shares(picture: Picture, y: float, name: str, names: str, without: fl
 
 
 def industries(ballast: Ballast) -> Picture:
-    """Draws the means of twelve industries, seen and under the worst law, and the best shares with and without a ball."""
+    """Draws the mean of each of twelve industries, as seen and under the worst law, and the shares with and without a
+    ball."""
     columns, rate = read(ballast, "us_industries_monthly.csv", columns=[str(number) for number in range(2, 14)])
     names = list(columns)
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
