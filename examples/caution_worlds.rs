@@ -1,12 +1,13 @@
-//! What each level of caution costs where the truth is known.
+//! Measures what each level of caution costs when the true law is known.
 //!
 //!     cargo run --release --example caution_worlds [RECORDS]
 //!
-//! The true law is that of the bundled months of the US market, shifted so that their mean beyond the bank is none, half, or the whole
-//! of what it was. Of each world records of 60 to 480 months are drawn in circular blocks of a year. On each record every rule says
-//! what to hold for a month, and is scored by the true law: what is told is the certainty equivalent lost beside who knows that law,
-//! with its standard error by the drawing, in basis points a year. *Worst regret* is the largest, over the three worlds, of what a
-//! rule loses more than the share of the radius that loses least there. *Shrunk* takes the record for the truth, its premium halved.
+//! There are three worlds. The true law of each is that of the bundled months of the US market, shifted so that the premium over
+//! the bank is zero, half or all of the observed one. Records of 60 to 480 months are drawn from each world in circular blocks of
+//! a year. On each record every rule says what to hold for a month, and the true law scores it. The table shows the certainty
+//! equivalent lost against the best allocation under that law, with its standard error over the records, in basis points a year.
+//! *Worst regret* is the largest excess loss over the three worlds, compared with the share of the radius that loses least in each.
+//! *Shrunk* treats the record as the true law, with half of its premium.
 
 use std::error::Error;
 
@@ -26,7 +27,7 @@ const LEVELS: [CautionLevel; 3] = CautionLevel::FOUND;
 const RULES: usize = SHARES.len() + LEVELS.len() + 1;
 /// Basis points of log certainty equivalent a month, in a year.
 const YEARLY: f64 = 12e4;
-/// Allocations among which the best is looked for.
+/// Number of steps in the grid of allocations.
 const GRID: usize = 1000;
 
 /// The true law of a world.
@@ -50,22 +51,22 @@ impl Truth {
         self.utility.inverse(total / self.growths.len() as f64)
     }
 
-    /// Basis points a year.
+    /// Returns the loss of an allocation in basis points a year.
     fn lost(&self, allocation: f64) -> f64 {
         YEARLY * (self.best - self.worth(allocation))
     }
 }
 
-/// Log-returns moved so that their mean beyond the bank is this.
+/// Shifts log-returns so that their premium over the bank is `mean_beyond`.
 fn shifted(log_returns: &[f64], bank: f64, mean_beyond: f64) -> Vec<f64> {
     let (seen, _) = premium(log_returns, bank);
     let shift = ((1.0 + bank + mean_beyond) / (1.0 + bank + seen)).ln();
     log_returns.iter().map(|z| z + shift).collect()
 }
 
-/// What each rule holds: the shares of the radius, the levels, and the record with half of its premium.
+/// Returns what each rule holds: the shares of the radius, the levels, and the record with half of its premium.
 fn held(record: Vec<f64>, bank: f64) -> Result<[f64; RULES], Box<dyn Error>> {
-    let asked = |record: Vec<f64>, caution: CautionLevel| {
+    let advise = |record: Vec<f64>, caution: CautionLevel| {
         let problem =
             ProblemSpecification { horizon: 1, caution: Some(caution), ..ProblemSpecification::of(record, bank) };
         Advise { problem, wealth: None, holding: None, seed: 1, sensitivity: false }.answer()
@@ -73,10 +74,10 @@ fn held(record: Vec<f64>, bank: f64) -> Result<[f64; RULES], Box<dyn Error>> {
     let (seen, _) = premium(&record, bank);
     let mut held = [0.0; RULES];
     for (held, share) in held.iter_mut().zip(SHARES) {
-        *held = asked(record.clone(), CautionLevel::Scale(share))?.advice.allocation;
+        *held = advise(record.clone(), CautionLevel::Scale(share))?.advice.allocation;
     }
-    held[RULES - 1] = asked(shifted(&record, bank, 0.5 * seen), CautionLevel::Scale(0.0))?.advice.allocation;
-    let levels = asked(record, CautionLevel::Balanced)?.levels.ok_or("a level is followed")?.levels;
+    held[RULES - 1] = advise(shifted(&record, bank, 0.5 * seen), CautionLevel::Scale(0.0))?.advice.allocation;
+    let levels = advise(record, CautionLevel::Balanced)?.levels.ok_or("a level is followed")?.levels;
     for (held, level) in held[SHARES.len()..].iter_mut().zip(LEVELS) {
         let found = levels.iter().find(|found| found.level == level);
         *held = found.and_then(|found| found.allocation).ok_or("a short record is solved")?;
@@ -108,7 +109,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| months | rule | no premium | half | whole | worst regret |");
     println!("|---|---|---|---|---|---|");
     for count in MONTHS {
-        // Rule by rule and world by world.
+        // Mean loss and standard error by rule and world.
         let mut lost: Vec<[[f64; 2]; 3]> = vec![[[0.0; 2]; 3]; RULES];
         for (world, part) in PARTS.iter().enumerate() {
             let law = shifted(&market, bank, part * whole);
@@ -126,10 +127,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             .map(|world| lost[..SHARES.len()].iter().map(|lost| lost[world][0]).fold(f64::INFINITY, f64::min))
             .collect();
         for (name, lost) in names.iter().zip(&lost) {
-            let told: Vec<String> = lost.iter().map(|[mean, error]| format!("{mean:.0} ± {error:.0}")).collect();
+            let cells: Vec<String> = lost.iter().map(|[mean, error]| format!("{mean:.0} ± {error:.0}")).collect();
             let regret = |(lost, least): (&[f64; 2], &f64)| lost[0] - least;
             let worst = lost.iter().zip(&least).map(regret).fold(f64::NEG_INFINITY, f64::max);
-            println!("| {count} | {name} | {} | {worst:.0} |", told.join(" | "));
+            println!("| {count} | {name} | {} | {worst:.0} |", cells.join(" | "));
         }
     }
     Ok(())

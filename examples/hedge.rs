@@ -1,14 +1,14 @@
-//! Another controlled problem: the seller of a short European call, who hedges with shares of its asset.
+//! Solves another controlled problem: the seller of a European call hedges it with shares of its asset.
 //!
 //!     cargo run --example hedge [TRADING_COST]
 //!
-//! Shows how the method is used for a problem that the library does not know: `Seller` says what its state is, what may be done,
-//! and what it is worth in the end, and the library's general solver does the rest. The seller knows eight returns of the asset,
-//! and guards against every law of the next three within a Wasserstein distance of theirs. What he asks for the call at least is
-//! the amount that leaves him as well off with it as without: its premium.
+//! The example shows how to use the method for a problem that the library does not know. `Seller` defines the state, the actions
+//! and the final value, and the general solver of the library does the rest. The seller knows eight returns of the asset, and is
+//! robust against every law of the next three within a Wasserstein distance of theirs. The premium is the lowest price of the
+//! call that leaves the seller as well off with the call as without it.
 //!
-//! The same premium is found a second time by nested enumeration, with nothing of the library's: on a lattice of prices, each
-//! action's worst law by the dual of the transport problem. The two must agree to half a basis point of the premium.
+//! Nested enumeration computes the same premium without the library. It uses a lattice of prices, and finds the worst law of each
+//! action by the dual of the transport problem. The two must agree to half a basis point of the premium.
 
 use std::error::Error;
 
@@ -24,38 +24,38 @@ const PERIODS: usize = 3;
 const RATE: f64 = 0.002;
 const PRICE: f64 = 100.0;
 const STRIKE: f64 = 100.0;
-/// Absolute, per unit of wealth.
+/// Absolute risk aversion, per unit of wealth.
 const RISK_AVERSION: f64 = 0.05;
-/// Log-returns seen.
+/// Observed log-returns.
 const HISTORY: [f64; 8] = [0.05, -0.045, 0.04, 0.005, -0.05, 0.07, -0.03, 0.0];
-/// Of the ball around them.
+/// Radius of the ball around their law.
 const RADIUS: f64 = 0.004;
-/// Returns that there can be: nobody can guard a call against a price without bound.
+/// Range of possible returns. Without a bound on the price no hedge of a call is robust.
 const SUPPORT: [f64; 2] = [-0.25, 0.25];
 const BASIS_POINTS: f64 = 1e4;
 
-/// Who may have sold a call, and holds shares.
+/// A seller of calls who holds shares.
 struct Seller {
-    /// How many calls are owed at the horizon: 1, or 0 for the comparison.
+    /// Number of calls sold: 1, or 0 for the comparison.
     calls: f64,
-    /// Lost of every amount that is traded.
+    /// Share of every traded amount that is lost.
     cost: f64,
 }
 
 #[derive(Clone)]
 struct Book {
-    /// Of a share.
+    /// Price of a share.
     price: f64,
-    /// In the bank and in shares together.
+    /// Wealth in the bank and in shares together.
     wealth: f64,
-    /// Held before trading.
+    /// Shares held before trading.
     shares: f64,
 }
 
 impl Controlled for Seller {
     type State = Book;
 
-    /// Shares held through the period.
+    /// The actions are the shares held through the period.
     fn actions(&self, _: usize, _: &Book) -> ActionInterval {
         ActionInterval { lowest: 0.0, highest: 1.0 }
     }
@@ -67,7 +67,7 @@ impl Controlled for Seller {
         Book { price: next, wealth: (traded - shares * price) * (1.0 + RATE) + shares * next, shares }
     }
 
-    /// The price; and where trading costs, the shares. Wealth only moves the certainty equivalent along with it.
+    /// Describes a state by the price and, if trading has a cost, the shares. Wealth only shifts the certainty equivalent.
     fn describe(&self, _: usize, state: &Book) -> Vec<f64> {
         let mut described = vec![state.price.ln()];
         if self.cost > 0.0 {
@@ -76,14 +76,14 @@ impl Controlled for Seller {
         described
     }
 
-    /// Wealth in the bank until the horizon, less what is owed there on average were the law that of the returns seen. What the
-    /// surrogates have to find is then smaller and smoother than the certainty equivalent itself.
+    /// Returns the wealth with everything in the bank until the horizon, less the mean payoff of the calls under the law of the
+    /// observed returns. The surrogates fit the difference, which is smaller and smoother than the certainty equivalent.
     fn baseline(&self, step: usize, state: &Book) -> f64 {
         let periods = PERIODS - step;
         state.wealth * (1.0 + RATE).powi(periods as i32) - self.calls * mean_owed(state.price, periods)
     }
 
-    /// No wealth is safe from what is owed.
+    /// No amount of wealth is certain, because the payoff of the call may exceed it.
     fn has_floor(&self) -> bool {
         false
     }
@@ -97,7 +97,7 @@ impl Controlled for Seller {
     }
 }
 
-/// What a call pays on average after so many periods.
+/// Returns the mean payoff of a call after `periods` periods.
 fn mean_owed(price: f64, periods: usize) -> f64 {
     match periods {
         0 => (price - STRIKE).max(0.0),
@@ -105,12 +105,12 @@ fn mean_owed(price: f64, periods: usize) -> f64 {
     }
 }
 
-/// Certainty equivalent and first action by the library.
+/// Returns the certainty equivalent and the first action that the library finds.
 fn by_the_library(seller: &Seller) -> Result<(f64, f64), Box<dyn Error>> {
     let specification: Specification = serde_json::from_value(json!({
         "problem": { "framework": "static", "horizon": PERIODS, "rate_per_step": RATE, "history": HISTORY,
             "radius": { "rule": "fixed", "radius": RADIUS }, "support": { "rule": "between", "min": SUPPORT[0], "max": SUPPORT[1] } },
-        // Wide enough for the design to reach wherever the adversary can.
+        // Wide enough for the design to cover every state that the adversary can reach.
         "design": { "count": 200, "sampling_law":
             { "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.0, "variance": 0.03 }] } }
     }))?;
@@ -120,19 +120,19 @@ fn by_the_library(seller: &Seller) -> Result<(f64, f64), Box<dyn Error>> {
     Ok((found.certainty_equivalent, found.action))
 }
 
-/// Returns of the lattice, and of the support, in units of its spacing.
+/// Spacing of the lattice of log-returns, and the largest return in units of it.
 const SPACING: f64 = 0.005;
 const REACH: usize = 50;
 
-/// Nested enumeration where trading is free: certainty equivalents of a wealth of 0 at every price of the lattice, from the
-/// horizon back; the last of them, and the action there.
+/// Returns the certainty equivalent of a wealth of 0 and the first action, by nested enumeration without trading costs. It computes
+/// the certainty equivalent at every price of the lattice, from the horizon back.
 fn by_enumeration(calls: f64) -> (f64, f64) {
     let (mut later, mut first) = (Vec::new(), 0.0);
     for step in (0..PERIODS).rev() {
         let prices = step * 2 * REACH + 1;
         let price = |index: usize| PRICE * ((index as f64 - (step * REACH) as f64) * SPACING).exp();
         let solve = |index: usize| {
-            // From price number i, the return number k leads to price number i + k of the step after.
+            // From price number i, return number k leads to price number i + k of the next step.
             let value = |shares: f64| {
                 let payoff: Vec<f64> = (0..=2 * REACH)
                     .map(|k| {
@@ -169,7 +169,7 @@ fn worst_expectation(payoff: &[f64]) -> f64 {
     dual(best(0.0, steepest, 1e-9 * steepest, dual))
 }
 
-/// Where a concave function is largest, by golden sections.
+/// Returns the maximiser of a concave function, by golden-section search.
 fn best(mut low: f64, mut high: f64, tolerance: f64, function: impl Fn(f64) -> f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let [mut left, mut right] = [high - golden * (high - low), low + golden * (high - low)];

@@ -1,10 +1,10 @@
-//! Trains a policy by hand: two steps, a history of four returns, a design of four points.
+//! Trains a policy by hand, with two steps, a history of four returns and a design of four points.
 //!
 //!     cargo run --example train_offline
 //!
-//! Uses the two lower floors alone: `numerics` for the mathematics, `control` for what wealth does. Each quantity is
-//! printed beside its formula; at the end the same problem goes to the library's own backward induction, and the three
-//! answers must agree. The utility is logarithmic, so wealth drops out of the state and the values are log gains.
+//! The example uses only the two lower layers: `numerics` for the mathematics and `control` for the dynamics of wealth. It
+//! prints each quantity with its formula. At the end the library's own backward induction solves the same problem, and the
+//! three answers must agree. The utility is logarithmic, so wealth drops out of the state and the values are log gains.
 
 use ballast::control::problem::dynamics::Dynamics;
 use ballast::control::progress::Watch;
@@ -64,7 +64,7 @@ fn with(law: &EmpiricalDistribution, z: f64) -> EmpiricalDistribution {
     larger
 }
 
-/// V_1 at the law with z learned: nothing comes after it.
+/// Solves V_1, the last step, at the law that includes z.
 fn last_step(law: &EmpiricalDistribution, z: f64) -> (f64, WorstLaw) {
     Ball::around(&with(law, z)).robust_step(|_| 0.0)
 }
@@ -93,7 +93,7 @@ fn main() {
             worst.multiplier,
             worst.expectation - worst.dual
         );
-        // Sums of six numbers below 1.
+        // Both are sums of six numbers below 1.
         must(
             (worst.expectation - worst.dual).abs() < 1e-14,
             "the worst law and the multiplier prove each other optimal",
@@ -121,7 +121,7 @@ fn main() {
     let ceiling = gains.iter().copied().fold(0.0, f64::max);
     let surrogate = |z: f64| process.mean(&[mean_after(z)]).clamp(0.0, ceiling);
 
-    println!("4. One step back, with the surrogate in the place of g_1: both wealth and law move with z");
+    println!("4. One step back, with the surrogate instead of g_1: both wealth and law move with z");
     let (action, worst) = ball.robust_step(surrogate);
     println!(
         "    g_0 = max_a min_F E_F[ln(growth(a, Z)/(1+r)) + m(Z)] = {:.6} at action {action:.4}",
@@ -133,7 +133,7 @@ fn main() {
         println!("    the worst law moves mass {:.4} from {from:.3} to {to:.3}", moved.mass);
     }
 
-    println!("5. The same without a surrogate: g_1 solved anew at every return of the grid");
+    println!("5. Step 4 without a surrogate: g_1 is solved at every return of the grid");
     let (exact_action, exact) = ball.robust_step(|z| last_step(&law, z).1.expectation);
     let basis_points = |difference: f64| 1e4 * difference.abs();
     let error = basis_points(worst.expectation - exact.expectation);
