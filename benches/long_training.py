@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Trains a year of days on twenty years of daily returns through the service, and prints what it first said of the time left.
+"""Trains a year of days on twenty years of daily returns through the service, and prints the first estimate of the total time.
 
     cargo build --release
     benches/long_training.py [--horizon 250] [--returns 5000] [--mean 0.0006]
 
 The returns are draws of a normal law with a deviation of 1 % a day, the bank pays 0.01 %, and the utility is power utility of risk
-aversion 3. Everything else is the service's default: the radius of alpha 0.1, an accuracy of 0.5 basis points. Needs Linux, for
-the memory.
+aversion 3. Everything else is the default of the service: the radius of alpha 0.1, an accuracy of 0.5 basis points. It needs
+Linux to measure the memory.
 """
 import argparse
 import json
@@ -48,13 +48,13 @@ def main():
             port = re.search(r":(\d+)\s*$", service.stdout.readline()).group(1)
             url = f"http://127.0.0.1:{port}"
             job, started, first = call(f"{url}/train", {"problem": problem})["job"], time.time(), None
-            while (told := call(f"{url}/jobs/{job}"))["state"] in ("queued", "running"):
-                left = told["progress"]["seconds_left"]
+            while (state := call(f"{url}/jobs/{job}"))["state"] in ("queued", "running"):
+                left = state["progress"]["seconds_left"]
                 if first is None and left is not None:
                     first = time.time() - started + left
-                    print(f"after {time.time() - started:.0f} s: {first:.0f} s in all, it says", flush=True)
+                    print(f"after {time.time() - started:.0f} s: the service estimates {first:.0f} s in all", flush=True)
                 time.sleep(1)
-            print(f"{told['state']} after {time.time() - started:.0f} s, {largest_resident(service):.0f} MB at most")
+            print(f"{state['state']} after {time.time() - started:.0f} s, {largest_resident(service):.0f} MB at most")
         finally:
             service.terminate()
             service.wait()

@@ -5,8 +5,9 @@
     benches/race.py --opponents FOLDER [--runs 3] [--horizon 3]
 
 FOLDER holds `python_reference.py` (a training: numba for the robust step, scikit-learn for the surrogates) and
-`gp_fit.py` (scikit-learn's fit and prediction on a CSV); the inner solve races HiGHS, and must agree with it; this Python needs numpy, scipy, scikit-learn and numba. Both
-sides train 1000 design points with a history each (20 draws of the paper's mixture) over the same number of steps.
+`gp_fit.py` (scikit-learn's fit and prediction on a CSV). The inner solve races HiGHS, whose value it must match. This
+Python needs numpy, scipy, scikit-learn and numba. Both sides train 1000 design points, each with a history of 20 draws of the
+paper's mixture, over the same number of steps.
 """
 import argparse
 import json

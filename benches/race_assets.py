@@ -4,13 +4,13 @@
     cargo build --release
     benches/race_assets.py [--costs 60] [--assets 2,5,12] [--months 60,240]
 
-Under the norm `sup` an adversary who moves date j for the cost D leaves the investor (1 - sum a) + sum a_i g_ij e^(-D) of what
-the bank makes, which is linear in the shares a. With D from a grid the step is a cone program,
+Under the norm `sup`, if the adversary moves date j at the cost D, the investor's wealth is (1 - sum a) + sum a_i g_ij e^(-D)
+times what the bank makes, which is linear in the shares a. With D from a grid the step is a cone program,
 
     max over a, gamma >= 0, t of  mean(t) - gamma radius,   t_j <= u(wealth_jk(a)) + gamma D_k  for every date j and cost k,
 
-whose value lies above the step's, since its adversary chooses among fewer moves. Both see the same months of the same file; this
-Python needs cvxpy, clarabel and numpy. Seconds of the opponent are Clarabel's own, without what cvxpy takes to state the program.
+whose value is above that of the step, because its adversary has fewer moves. Both use the same months of the same file. This
+Python needs cvxpy, clarabel and numpy. The time of the opponent is that of Clarabel alone, without the setup by cvxpy.
 """
 import argparse
 import csv
@@ -23,7 +23,7 @@ import warnings
 import cvxpy as cp
 import numpy as np
 
-# Of an atom: far beyond every move of the answers.
+# Largest cost of moving an atom, far above every move in the answers.
 LARGEST_COST = 1.5
 
 
@@ -34,9 +34,9 @@ def log_returns(path):
 
 
 def by_clarabel(growths, radius, risk_aversion, count):
-    """Seconds, and the log certainty equivalent over the bank."""
+    """Returns the seconds, and the log certainty equivalent over the bank."""
     dates, assets = growths.shape
-    # Closer together where moves are small.
+    # The grid is finer for small moves.
     costs = LARGEST_COST * np.linspace(0.0, 1.0, count) ** 1.5
     shares, price, tops = cp.Variable(assets, nonneg=True), cp.Variable(nonneg=True), cp.Variable(dates)
     power = 1.0 - risk_aversion
@@ -46,7 +46,7 @@ def by_clarabel(growths, radius, risk_aversion, count):
         rules.append(tops <= cp.power(wealth, power) / power + price * cost)
     program = cp.Problem(cp.Maximize(cp.sum(tops) / dates - price * radius), rules)
     with warnings.catch_warnings():
-        # Clarabel stops where rounding stalls it, some 1e-3 basis points off: the values are compared below.
+        # Clarabel stops when rounding stalls it, about 1e-3 basis points off. The values are compared below.
         warnings.simplefilter("ignore")
         program.solve(solver=cp.CLARABEL)
     assert program.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE), program.status
@@ -64,11 +64,11 @@ def main():
     options = parser.parse_args()
     command = [options.binary, "bench", "assets", "--json", "--file", options.file]
     command += ["--assets", options.assets, "--months", options.months]
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     returns = log_returns(options.file)
     title = f"{'assets':>6} {'months':>6} {'Ballast, ms':>12} {'Clarabel, ms':>13} {'ratio':>7} {'value, bp':>10} {'above it, bp':>13}"
     print(title)
-    for line in told.splitlines():
+    for line in output.splitlines():
         found = json.loads(line)
         if found["ground_norm"] != "sup":
             continue
@@ -76,7 +76,7 @@ def main():
         growths = np.exp(window) / (1.0 + found["rate"])
         seconds, value = by_clarabel(growths, found["radius"], found["risk_aversion"], options.costs)
         above = 1e4 * (value - found["value"])
-        # What rounding costs Clarabel.
+        # Allows for the rounding of Clarabel.
         assert above > -1e-2, f"{above} below the exact value"
         ratio = seconds / found["cold"]
         print(
