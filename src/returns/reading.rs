@@ -149,14 +149,8 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
         remarks.push("The rows came newest first and are reversed.".to_owned());
     }
     remarks.extend(order.remark.take().into_iter().chain(kept.remarks).chain(sheet.remarks.iter().cloned()));
-    let found = ColumnContents {
-        names: chosen.iter().map(|column| column.name.clone()).collect(),
-        order,
-        returns,
-        rate,
-        used,
-        remarks,
-    };
+    let names = chosen.iter().map(|column| column.name.clone()).collect();
+    let found = ColumnContents { names, order, returns, rate, used, remarks };
     Ok(found.record(sheet.found()))
 }
 

@@ -13,7 +13,8 @@
 //! [`interruption`]). A piece that has waited too long for a place of the first stage is refused.
 //! Checked by: the tests below and `tests/operation/interruption.rs`.
 
-use std::collections::{HashMap, VecDeque};
+mod stage;
+
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -21,20 +22,13 @@ use tokio::runtime::Handle;
 use tokio::sync::{oneshot, watch};
 use tracing::Instrument;
 
+use self::stage::{Stage, StageQueue};
 use super::allowance::Refused;
 use super::error::ServiceError;
 use super::spans;
 use crate::numerics::interruption::{self, Stopped, Watcher};
 use crate::store::Tenant;
 
-/// How long a piece is in the first stage, which most pieces end in.
-const FIRST: Duration = Duration::from_millis(100);
-/// How long a piece has worked when it enters the third stage.
-const SECOND: Duration = Duration::from_secs(1);
-/// How long a piece keeps a place of the second stage while others wait.
-const SECOND_TURN: Duration = Duration::from_millis(100);
-/// How long a piece keeps a place of the third stage while others wait.
-const LONG_TURN: Duration = Duration::from_millis(250);
 /// Pieces that may wait in the second stage, each on a thread of its own.
 const SECOND_WAITING: usize = 16;
 /// Pieces that may wait in the third stage. Few, because those that share a place must all end before their time limits.
@@ -49,7 +43,7 @@ pub struct FairQueue {
     pub name: &'static str,
     /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
     pub of_one: usize,
-    lines: Arc<[Mutex<StageQueue>; 3]>,
+    lines: Arc<[Mutex<StageQueue<Granted>>; 3]>,
     wait: Duration,
 }
 
@@ -60,59 +54,6 @@ pub struct QueueSize {
     pub first: usize,
     /// In the second stage, and in the third.
     pub long: usize,
-}
-
-/// How far a piece has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
-    First,
-    Second,
-    Long,
-}
-
-impl Stage {
-    /// The stage of a piece that has worked for so long.
-    fn after(worked: Duration) -> Stage {
-        match worked {
-            worked if worked < FIRST => Stage::First,
-            worked if worked < SECOND => Stage::Second,
-            _ => Stage::Long,
-        }
-    }
-
-    fn turn(self) -> Duration {
-        match self {
-            Stage::First => FIRST,
-            Stage::Second => SECOND_TURN,
-            Stage::Long => LONG_TURN,
-        }
-    }
-
-    /// Pieces of a lower rank come first; those of equal rank take turns.
-    fn rank(self, worked: Duration) -> u128 {
-        if self == Stage::Second { worked.as_millis() / SECOND_TURN.as_millis() } else { 0 }
-    }
-}
-
-/// The places of one stage, and who waits for them.
-struct StageQueue {
-    /// Places that nobody has; while there are any, all who wait have as many as one tenant may.
-    free: usize,
-    /// Places that one tenant may have.
-    of_one: usize,
-    /// Pieces that may wait.
-    most_waiting: usize,
-    /// Places that each tenant has; none of them 0.
-    running: HashMap<Tenant, usize>,
-    /// Tenants that wait, whose turn is next first; each has a queue.
-    ring: VecDeque<Tenant>,
-    queues: HashMap<Tenant, VecDeque<WaitingPiece>>,
-}
-
-/// A piece that waits for a place.
-struct WaitingPiece {
-    rank: u128,
-    grant: oneshot::Sender<Granted>,
 }
 
 /// What a waiting piece gets.
@@ -147,14 +88,11 @@ struct PieceState {
 
 impl FairQueue {
     pub fn new(name: &'static str, QueueSize { first, long }: QueueSize, wait: Duration) -> Self {
-        let line = |free, of_one, most_waiting| {
-            let (running, queues) = (HashMap::new(), HashMap::new());
-            Mutex::new(StageQueue { free, of_one, most_waiting, running, ring: VecDeque::new(), queues })
-        };
         let of_one = first.div_ceil(2);
         // How long a caller waits for the first stage is bounded, not how many do.
-        let lines = [line(first, of_one, usize::MAX), line(long, long, SECOND_WAITING), line(long, long, LONG_WAITING)];
-        FairQueue { name, of_one, lines: Arc::new(lines), wait }
+        let queue = |(free, of_one, most)| Mutex::new(StageQueue::new(free, of_one, most));
+        let stages = [(first, of_one, usize::MAX), (long, long, SECOND_WAITING), (long, long, LONG_WAITING)];
+        FairQueue { name, of_one, lines: Arc::new(stages.map(queue)), wait }
     }
 
     /// Runs `work` on a thread that may block. It ends early where the future is dropped.
@@ -229,7 +167,7 @@ impl FairQueue {
         Permit { bounded: self.clone(), stage, tenant }
     }
 
-    fn line(&self, stage: Stage) -> MutexGuard<'_, StageQueue> {
+    fn line(&self, stage: Stage) -> MutexGuard<'_, StageQueue<Granted>> {
         // No code panics while holding the lock.
         self.lines[stage as usize].lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -300,10 +238,11 @@ impl Piece {
             return Entered::Stays;
         }
         if !is_in && waiting >= line.most_waiting {
-            let Some((grant, refused)) = line.give_up_one(&self.tenant, rank) else {
+            let Some((grant, is_one_of_several)) = line.give_up_one(&self.tenant, rank) else {
                 let own = line.waiting_of(&self.tenant) > 0;
                 return Entered::Refused(if own { Refused::OwnWork.into() } else { ServiceError::Busy });
             };
+            let refused = if is_one_of_several { Refused::OwnWork.into() } else { ServiceError::Busy };
             drop(grant.send(Err(refused)));
         }
         line.ask(&self.tenant, rank).map_or(Entered::Granted, Entered::Waits)
@@ -321,105 +260,9 @@ impl Piece {
     }
 }
 
-impl StageQueue {
-    fn may(&self, tenant: &Tenant) -> bool {
-        self.free > 0 && !self.is_full_of(tenant)
-    }
-
-    /// Whether the tenant has as many places as it may.
-    fn is_full_of(&self, tenant: &Tenant) -> bool {
-        self.running.get(tenant).copied().unwrap_or_default() >= self.of_one
-    }
-
-    fn take(&mut self, tenant: &Tenant) {
-        self.free -= 1;
-        *self.running.entry(tenant.clone()).or_default() += 1;
-    }
-
-    /// Takes a place if there is one for the tenant: `None`. Else waits for it.
-    fn ask(&mut self, tenant: &Tenant, rank: u128) -> Option<oneshot::Receiver<Granted>> {
-        if self.may(tenant) {
-            self.take(tenant);
-            return None;
-        }
-        let (grant, granted) = oneshot::channel();
-        let queue = self.queues.entry(tenant.clone()).or_default();
-        if queue.is_empty() {
-            self.ring.push_back(tenant.clone());
-        }
-        queue.push_back(WaitingPiece { rank, grant });
-        Some(granted)
-    }
-
-    /// Takes a place back, and gives it to the piece of the lowest rank, of equal ones to that of the tenant whose turn is next.
-    fn give_back(&mut self, tenant: &Tenant) -> Option<(Tenant, oneshot::Sender<Granted>)> {
-        self.free += 1;
-        if let Some(running) = self.running.get_mut(tenant) {
-            *running -= 1;
-            if *running == 0 {
-                self.running.remove(tenant);
-            }
-        }
-        self.forget_gone();
-        let next = self.ring.iter().filter(|tenant| self.may(tenant));
-        let tenant = next.min_by_key(|tenant| self.queues.get(*tenant).and_then(first).map(|(_, rank)| rank))?.clone();
-        let queue = self.queues.get_mut(&tenant)?;
-        let (at, _) = first(queue)?;
-        let WaitingPiece { grant, .. } = queue.remove(at)?;
-        // The tenant goes to the end of the ring.
-        self.ring.retain(|waiting| *waiting != tenant);
-        if queue.is_empty() {
-            self.queues.remove(&tenant);
-        } else {
-            self.ring.push_back(tenant.clone());
-        }
-        self.take(&tenant);
-        Some((tenant, grant))
-    }
-
-    /// Removes from a full queue the piece that should make room for one of `tenant`, if any should, and gives why it is refused.
-    fn give_up_one(&mut self, tenant: &Tenant, rank: u128) -> Option<(oneshot::Sender<Granted>, ServiceError)> {
-        self.forget_gone();
-        let worst = |(tenant, queue): (&Tenant, &VecDeque<WaitingPiece>)| {
-            let (at, rank) = queue.iter().map(|waiting| waiting.rank).enumerate().max_by_key(|&(_, rank)| rank)?;
-            Some(((queue.len(), rank), at, tenant.clone()))
-        };
-        let ((count, most), at, loser) = self.queues.iter().filter_map(worst).max_by_key(|(key, ..)| *key)?;
-        if (count, most) <= (self.waiting_of(tenant) + 1, rank) {
-            return None;
-        }
-        let queue = self.queues.get_mut(&loser)?;
-        let WaitingPiece { grant, .. } = queue.remove(at)?;
-        self.forget_gone();
-        Some((grant, if count > 1 { Refused::OwnWork.into() } else { ServiceError::Busy }))
-    }
-
-    /// Forgets the pieces that wait no more.
-    fn forget_gone(&mut self) {
-        self.queues.retain(|_, queue| {
-            queue.retain(|waiting| !waiting.grant.is_closed());
-            !queue.is_empty()
-        });
-        let StageQueue { ring, queues, .. } = self;
-        ring.retain(|tenant| queues.contains_key(tenant));
-    }
-
-    fn waiting(&self) -> usize {
-        self.queues.keys().map(|tenant| self.waiting_of(tenant)).sum()
-    }
-
-    fn waiting_of(&self, tenant: &Tenant) -> usize {
-        self.queues.get(tenant).map_or(0, |queue| queue.iter().filter(|waiting| !waiting.grant.is_closed()).count())
-    }
-}
-
-/// The place in a queue, and the rank, of its first piece of the lowest rank.
-fn first(queue: &VecDeque<WaitingPiece>) -> Option<(usize, u128)> {
-    queue.iter().map(|waiting| waiting.rank).enumerate().min_by_key(|&(_, rank)| rank)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::HashMap;
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::mpsc;
 

@@ -2,8 +2,7 @@
 //!
 //! The start of a session with several assets holds their names. In its entries, each map from names to numbers is
 //! replaced by the index of a list of the numbers in the order of the names. Each list is stored once. So the size of
-//! an
-//! entry depends on the number of assets, and not on the length of their names.
+//! an entry depends on the number of assets, and not on the length of their names.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -9,8 +9,7 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exchangeability::{TestMartingale, p_value};
 
 /// Values of the test martingale that cause a warning and an alarm. If nothing changes, the chance of ever an alarm is
-/// at
-/// most 1 %.
+/// at most 1 %.
 const WARNING: f64 = 20.0;
 const ALARM: f64 = 100.0;
 /// The largest value that is reported.

@@ -13,8 +13,7 @@ pub(super) const DAILY: f64 = 200.0;
 const LONGEST_DAYS: f64 = 3_650.0;
 
 /// Returns the last day of the period after the one that ended on `date`. The last day of a month is followed by the
-/// last
-/// day of a month. Markets are closed on Saturdays and Sundays.
+/// last day of a month. Markets are closed on Saturdays and Sundays.
 pub fn next_day(date: Date, periods_per_year: f64) -> Option<Date> {
     if periods_per_year <= 0.0 {
         return None;

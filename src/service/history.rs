@@ -176,8 +176,7 @@ impl Sessions {
     }
 
     /// Returns each period from `first` on, the first that differs from its acknowledgement. Each waits for its own
-    /// permit to
-    /// be advised. So a long session starves nobody, and a disconnected caller stops the work.
+    /// permit to be advised. So a long session starves nobody, and a disconnected caller stops the work.
     async fn changed(
         &self,
         tenant: &Tenant,
@@ -278,8 +277,7 @@ fn now(period: &SessionPeriod, passed: ReplayedPeriod, after: &SessionState, adv
 }
 
 /// Builds the answer for an inserted period as if it had been observed. The executed allocation counts as the advised
-/// one,
-/// because none was advised.
+/// one, because none was advised.
 fn inserted(
     (session, period): (&str, usize),
     passed: &ReplayedPeriod,

@@ -77,8 +77,7 @@ impl Jobs {
     }
 
     /// Queues a training whose policy gets `labels`. The same key and specification again return the same job, whatever
-    /// the
-    /// labels are.
+    /// the labels are.
     ///
     /// # Errors
     /// A field breaks its rule or needs more memory than there is, or the key was used with another request.
@@ -97,8 +96,7 @@ impl Jobs {
     }
 
     /// Finds or queues the training that a session requests. All sessions of a tenant that need one policy share its
-    /// job. The
-    /// same request again returns the same job, whatever it trains.
+    /// job. The same request again returns the same job, whatever it trains.
     ///
     /// # Errors
     /// As [`Self::train`].

@@ -1,15 +1,13 @@
 //! Authenticates callers by their keys, and knows what each may do.
 //!
 //! A store without a key answers everybody as the default tenant. Once a store has a key, every call needs one, and
-//! this
-//! stays so after the last key is revoked.
+//! this stays so after the last key is revoked.
 //!
 //! A request costs one hash and one lookup in memory. The store is read every [`REFRESH`] instead, so a key made or
 //! revoked by another process or replica counts within that time. While the store does not answer, the last known keys
 //! hold; nothing else that needs the store answers then either. An expired key is rejected from its expiry on, whatever
-//! the
-//! store does, because its expiry is known beforehand by the clock of the store. A key is rotated without a gap: its
-//! successor is in force before it expires.
+//! the store does, because its expiry is known beforehand by the clock of the store. A key is rotated without a gap:
+//! its successor is in force before it expires.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};

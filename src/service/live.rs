@@ -174,8 +174,7 @@ impl LiveSession {
     }
 
     /// Returns the surrogate's advice for the coming period, computed once. A short computation runs here, a longer one
-    /// on a
-    /// thread that may block. A state outside the design is solved, which is heavy work.
+    /// on a thread that may block. A state outside the design is solved, which is heavy work.
     pub(super) async fn surrogate_advice(&mut self, means: &AdviceContext<'_>) -> Result<&Advice, ServiceError> {
         let step = self.step();
         let advice = match self.advice.take() {
@@ -253,8 +252,7 @@ impl LiveSession {
 }
 
 /// Returns the uncertainty set before `step` of the policy. For several assets the composition is chosen first, which
-/// is
-/// heavy work if it needs a solve.
+/// is heavy work if it needs a solve.
 pub(super) async fn with_uncertainty(
     means: &AdviceContext<'_>,
     tenant: &Tenant,

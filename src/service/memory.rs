@@ -1,10 +1,8 @@
 //! One memory budget for the process in bytes, and the part that each use may take.
 //!
 //! The limit is divided once, at the start: jobs, what is cached, what is being prepared for the cache, live sessions,
-//! and
-//! the process itself with its connections. No part takes from another. So a training never evicts what sessions need,
-//! and
-//! sessions never end a training.
+//! and the process itself with its connections. No part takes from another. So a training never evicts what sessions
+//! need, and sessions never end a training.
 
 use std::fmt;
 use std::fs;

@@ -85,11 +85,7 @@ pub fn describe() {
         counter!(STORE_FAILURES, "cause" => cause).increment(0);
     }
     describe_histogram!(TRAINING_STEP_SECONDS, Unit::Seconds, "Duration of one backward step of a training.");
-    describe_histogram!(
-        OBSERVE_SECONDS,
-        Unit::Seconds,
-        "Duration of recording one observation, durably, alone or of a list."
-    );
+    describe_histogram!(OBSERVE_SECONDS, Unit::Seconds, "Duration of recording one observation durably.");
     describe_histogram!(ACTION_SECONDS, Unit::Seconds, "Duration of finding one allocation, by mode.");
     describe_histogram!(HTTP_REQUEST_SECONDS, Unit::Seconds, "Duration of one request, by method and route.");
     describe_counter!(HTTP_REQUESTS, "Requests answered, by method, route and status.");

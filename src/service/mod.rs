@@ -109,8 +109,7 @@ impl Service {
     ///
     /// # Errors
     /// The role does not fit the store, the store or the training thread cannot be started, or a store that has lost
-    /// its keys
-    /// or must have one holds none. Also if others reach the address and no key would be needed.
+    /// its keys or must have one holds none. Also if others reach the address and no key would be needed.
     pub async fn start(config: &Config, clock: Clock, shutdown: Shutdown) -> Result<Arc<Self>, ServiceError> {
         let store = match &config.store {
             StoreLocation::Folder(_) if config.role != Role::All => {
@@ -198,8 +197,7 @@ impl Service {
     }
 
     /// Resolves if the store fails past recovery. After a failed fsync or an I/O error memory and disk may disagree. So
-    /// the
-    /// process must end: only a restart can find the true state.
+    /// the process must end: only a restart can find the true state.
     pub async fn store_failed(&self) -> StoreError {
         self.store.until_fatal().await
     }

@@ -1,8 +1,7 @@
 //! Compares the reports of a list: sessions with one policy see the same returns, so most reports of one day agree.
 //!
 //! A report that differs from most of its peers is doubted, even if its return fits the record. Sessions with one
-//! policy
-//! may follow different returns; if no return has a majority, nothing is doubted.
+//! policy may follow different returns; if no return has a majority, nothing is doubted.
 
 use std::collections::HashMap;
 

@@ -1,10 +1,8 @@
 //! Rebuilds a session from its entries: each period as last reported, in order.
 //!
 //! The state is a function of the entries alone. After a correction, which is an entry, the periods are replayed with
-//! the
-//! corrected report. The advice given for a period does not change, so the holdings do not either unless a report
-//! changes
-//! them. A renewal is an entry also: from there on the terms and the law are those of the next policy.
+//! the corrected report. The advice given for a period does not change, so the holdings do not either unless a report
+//! changes them. A renewal is an entry also: from there on the terms and the law are those of the next policy.
 
 use std::collections::BTreeMap;
 

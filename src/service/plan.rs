@@ -149,8 +149,7 @@ impl SessionPlan {
     }
 
     /// Returns the terms of the periods after `observed` ones, with a policy that starts from `returns` returns. They
-    /// cover
-    /// its horizon, or all remaining periods if the session rolls.
+    /// cover its horizon, or all remaining periods if the session rolls.
     ///
     /// # Errors
     /// The rule that such a policy breaks.

@@ -1,6 +1,5 @@
 //! Figures of the system about this process, under the names that Prometheus' own clients use. On systems other than
-//! Linux
-//! only the start time is reported.
+//! Linux only the start time is reported.
 
 use std::fs;
 use std::sync::OnceLock;

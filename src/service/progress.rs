@@ -133,8 +133,7 @@ impl Default for ProgressBoard {
 
 impl RunningJobs {
     /// Returns the time per step so far times the steps left. A step being solved counts by its share of finished
-    /// design
-    /// points. Simulation takes another time per step than solving, so there is no estimate for it.
+    /// design points. Simulation takes another time per step than solving, so there is no estimate for it.
     fn seconds_left(&self) -> Option<f64> {
         let share = match self.progress.current {
             Some(current) if current.phase == Phase::Simulating => return None,

@@ -1,8 +1,7 @@
 //! Records the entries of a session: observations of periods, and corrections of them.
 //!
 //! An entry is computed from all entries before it, and appended after them. If another process wrote meanwhile, the
-//! append
-//! fails and the entry is computed again. So observations and corrections of all processes have one order.
+//! append fails and the entry is computed again. So observations and corrections of all processes have one order.
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -28,8 +27,8 @@ use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
 
 impl Sessions {
     /// Records the return of a period exactly once, durably before the answer. Returns an [`Observed`] in JSON as it
-    /// was
-    /// recorded. If the caller disconnects, the write may or may not commit; either way nothing of it stays in memory.
+    /// was recorded. If the caller disconnects, the write may or may not commit; either way nothing of it stays in
+    /// memory.
     ///
     /// # Errors
     /// A field breaks a rule, or the period was observed with other content, is not the next, or lies past the horizon.
@@ -84,13 +83,11 @@ impl Sessions {
     }
 
     /// Records another report of an observed period, with the guarantees of [`Self::observe`]. Returns a [`Corrected`]
-    /// in
-    /// JSON. Every later advice uses the corrected returns.
+    /// in JSON. Every later advice uses the corrected returns.
     ///
     /// # Errors
     /// A field breaks a rule or makes a later period break one, or the correction was made with other content or is not
-    /// the
-    /// next.
+    /// the next.
     pub async fn correct(
         &self,
         caller: &Caller,
@@ -98,9 +95,8 @@ impl Sessions {
         correct: &Correct,
         turn: &HeavyPermit,
     ) -> Result<String, ServiceError> {
-        let number = numbered("correction", correct.correction)?;
+        let (number, tenant) = (numbered("correction", correct.correction)?, &caller.tenant);
         correct.check()?;
-        let tenant = &caller.tenant;
         let mut held = self.hold(tenant, session).await;
         loop {
             let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
@@ -116,8 +112,8 @@ impl Sessions {
             let AppliedCorrection { before, standing, observed, log_return, wealth_change } =
                 self.advising.run(tenant, move || periods.apply_correction(&putting, entry, today)).await??;
             let step = current.step_from(observed, SessionPlan::of(&facts.row)?.renew, renewals);
-            let (standing, uncertainty) =
-                with_uncertainty(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
+            let means = self.means_of(advisor, Some(turn));
+            let (standing, uncertainty) = with_uncertainty(&means, tenant, step, standing).await?;
             let answer = Corrected {
                 session: session.to_owned(),
                 correction: number,
@@ -184,8 +180,8 @@ impl Sessions {
     }
 
     /// Appends the entry that leads to `next`; returns false if another process wrote meanwhile. Counts a rise of the
-    /// drift
-    /// level between the two `levels`. The slot is empty during the write, so that memory never runs ahead of the disk.
+    /// drift level between the two `levels`. The slot is empty during the write, so that memory never runs ahead of the
+    /// disk.
     async fn append(
         &self,
         store: &Store,

@@ -1,9 +1,8 @@
 //! Renews a session: records the switch to its next policy.
 //!
 //! A renewal is an entry of its session. It names the next policy, which advises from the coming period on. It also
-//! holds
-//! the terms of the periods from there on, so that a replay does not need policies that no longer advise. The law is
-//! rebuilt from the corrected returns: all of them, or a window of the last ones.
+//! holds the terms of the periods from there on, so that a replay does not need policies that no longer advise. The law
+//! is rebuilt from the corrected returns: all of them, or a window of the last ones.
 
 use std::sync::Arc;
 

@@ -1,6 +1,5 @@
 //! Reports of many sessions at once: each element of a list is handled like a call of its own, except for doubts that
-//! its
-//! peers raise.
+//! its peers raise.
 //!
 //! A list is not a transaction and needs none, because each element is recorded exactly once. The same list sent again
 //! gets the same answers, and resumes if the first call was cut off. A list saves the overhead of a call for each
@@ -52,8 +51,7 @@ impl Sessions {
     }
 
     /// Records a list of reports, each like a call of its own, and returns their outcomes in order. The call itself
-    /// took the
-    /// first element from the rate limit; every other element is taken here.
+    /// took the first element from the rate limit; every other element is taken here.
     ///
     /// # Errors
     /// The list is empty or too long, or names a session twice. Nothing is recorded in that case.

@@ -3,12 +3,10 @@
 //! A session is its rows. The state in memory is a replay of them, or the start of one, and the slot is empty during a
 //! write. So memory never runs ahead of the disk. Before every use the state is compared with the store, and a state of
 //! other rows is dropped. So no process advises from an outdated law, or from one that a restored database never had.
-//! One
-//! lock per session orders its observations in this process (see `super::slots`).
+//! One lock per session orders its observations in this process (see `super::slots`).
 //!
 //! A session belongs to its tenant and does not exist for others. Slots are named by tenant and session, so no call
-//! waits
-//! for, fills or empties the slot of another tenant.
+//! waits for, fills or empties the slot of another tenant.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -44,8 +42,7 @@ use crate::control::request::specification::Specification;
 use crate::store::{CreateSession, Relabel, RequestKey, SessionRow, Store, Tenant};
 
 /// Lists of sessions read concurrently. These are fewer than the store's connections for lists, so that the lists of
-/// jobs,
-/// policies and labels always find one.
+/// jobs, policies and labels always find one.
 const LISTS: usize = 2;
 
 /// The tenant of a session, and its name.

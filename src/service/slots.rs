@@ -14,12 +14,10 @@
 //! 3. A state is out of its slot while the source decides on its successor. It is replaced or read again, never kept.
 //!
 //! Either of the first two would be enough. `tests/slots.rs` shows this with a concurrency checker, and also that the
-//! checker
-//! finds the fault if neither holds.
+//! checker finds the fault if neither holds.
 //!
 //! Memory is bounded by two generations. A slot that is held joins the young one. When that is full it becomes the old
-//! one,
-//! and old slots that nobody has held since are dropped. Their states are read again when needed.
+//! one, and old slots that nobody has held since are dropped. Their states are read again when needed.
 
 use std::collections::HashMap;
 use std::future::Future;

@@ -1,8 +1,7 @@
 //! Spans of where a request spends its time, for OpenTelemetry.
 //!
 //! They have a target of their own, to which only the exporting layer listens. Without such a layer, a span costs one
-//! read
-//! of a static. Spans name routes, statuses and tenants, never keys or request contents.
+//! read of a static. Spans name routes, statuses and tenants, never keys or request contents.
 
 use tracing::Span;
 use tracing::field::Empty;

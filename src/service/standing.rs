@@ -120,8 +120,7 @@ impl SessionState {
     }
 
     /// Returns the effect of `report` on `period`, for which a total of `advised` was advised. A report without a day
-    /// takes
-    /// the next one due, if `periods_per_year` is known.
+    /// takes the next one due, if `periods_per_year` is known.
     ///
     /// # Errors
     /// As [`SessionState::read`], or wealth leaves the permitted range.

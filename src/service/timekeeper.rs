@@ -1,14 +1,11 @@
 //! The clock that dates everything, and a check that it is right enough to delete by.
 //!
 //! Replicas follow the clock of their database, so that dates, expiry and deletion by age agree on all of them. A
-//! machine
-//! whose clock differs from it by more than [`LARGEST_SKEW_MS`] reports that and deletes nothing by age.
+//! machine whose clock differs from it by more than [`LARGEST_SKEW_MS`] reports that and deletes nothing by age.
 //!
 //! A folder has only the clock of its machine. That clock is compared with the newest time stored. If they differ by
-//! more
-//! than [`LONGEST_GAP_MS`], the clock has jumped or the service was stopped for that long. Nothing is deleted by age
-//! until
-//! the service has run for as long as that.
+//! more than [`LONGEST_GAP_MS`], the clock has jumped or the service was stopped for that long. Nothing is deleted by
+//! age until the service has run for as long as that.
 
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,11 +1,9 @@
 //! The worker: claims jobs one at a time and solves them step by step, with a checkpoint after each.
 //!
 //! It runs on a thread of its own with a pool of its own, so that the threads that answer requests stay free. Every
-//! stop (a
-//! cancel, a shutdown, a lost lease) ends in `release_job`. The store knows whether a cancel was requested, and
-//! requeues the
-//! job or cancels it. A worker that lost its lease changes nothing. The work itself checks the stop signal often, but
-//! not
+//! stop (a cancel, a shutdown, a lost lease) ends in `release_job`. The store knows whether a cancel was requested, and
+//! requeues the job or cancels it. A worker that lost its lease changes nothing. The work itself checks the stop signal
+//! often, but not
 //! inside a factorisation, which takes a minute at ten thousand points. After [`PATIENCE`] the job is released without
 //! waiting for it, and what it still computes is dropped.
 

@@ -92,8 +92,7 @@ impl WhatIfScenario {
     }
 
     /// Returns the advice under the hypothesis. With another wealth or other holdings, the composition is chosen again
-    /// from the
-    /// one held before. After a return, it is chosen as a report of that return would choose it.
+    /// from the one held before. After a return, it is chosen as a report of that return would choose it.
     ///
     /// # Errors
     /// The returns are not of the assets, or wealth leaves the permitted range.

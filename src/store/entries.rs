@@ -1,8 +1,7 @@
 //! The events of a session: append-only entries, numbered from 1 in the order they were recorded.
 //!
-//! An entry stores what was reported and what was answered. A writer must know all earlier entries, because it numbers
-//! the new entry one above the last. If two writers append at once, one fails, reads the other's entry, and decides
-//! again.
+//! An entry stores a report and its answer, and is numbered one above the last. If two writers append at once, one
+//! fails, reads the other's entry, and decides again.
 
 use std::sync::LazyLock;
 
@@ -163,11 +162,9 @@ async fn append_shared(database: &Database, new: EntryRow) -> Result<Append, Sto
     }
 }
 
-/// Names the operation in errors.
 pub(super) const APPENDING: &str = "appending an entry";
 
-/// Inserts the row by a statement that itself checks that it is the next one. The reason for a failure is looked up
-/// afterwards. No other statement here changes rows.
+/// Inserts the row by a statement that itself checks that it is the next one. No other statement here changes rows.
 pub(super) async fn append(mut connection: StoreConnection<'_>, new: EntryRow) -> Result<Append, Failure> {
     append_next(&mut connection, &new).await.map(|(append, _)| append)
 }
@@ -202,7 +199,6 @@ async fn append_with_room(
     Ok(append)
 }
 
-/// Reserves quota for `room` more entries, and records in the audit what it is for.
 pub(super) async fn take_room(
     connection: &mut StoreConnection<'_>,
     tenant: &Tenant,
@@ -219,11 +215,9 @@ pub(super) async fn take_room(
 
 const NAMES: &str = "session, entry, kind, number, content_json, answer_json, numbers, created_ms, access_key, seal";
 const COLUMNS: usize = 10;
-/// Selects the number after the last entry of `new.session`.
 const NEXT: &str = "(SELECT coalesce(max(entry), 0) + 1 FROM entries WHERE entries.session = new.session)";
 
-/// Inserts a row if its session exists and it is the session's next entry, unless another transaction inserts that
-/// entry.
+/// Inserts the next entry of a session that exists, unless another transaction inserts it.
 static INSERT_ONE: LazyLock<String> = LazyLock::new(|| {
     let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${column}")).collect();
     format!(
@@ -286,7 +280,6 @@ fn bind_row(insert: Query, new: &EntryRow) -> Query {
 }
 
 impl EntryRow {
-    /// Returns the head of its session if this is the last entry.
     pub fn head(&self) -> Head {
         Head { entries: self.entry, seal: self.seal().finish() }
     }
@@ -310,7 +303,6 @@ impl EntryRow {
             .text(&self.key)
     }
 
-    /// Verifies an observation's seal and returns it as an audit row.
     pub(super) fn audit_row(row: &StoreRow) -> Result<AuditRow, Failure> {
         let observation = EntryRow::from_row(row)?;
         Ok(AuditRow {

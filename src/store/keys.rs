@@ -19,7 +19,6 @@ use crate::control::error::FieldError;
 /// A role of a key: what it allows its holder to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum KeyRole {
-    /// Everything that changes nothing.
     Read,
     /// Open, advance and delete sessions.
     Operate,
@@ -33,16 +32,13 @@ pub enum KeyRole {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyRoles(Vec<KeyRole>);
 
-/// A key to store.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewKey {
-    /// Its name, which is no secret.
     pub key: String,
     pub hash: [u8; 32],
     pub tenant: Tenant,
     pub roles: KeyRoles,
     pub created_ms: i64,
-    /// The key is not in force from this time on.
     pub expires_ms: Option<i64>,
 }
 
@@ -56,12 +52,13 @@ pub struct Successor {
     pub expires_ms: Option<i64>,
 }
 
-/// The outcome of a rotation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rotation {
     /// Both are in force; `old` is the replaced key as it is now.
-    Rotated { old: Box<KeyRow>, new: Box<KeyRow> },
-    /// There is no key of this name.
+    Rotated {
+        old: Box<KeyRow>,
+        new: Box<KeyRow>,
+    },
     Absent,
     /// The key is no longer in force, so it cannot be replaced.
     Ended,
@@ -100,7 +97,6 @@ impl StoredKeys {
         Ok(keys)
     }
 
-    /// Returns true if there never was a key.
     pub fn is_empty(&self) -> bool {
         self.sound.is_empty() && self.damaged.is_empty()
     }
@@ -152,14 +148,12 @@ impl KeyRing {
         self.0.write("revoking a key", move |connection| revoke(connection, key, now_ms).boxed()).await
     }
 
-    /// Stores a successor of `key`, and makes `key` itself expire at `old_expires_ms` unless it expires sooner. Both
-    /// happen or neither, so that there is always a key in force.
+    /// Stores a successor of `key`, which itself expires at `old_expires_ms` or sooner. Both happen, or neither.
     pub async fn rotate(&self, key: &str, new: Successor, old_expires_ms: i64) -> Result<Rotation, StoreError> {
         let key = key.to_owned();
         self.0.write("rotating a key", move |connection| rotate(connection, key, new, old_expires_ms).boxed()).await
     }
 
-    /// Lists audit entries like [`Store::deeds`].
     pub async fn deeds(
         &self,
         filter: &AuditFilter,
@@ -188,7 +182,6 @@ async fn create(mut connection: StoreConnection<'_>, new: NewKey, actor: Actor) 
     audit_chain::record(&mut connection, (Quotas::NONE, &actor), &tenant, AuditAction::CreateKey, &key, &outcome).await
 }
 
-/// Finds the key and locks it for this transaction.
 async fn find(connection: &mut StoreConnection<'_>, key: &str) -> Result<Option<KeyRow>, Failure> {
     let find = query("SELECT * FROM access_keys WHERE access_key = $1").bind(key).for_update();
     connection.row(find).await?.as_ref().map(KeyRow::from_row).transpose()
@@ -206,7 +199,6 @@ async fn revoke(mut connection: StoreConnection<'_>, key: String, now_ms: i64) -
     Ok(true)
 }
 
-/// Stores when a key ends.
 async fn change(connection: &mut StoreConnection<'_>, row: &KeyRow) -> Result<(), Failure> {
     let change = query("UPDATE access_keys SET revoked_ms = $1, expires_ms = $2, seal = $3 WHERE access_key = $4");
     let change = change.bind(row.revoked_ms).bind(row.expires_ms).bind(row.seal().finish()).bind(row.key.as_str());
@@ -270,7 +262,6 @@ impl From<NewKey> for KeyRow {
 }
 
 impl KeyRow {
-    /// Computes the seal over every field; a time that is not set counts as `i64::MAX`.
     fn seal(&self) -> Seal {
         Seal::of("key")
             .text(&self.key)
@@ -308,7 +299,6 @@ impl KeyRow {
 impl KeyRole {
     pub const ALL: [KeyRole; 4] = [KeyRole::Read, KeyRole::Operate, KeyRole::Train, KeyRole::Admin];
 
-    /// Returns the name on the wire, on the command line and in SQL.
     pub fn as_str(self) -> &'static str {
         match self {
             KeyRole::Read => "read",

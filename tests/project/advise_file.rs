@@ -187,7 +187,7 @@ fn named_columns_are_an_asset_each() {
         (&["--holding", "coal=0.1"], "--holding is coal=0.1: must name one of the assets: energy, utilities"),
         (
             &["--holding", "energy=0.6", "--holding", "utilities=0.6"],
-            "--holding is shares summing to 1.2: must sum to 1",
+            "--holding is shares summing to 1.2: must sum to at most 1",
         ),
         (&["--holding", "energy=1.5"], "--holding is energy=1.5: must be a number in [0, 1]"),
         (&["--half-life", "12"], "--half-life is given with 2 assets: must be left out"),

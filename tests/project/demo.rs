@@ -30,7 +30,7 @@ async fn the_demo_tells_both_acts_and_opens_its_page() {
         }
     }
     let printed = printed.join("\n");
-    for part in ["Told for 2008-01: hold", "four industries", "Done in"] {
+    for part in ["Advice for 2008-01: hold", "four industries", "Done in"] {
         assert!(printed.contains(part), "{part}: {printed}");
     }
     let page = fs::read_to_string(&opened).unwrap();

@@ -141,7 +141,8 @@ fn the_last_year_ends_with_the_record_and_every_output_ranks_alike() {
     }
     let (main, place) = (strategies[1]["strategy"].as_str().unwrap(), &strategies[1]["place"]);
     assert!(
-        printed.contains(&format!("With “{main}” a year from 100")) && printed.contains(&format!("place {place} of 7"))
+        printed.contains(&format!("With “{main}” a year that starts at 100"))
+            && printed.contains(&format!("place {place} of 7"))
     );
 }
 

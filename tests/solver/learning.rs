@@ -188,8 +188,11 @@ async fn a_policy_is_exported_taken_back_and_asked_as_any_other() {
     for field in ["allocation", "certainty_equivalent", "radius", "effective_size", "worst_case"] {
         assert_eq!(advised[field], action[field], "{field}");
     }
-    // Ten returns of this half-life weigh like fewer, and the caution says so.
-    assert!(advised["caution"][0]["sentence"].as_str().unwrap().contains("weigh like"), "{advised}");
+    // Ten returns of this half-life count as much as fewer, and the caution says so.
+    assert!(
+        advised["caution"][0]["sentence"].as_str().unwrap().contains("count as much as 9.0 equally weighted ones"),
+        "{advised}"
+    );
     let present = advised["sensitivity"]["premium"]["present"].as_f64().unwrap();
     let resolved = specification(request(1, bridge(), decay())).resolved(&Cache::default());
     let law = resolved.problem.learning.law(&HISTORY);

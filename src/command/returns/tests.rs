@@ -211,5 +211,5 @@ fn volumes_and_other_prices_of_a_day_are_no_assets() {
     let columns = ["Open", "Last"].map(str::to_owned).to_vec();
     let choices = Choices { columns, ..Choices::default() };
     let refused = AnyReturns::parse(text, &choices, Some(0.001), None).unwrap_err().to_string();
-    assert!(refused.starts_with("Column Open is no return and not the last price of its period"), "{refused}");
+    assert!(refused.starts_with("Column Open holds neither returns nor the last price of each period."), "{refused}");
 }

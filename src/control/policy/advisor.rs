@@ -39,7 +39,6 @@ pub struct Advisor {
     kept: Cache,
 }
 
-/// The inputs of an advice.
 struct AdviceInputs<'a> {
     step: usize,
     state: &'a State,
@@ -88,8 +87,7 @@ impl Advisor {
         prepared_bytes(&self.policy)
     }
 
-    /// Returns the bytes of the largest bridges needed by a session of `periods` periods that starts from `sample_size`
-    /// returns.
+    /// Returns the bytes of the largest bridges of a session of `periods` periods that starts from `sample_size` returns.
     pub fn heaviest_bridges(&self, sample_size: usize, periods: usize) -> usize {
         self.problem.sets.heaviest(sample_size, periods)
     }
@@ -160,16 +158,14 @@ impl Advisor {
         }
     }
 
-    /// Returns the advice of [`Self::advise`] by re-solving, after [`Self::advise_from_surrogate`] found the state
-    /// outside the design.
+    /// Returns the advice of [`Self::advise`] by re-solving, if [`Self::advise_from_surrogate`] could not answer.
     pub fn advise_outside(&self, step: usize, state: &State, outside: &OutsideDesign) -> Advice {
         let OutsideDesign { radius, predicted } = outside;
         let inputs = AdviceInputs { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
         self.resolved(&inputs, predicted).0
     }
 
-    /// Returns true if [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what
-    /// they need is prepared, and small.
+    /// Returns true if an advice by surrogate takes well below a millisecond: what it needs is prepared, and small.
     pub fn is_prompt(&self, step: usize, state: &State) -> bool {
         let (points, is_ready) = match self.surrogates(step) {
             Some((stored, prepared)) => (stored.count(), prepared.factor.is_in(&self.kept)),
@@ -187,8 +183,7 @@ impl Advisor {
         }
     }
 
-    /// Returns the surrogates of a step, stored and prepared; `None` if the step has a single state or lies past the
-    /// horizon.
+    /// Returns the surrogates of a step, stored and prepared; `None` for a single state or past the horizon.
     fn surrogates(&self, step: usize) -> Option<(&StepSurrogates, &PreparedStep)> {
         match &self.policy.steps().get(step)?.solution {
             Solution::Single(_) => None,
@@ -211,8 +206,7 @@ impl Advisor {
         self.explain_knowing(step, state, own, own)
     }
 
-    /// Returns the re-solved advice if the radius of the coming period were `radius`, for any law; later periods keep
-    /// their own.
+    /// Returns the re-solved advice if the radius of the coming period were `radius`; later periods keep their own.
     pub fn explain_within(&self, step: usize, state: &State, radius: f64) -> (Advice, WorstCase) {
         self.explain_knowing(step, state, self.radius(state), radius)
     }
@@ -280,7 +274,6 @@ impl Advisor {
         }
     }
 
-    /// Predicts by the surrogates; `radius` is that of the state.
     fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
         // An imported policy may contain any number.
         let largest = self.problem.largest_gain(step, state);

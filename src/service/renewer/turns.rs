@@ -1,6 +1,5 @@
 //! Chooses the next session to handle: one at a time for each tenant, and tenants concurrently, so that no tenant waits
-//! for
-//! the sessions of another.
+//! for the sessions of another.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 

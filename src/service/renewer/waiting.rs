@@ -1,6 +1,5 @@
 //! Sessions that wait for the training of their next policies: grouped by job, or in line if the queue has no room for
-//! their
-//! training.
+//! their training.
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 

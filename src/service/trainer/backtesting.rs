@@ -1,6 +1,5 @@
 //! Walk-forward jobs: first the trainings of each stretch, or the strategies of several assets, with a checkpoint each;
-//! then
-//! the books.
+//! then the books.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;

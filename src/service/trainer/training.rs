@@ -28,8 +28,7 @@ impl Worker {
     }
 
     /// Returns the policy of a specification, resumed from the checkpoints. Step s is checkpoint `first + s` of the
-    /// job, whose
-    /// checkpoints below `first` are all there. `Err` is how the job ends instead.
+    /// job, whose checkpoints below `first` are all there. `Err` is how the job ends instead.
     pub(super) fn trained(
         &self,
         claimed: &ClaimedJob,
