@@ -117,7 +117,7 @@ def test_what_may_be_a_mistake_is_said(ballast: Ballast) -> None:
 
 def test_how_near_the_advice_is_to_changing(ballast: Ballast, session: Session) -> None:
     advised = ballast.advise(RETURNS, kind="log", rate_per_step=0.002, sensitivity=True)
-    answers: list[wire.Advised | wire.Action] = [advised, session.action(sensitivity=True)]
+    answers: list[wire.Advised | wire.AssetAction] = [advised, session.action(sensitivity=True)]
     for answer in answers:
         without_one = answer["sensitivity"]["without_one"]  # type: ignore[index]
         assert without_one["lowest"]["allocation"] <= without_one["highest"]["allocation"]  # type: ignore[index]

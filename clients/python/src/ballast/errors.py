@@ -84,7 +84,7 @@ class ProblemError(BallastError):
         super().__init_subclass__(**rest)
         cls.kinds[slug] = cls
 
-    def __init__(self, problem: wire.Problem, retry_after: float | None = None) -> None:
+    def __init__(self, problem: wire.ProblemDocument, retry_after: float | None = None) -> None:
         super().__init__(problem, retry_after)
         self.type = problem["type"]
         self.title = problem["title"]
@@ -144,7 +144,7 @@ class Unconfirmed(ProblemError, slug="unconfirmed"):
     ``confirm=True``. If periods are missing, ``missing`` lists their last days. Report each of them with
     ``missing=True`` and its ``date``, and then the period itself."""
 
-    def __init__(self, problem: wire.Problem, retry_after: float | None = None) -> None:
+    def __init__(self, problem: wire.ProblemDocument, retry_after: float | None = None) -> None:
         super().__init__(problem, retry_after)
         self.doubts: list[wire.Doubt] = problem.get("doubts") or []
 
@@ -191,7 +191,7 @@ class Internal(ProblemError, slug="internal"):
 
 def of_response(response: httpx.Response, retry_after: float | None) -> ProblemError:
     """Returns the exception for an unsuccessful answer, whether the service sent it or a proxy did."""
-    problem: wire.Problem = {
+    problem: wire.ProblemDocument = {
         "type": "about:blank",
         "title": response.reason_phrase or "Error",
         "status": response.status_code,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: The answers that contain a worst law: ``Ballast.advise``, ``Session.action(explain="worst_case")``, a what-if.
-Explained: TypeAlias = wire.Advised | wire.Action | wire.WhatIfPoint
+Explained: TypeAlias = wire.Advised | wire.AssetAction | wire.WhatIfPoint
 
 #: The figures of a walk-forward that have a value for each period.
 Figure: TypeAlias = Literal["wealth", "allocation", "low", "high", "radius", "traded"]

@@ -52,7 +52,7 @@ class _Session(Labelled):
         #: The coming period, from 1; ``horizon + 1`` once completed.
         self.period = session["period"]
         #: ``waiting`` while its next policy is trained. Until then it keeps its policy, even past the horizon.
-        self.state: wire.SessionState = session["state"]
+        self.state: wire.SessionStatus = session["state"]
         self.wealth = session["wealth"]
         #: Share of wealth in the risky asset, before trading.
         self.holding = session["holding"]
@@ -76,7 +76,7 @@ class _Session(Labelled):
         mode: Literal["surrogate", "resolve"] | None = None,
         explain: Literal["worst_case"] | None = None,
         sensitivity: bool | None = None,
-    ) -> wire.Action:
+    ) -> wire.AssetAction:
         """Returns the robust allocation for the coming period.
 
         ``mode="resolve"`` solves the robust step again at the exact state. ``explain="worst_case"`` does so too, and
@@ -85,7 +85,7 @@ class _Session(Labelled):
         current policy gives the advice, and ``caution`` in the answer says so.
         """
         params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
-        return cast(wire.Action, await self._transport.json("GET", "/action", params=params))
+        return cast(wire.AssetAction, await self._transport.json("GET", "/action", params=params))
 
     async def _assets_action(
         self, *, mode: Literal["surrogate", "resolve"] | None = None, explain: Literal["worst_case"] | None = None
@@ -234,7 +234,7 @@ class _Session(Labelled):
             if made is None:
                 raise
             detail = f"{counted} {number} was {made}, which this object has not seen: call refresh()"
-            problem = cast(wire.Problem, {**conflict.args[0], "detail": detail})
+            problem = cast(wire.ProblemDocument, {**conflict.args[0], "detail": detail})
             raise ReportConflict(problem, conflict.retry_after) from conflict
 
     async def _made(self, counted: _Counted, number: int) -> str | None:
@@ -374,7 +374,7 @@ def _by_name(report: wire.Report) -> wire.Report:
 class Session(_Session):
     __doc__ = _Session.__doc__
 
-    action = Answering(wire.Action).blocking(_Session._action)
+    action = Answering(wire.AssetAction).blocking(_Session._action)
     assets_action = Answering(wire.AssetsAction).blocking(_Session._assets_action)
     observe = blocking(_Session._observe)
     replay = blocking(_Session._replay)
