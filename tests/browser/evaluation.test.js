@@ -82,7 +82,7 @@ test("what ends as the bank does is a bar of its own, of as many futures as ende
   const rows = charts.getByRole("table", { name: name[banked.framework], exact: true, includeHidden: true });
   await page.evaluate(() => document.querySelectorAll("figure details, figure button[aria-expanded]").forEach((element) => element.open !== undefined && (element.open = true)));
   const text = plain(await rows.innerText());
-  assert.ok(text.includes(`${report.floor.toFixed(2)}, as all in the bank`) && text.includes(`${(banked.wealth.at_bank / 4).toFixed(1)} %`), text);
+  assert.ok(text.includes(`${report.floor.toFixed(2)}, same as all in the bank`) && text.includes(`${(banked.wealth.at_bank / 4).toFixed(1)} %`), text);
 });
 
 test("a strategy has one colour in every chart", async () => {

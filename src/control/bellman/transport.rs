@@ -88,9 +88,11 @@ impl<'f> TransportPricing<'f> {
     ///
     ///   u0(z) + gamma |z - z_j| >= E_j,   E the envelope inf_z' { v(z') + gamma |z' - z_j| } over the window.
     ///
-    /// Below the window, an interval [first - far, first - near] passes if u0(first - far) + gamma near >= max_j { E_j
-    /// - gamma (z_j - first) }, because |z - z_j| = (first - z) + (z_j - first). Above it, the window's own edge
-    /// decides.
+    /// Below the window, an interval [first - far, first - near] passes if
+    ///
+    ///   u0(first - far) + gamma near >= max_j { E_j - gamma (z_j - first) },
+    ///
+    /// because |z - z_j| = (first - z) + (z_j - first). Above it, the window's own edge decides.
     fn certified(&self, payoff: &[f64], worst: &WorstLaw, trade: Trade) -> bool {
         // A ball of radius 0 holds its centre alone, all of whose returns are in the window.
         if self.radius <= 0.0 {
