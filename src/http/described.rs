@@ -115,6 +115,6 @@ fn by_shape(operation: &Operation) -> Vec<ProblemKind> {
 }
 
 fn response(meaning: &str) -> Response {
-    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("ProblemDocument"))).build();
     ResponseBuilder::new().description(format!("{meaning}.")).content("application/problem+json", content).build()
 }

@@ -70,3 +70,12 @@ fn every_problem_is_in_the_table_and_a_full_quota_is_said_where_it_refuses() {
     let refusing: Vec<&String> = refusing.map(|(path, _)| path).collect();
     assert_eq!(refusing, ["/backtest", "/evaluate", "/frontier", "/policies/import", "/sessions", "/train"]);
 }
+
+/// A schema that is named by hand would otherwise be missed when its type is renamed.
+#[test]
+fn every_schema_that_is_named_exists() {
+    let whole: Value = serde_json::from_str(CHECKED_IN).unwrap();
+    let mut named = CHECKED_IN.split("#/components/schemas/").skip(1).map(|rest| rest.split('"').next().unwrap());
+    let unknown = named.find(|name| whole["components"]["schemas"].get(name).is_none());
+    assert_eq!(unknown, None);
+}
