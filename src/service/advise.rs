@@ -127,6 +127,12 @@ impl Sessions {
         checked.check_sensitivity(&investor)?;
         let shown = checked.specification.problem.history.len();
         let room = self.memory.answers(shown * ATOM_BYTES).await?;
-        Ok(Large { value: self.resolving.run(tenant, move || checked.answered(&investor.resolved())).await??, room })
+        Ok(Large {
+            value: self
+                .resolving
+                .run_on_record(tenant, shown, move || checked.answered(&investor.resolved()))
+                .await??,
+            room,
+        })
     }
 }

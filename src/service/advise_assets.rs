@@ -74,7 +74,9 @@ impl Sessions {
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
         let CheckedAssets { problem, holdings, fund } = question.checked()?;
         let fund = self.policies.one_period(&fund)?;
-        Ok(self.resolving.run(tenant, move || AssetsAdvised::of(&problem, &holdings, &fund)).await??)
+        let returns = problem.history.len();
+        let answer = move || AssetsAdvised::of(&problem, &holdings, &fund);
+        Ok(self.resolving.run_on_record(tenant, returns, answer).await??)
     }
 }
 

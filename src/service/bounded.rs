@@ -1,16 +1,17 @@
 //! Work that requests cause, bounded and shared fairly between tenants.
 //!
-//! A piece of work passes up to three stages. It begins in a place of the first stage, of which a tenant has half at most, and
-//! keeps it for 100 ms. Until it has worked for a second it shares the places of the second stage, where the piece that has
-//! worked least comes first. Longer pieces share the places of the third stage in turns of 250 ms. So a short question waits
-//! for moments, however long the questions of others are, and long questions share what is left.
-//! Each stage has a queue for every tenant, and the tenants take turns.
+//! A piece of work begins in a place of the first stage, of which a tenant has half at most, and keeps it for 100 ms.
+//! Longer work goes on in the second stage, whose places are fewer than the processors, in turns of 100 ms. Every second
+//! turn goes to the piece that has worked least, the others go round the tenants. So a short question waits for moments,
+//! however long the questions of others are, and long questions share what is left. A question about a long record
+//! begins in the second stage, because measuring its radius takes longer than a moment and cannot be interrupted.
+//! Each stage has a queue for every tenant.
 //!
-//! A queue of the second or third stage is bounded. When it is full, the tenant with the most pieces in it loses one; if every
+//! The queue of the second stage is bounded. When it is full, the tenant with the most pieces in it loses one; if every
 //! tenant has one, the piece that has worked longest is refused.
 //!
-//! A piece whose caller is gone, by a time limit, a closed connection or the end of the service, ends at its next checkpoint (see
-//! [`interruption`]). A piece that has waited too long for a place of the first stage is refused.
+//! A piece whose caller is gone, by a time limit, a closed connection or the end of the service, ends at its next
+//! checkpoint (see [`interruption`]). A piece that waits too long for a place of the first stage is refused.
 //! Checked by: the tests below and `tests/operation/interruption.rs`.
 
 mod stage;
@@ -22,19 +23,17 @@ use tokio::runtime::Handle;
 use tokio::sync::{oneshot, watch};
 use tracing::Instrument;
 
-use self::stage::{Stage, StageQueue};
+use self::stage::{Stage, StageQueue, TURN, rank};
 use super::allowance::Refused;
 use super::error::ServiceError;
 use super::spans;
 use crate::numerics::interruption::{self, Stopped, Watcher};
 use crate::store::Tenant;
 
-/// Pieces that may wait in the second stage, each on a thread of its own.
-const SECOND_WAITING: usize = 16;
-/// Pieces that may wait in the third stage. Few, because those that share a place must all end before their time limits.
-const LONG_WAITING: usize = 4;
-/// Threads that waiting pieces of one [`FairQueue`] may hold.
-pub(super) const WAITING_THREADS: usize = SECOND_WAITING + LONG_WAITING;
+/// Pieces that may wait in the second stage.
+pub(super) const LONG_WAITING: usize = 16;
+/// The measurement of the radius of a record with more returns takes longer than the first stage.
+const LONG_RECORD: usize = 1000;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
@@ -43,7 +42,7 @@ pub struct FairQueue {
     pub name: &'static str,
     /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
     pub of_one: usize,
-    lines: Arc<[Mutex<StageQueue<Granted>>; 3]>,
+    queues: Arc<[Mutex<StageQueue<Granted>>; 2]>,
     wait: Duration,
 }
 
@@ -52,7 +51,7 @@ pub struct FairQueue {
 pub struct QueueSize {
     /// In the first stage.
     pub first: usize,
-    /// In the second stage, and in the third.
+    /// In the second stage.
     pub long: usize,
 }
 
@@ -61,14 +60,14 @@ type Granted = Result<Permit, ServiceError>;
 
 /// The right to work, given up when dropped.
 struct Permit {
-    bounded: FairQueue,
+    queue: FairQueue,
     stage: Stage,
     tenant: Tenant,
 }
 
 /// A piece of work under way.
 struct Piece {
-    bounded: FairQueue,
+    queue: FairQueue,
     tenant: Tenant,
     /// Closed once the caller is gone.
     caller: watch::Receiver<()>,
@@ -89,13 +88,12 @@ struct PieceState {
 impl FairQueue {
     pub fn new(name: &'static str, QueueSize { first, long }: QueueSize, wait: Duration) -> Self {
         let of_one = first.div_ceil(2);
-        // How long a caller waits for the first stage is bounded, not how many do.
-        let queue = |(free, of_one, most)| Mutex::new(StageQueue::new(free, of_one, most));
-        let stages = [(first, of_one, usize::MAX), (long, long, SECOND_WAITING), (long, long, LONG_WAITING)];
-        FairQueue { name, of_one, lines: Arc::new(stages.map(queue)), wait }
+        // In the first stage the time that a caller waits is bounded, not the number of those that wait.
+        let stages = [StageQueue::new(first, of_one, usize::MAX), StageQueue::new(long, long, LONG_WAITING)];
+        FairQueue { name, of_one, queues: Arc::new(stages.map(Mutex::new)), wait }
     }
 
-    /// Runs `work` on a thread that may block. It ends early where the future is dropped.
+    /// Runs `work` on a thread that may block. It ends early if the future is dropped.
     ///
     /// # Errors
     /// [`ServiceError::Busy`] if no place became free in time, [`Refused::OwnWork`] if the tenant had all it may have; a panic
@@ -118,14 +116,38 @@ impl FairQueue {
         tenant: &Tenant,
         work: impl FnOnce() -> (T, P) + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let place = self.first_place(tenant).instrument(spans::of_turn()).await?;
+        self.run_from(Stage::First, tenant, work).await
+    }
+
+    /// Runs `work` on a record of so many returns as [`Self::run`] does.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub async fn run_on_record<T: Send + 'static>(
+        &self,
+        tenant: &Tenant,
+        returns: usize,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let stage = if returns > LONG_RECORD { Stage::Long } else { Stage::First };
+        self.run_from(stage, tenant, move || (work(), || ())).await
+    }
+
+    async fn run_from<T: Send + 'static, P: FnOnce()>(
+        &self,
+        stage: Stage,
+        tenant: &Tenant,
+        work: impl FnOnce() -> (T, P) + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let place = self.begin(stage, tenant).instrument(spans::of_turn()).await?;
         let (here, caller) = watch::channel(());
+        let held = PieceState { place: Some(place), since: Instant::now(), before: stage.begins() };
         let piece = Arc::new(Piece {
-            bounded: self.clone(),
+            queue: self.clone(),
             tenant: tenant.clone(),
             caller,
             refused: OnceLock::new(),
-            held: Mutex::new(PieceState { place: Some(place), since: Instant::now(), before: Duration::ZERO }),
+            held: Mutex::new(held),
         });
         let (done, answer) = oneshot::channel();
         tokio::task::spawn_blocking(move || {
@@ -148,37 +170,58 @@ impl FairQueue {
 
     /// Pieces that wait for a place.
     pub fn waiting(&self) -> usize {
-        [Stage::First, Stage::Second, Stage::Long].map(|stage| self.line(stage).waiting()).into_iter().sum()
+        [Stage::First, Stage::Long].map(|stage| self.stage(stage).waiting()).into_iter().sum()
     }
 
-    async fn first_place(&self, tenant: &Tenant) -> Result<Permit, ServiceError> {
-        let turn = self.line(Stage::First).ask(tenant, 0);
-        let Some(granted) = turn else { return Ok(self.place(Stage::First, tenant.clone())) };
-        let granted = tokio::time::timeout(self.wait, granted).await;
+    /// Waits for a place to begin in.
+    async fn begin(&self, stage: Stage, tenant: &Tenant) -> Result<Permit, ServiceError> {
+        let Some(granted) = self.ask(stage, tenant, 0)? else { return Ok(self.place(stage, tenant.clone())) };
+        if stage == Stage::Long {
+            return granted.await.map_err(ServiceError::internal)?;
+        }
         let late = |_| {
-            let line = self.line(Stage::First);
-            let is_own = line.running.contains_key(tenant) && line.is_full_of(tenant);
-            if is_own { Refused::OwnWork.into() } else { ServiceError::Busy }
+            let queue = self.stage(stage);
+            too_many(if queue.is_full_of(tenant) { queue.running_of(tenant) } else { 0 })
         };
-        granted.map_err(late)?.map_err(ServiceError::internal)?
+        tokio::time::timeout(self.wait, granted).await.map_err(late)?.map_err(ServiceError::internal)?
+    }
+
+    /// Takes a place and returns `None` if there is one for the tenant; else queues for it.
+    ///
+    /// # Errors
+    /// The queue is full, and no other piece should make room.
+    fn ask(
+        &self,
+        stage: Stage,
+        tenant: &Tenant,
+        rank: u128,
+    ) -> Result<Option<oneshot::Receiver<Granted>>, ServiceError> {
+        let mut queue = self.stage(stage);
+        if queue.is_full() {
+            let Some((grant, left)) = queue.give_up_one(tenant, rank) else {
+                return Err(too_many(queue.waiting_of(tenant)));
+            };
+            drop(grant.send(Err(too_many(left))));
+        }
+        Ok(queue.ask(tenant, rank))
     }
 
     fn place(&self, stage: Stage, tenant: Tenant) -> Permit {
-        Permit { bounded: self.clone(), stage, tenant }
+        Permit { queue: self.clone(), stage, tenant }
     }
 
-    fn line(&self, stage: Stage) -> MutexGuard<'_, StageQueue<Granted>> {
+    fn stage(&self, stage: Stage) -> MutexGuard<'_, StageQueue<Granted>> {
         // No code panics while holding the lock.
-        self.lines[stage as usize].lock().unwrap_or_else(PoisonError::into_inner)
+        self.queues[stage as usize].lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Permit {
     fn drop(&mut self) {
-        let next = self.bounded.line(self.stage).give_back(&self.tenant);
+        let next = self.queue.stage(self.stage).give_back(&self.tenant);
         if let Some((tenant, grant)) = next {
-            // Whoever stopped waiting in this instant drops it, and so hands it on.
-            drop(grant.send(Ok(self.bounded.place(self.stage, tenant))));
+            // A piece that stopped waiting in this instant drops the permit, which hands it on.
+            drop(grant.send(Ok(self.queue.place(self.stage, tenant))));
         }
     }
 }
@@ -190,64 +233,36 @@ impl Watcher for Piece {
 
     fn give_way(&self) {
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(stage) = held.place.as_ref().map(|place| place.stage) else { return };
-        let turn = held.since.elapsed();
-        if turn < stage.turn() {
+        let worked = held.since.elapsed();
+        if held.place.is_none() || worked < TURN {
             return;
         }
-        held.before += turn;
+        held.before += worked;
         held.since = Instant::now();
-        let next = Stage::after(held.before);
-        let entered = self.enter(next, next == stage, next.rank(held.before));
-        let granted = match entered {
-            Entered::Stays => return,
-            Entered::Refused(refused) => return drop(self.refused.set(refused)),
-            Entered::Granted => Some(Ok(self.bounded.place(next, self.tenant.clone()))),
-            Entered::Waits(granted) => {
-                held.place = None;
-                self.wait_for(granted)
+        // Given up first, so that another piece may have it.
+        held.place = None;
+        let place = match self.queue.ask(Stage::Long, &self.tenant, rank(held.before)) {
+            Ok(None) => Ok(self.queue.place(Stage::Long, self.tenant.clone())),
+            Ok(Some(granted)) => {
+                let Some(granted) = self.wait_for(granted) else { return };
+                held.since = Instant::now();
+                granted
             }
+            Err(refused) => Err(refused),
         };
-        held.since = Instant::now();
-        held.place = match granted {
-            Some(Ok(place)) => Some(place),
-            Some(Err(refused)) => {
-                let _ = self.refused.set(refused);
-                None
-            }
-            None => None,
-        };
+        match place {
+            Ok(place) => held.place = Some(place),
+            Err(refused) => drop(self.refused.set(refused)),
+        }
     }
 }
 
-/// What comes of a piece whose turn is over.
-enum Entered {
-    /// Nobody waits: it keeps its place.
-    Stays,
-    Granted,
-    Waits(oneshot::Receiver<Granted>),
-    Refused(ServiceError),
+/// Refuses a piece for want of a place, if its tenant has `own` others there.
+fn too_many(own: usize) -> ServiceError {
+    if own > 0 { Refused::OwnWork.into() } else { ServiceError::Busy }
 }
 
 impl Piece {
-    /// Asks for a place in a stage, in which it `is_in` already or not.
-    fn enter(&self, stage: Stage, is_in: bool, rank: u128) -> Entered {
-        let mut line = self.bounded.line(stage);
-        let waiting = line.waiting();
-        if is_in && waiting == 0 {
-            return Entered::Stays;
-        }
-        if !is_in && waiting >= line.most_waiting {
-            let Some((grant, is_one_of_several)) = line.give_up_one(&self.tenant, rank) else {
-                let own = line.waiting_of(&self.tenant) > 0;
-                return Entered::Refused(if own { Refused::OwnWork.into() } else { ServiceError::Busy });
-            };
-            let refused = if is_one_of_several { Refused::OwnWork.into() } else { ServiceError::Busy };
-            drop(grant.send(Err(refused)));
-        }
-        line.ask(&self.tenant, rank).map_or(Entered::Granted, Entered::Waits)
-    }
-
     /// Waits for a place or a refusal; `None` if the caller goes away first.
     fn wait_for(&self, granted: oneshot::Receiver<Granted>) -> Option<Granted> {
         let mut caller = self.caller.clone();
@@ -307,13 +322,13 @@ mod tests {
         (passed, tokio::spawn(async move { bounded.run(&of, work).await }))
     }
 
-    /// Waits until every place is free: so many of the first stage, and of each of the others.
+    /// Waits until every place is free: so many of the first stage, and of the second.
     async fn all_free(bounded: &FairQueue, [first, long]: [usize; 2]) {
         let is_free = |(stage, places): (Stage, usize)| {
-            let line = bounded.line(stage);
-            line.free == places && line.ring.is_empty() && line.queues.is_empty() && line.running.is_empty()
+            let queue = bounded.stage(stage);
+            queue.free == places && queue.ring.is_empty() && queue.queues.is_empty() && queue.running.is_empty()
         };
-        let stages = [(Stage::First, first), (Stage::Second, long), (Stage::Long, long)];
+        let stages = [(Stage::First, first), (Stage::Long, long)];
         until(|| stages.into_iter().all(is_free)).await;
     }
 
@@ -407,7 +422,7 @@ mod tests {
     #[tokio::test]
     async fn a_full_queue_takes_from_the_tenant_with_most() {
         let bounded = bounded(1, 1);
-        let mut all: Vec<_> = (0..SECOND_WAITING + 3).map(|_| busy(&bounded, "north", u64::MAX).1).collect();
+        let mut all: Vec<_> = (0..LONG_WAITING + 3).map(|_| busy(&bounded, "north", u64::MAX).1).collect();
         until(|| all.iter().any(tokio::task::JoinHandle::is_finished)).await;
         let first = all.iter().position(tokio::task::JoinHandle::is_finished).unwrap();
         let refused = all.swap_remove(first).await.unwrap();
@@ -422,10 +437,9 @@ mod tests {
     async fn a_short_piece_goes_before_long_ones_however_many_there_are() {
         let bounded = bounded(1, 1);
         let name = |number: usize| format!("tenant-{number}");
-        let all: Vec<_> = (0..SECOND_WAITING).map(|number| busy(&bounded, &name(number), u64::MAX)).collect();
-        // All of them are past the first stage.
-        until(|| all.iter().all(|(passed, _)| passed.load(Ordering::Relaxed) > 0)).await;
-        until(|| bounded.line(Stage::First).running.is_empty()).await;
+        let all: Vec<_> = (0..LONG_WAITING).map(|number| busy(&bounded, &name(number), u64::MAX)).collect();
+        // All of them have had a turn in each stage, 100 checkpoints and less each.
+        until(|| all.iter().all(|(passed, _)| passed.load(Ordering::Relaxed) > 200)).await;
         for _ in 0..5 {
             let started = Instant::now();
             assert!(busy(&bounded, "south", 150).1.await.unwrap().is_ok());
@@ -436,13 +450,28 @@ mod tests {
         all_free(&bounded, [1, 1]).await;
     }
 
+    /// A question about a long record that cannot be interrupted takes no place of the first stage.
+    #[tokio::test]
+    async fn a_long_record_begins_in_the_second_stage() {
+        let bounded = bounded(1, 1);
+        let ((release, held), begun) = (mpsc::channel::<()>(), bounded.clone());
+        let long = tokio::spawn(async move {
+            begun.run_on_record(&tenant("north"), LONG_RECORD + 1, move || held.recv().is_ok()).await
+        });
+        until(|| bounded.stage(Stage::Long).running.contains_key(&tenant("north"))).await;
+        assert_eq!(bounded.run_on_record(&tenant("north"), LONG_RECORD, || 7).await.unwrap(), 7);
+        release.send(()).unwrap();
+        assert!(long.await.unwrap().unwrap());
+        all_free(&bounded, [1, 1]).await;
+    }
+
     #[tokio::test]
     async fn work_whose_caller_went_away_ends() {
         let bounded = bounded(1, 1);
         let (passed, done) = busy(&bounded, "north", u64::MAX);
         until(|| passed.load(Ordering::Relaxed) > 0).await;
         done.abort();
-        until(|| bounded.line(Stage::First).free == 1).await;
+        until(|| bounded.stage(Stage::First).free == 1).await;
         let ended = passed.load(Ordering::Relaxed);
         tokio::time::sleep(Duration::from_millis(30)).await;
         assert_eq!(passed.load(Ordering::Relaxed), ended);

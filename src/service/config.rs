@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::allowance::Limits;
-use super::bounded::WAITING_THREADS;
+use super::bounded::LONG_WAITING;
 use super::memory::MemoryLimit;
 use crate::store::{PostgresUrl, Quotas};
 
@@ -117,11 +117,12 @@ pub const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 const OTHER_BLOCKING_THREADS: usize = 8;
 
 impl Config {
-    /// The most threads that work may block: one for each place of each stage and for each piece that waits after its first
-    /// stage, so that no work that has its turn waits for a thread, and a few more. Decoding is never long. A thread costs some megabytes of what its work allocated.
+    /// Returns the most threads that work may block: one for each place of each stage and for each piece that waits
+    /// after its first stage, so that no work that has its turn waits for a thread, and a few more. Decoding is never
+    /// long. A thread costs some megabytes of what its work allocated.
     pub fn blocking_threads(&self) -> usize {
         let begun = self.advice_limit + self.resolve_limit + self.decode_limit;
-        begun + 2 * (2 * self.long_limit + WAITING_THREADS) + OTHER_BLOCKING_THREADS
+        begun + 2 * (self.long_limit + LONG_WAITING) + OTHER_BLOCKING_THREADS
     }
 
     /// Returns the defaults for a folder: loopback, and every core for training.

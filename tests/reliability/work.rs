@@ -109,6 +109,8 @@ pub async fn ask(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> 
     let history: Vec<f64> = (0..SHORT).map(log_return).collect();
     let short = json!({ "problem": { "rate_per_step": 0.002, "history": history } });
     let others = tenants.others(TENANTS).await?;
+    // What the first answer finds out about the record is kept for the others.
+    median(&tenants.owner, &short, Duration::ZERO).await?;
     let alone = median(&tenants.owner, &short, Duration::from_secs(1)).await?;
     let end = Instant::now() + attack_time();
     let asking = join_all(others.iter().map(async |other| {

@@ -7,44 +7,29 @@ use tokio::sync::oneshot;
 
 use crate::store::Tenant;
 
-/// How long a piece is in the first stage, which most pieces end in.
-const FIRST: Duration = Duration::from_millis(100);
-/// How long a piece has worked when it enters the third stage.
-const SECOND: Duration = Duration::from_secs(1);
-/// How long a piece keeps a place of the second stage while others wait.
-const SECOND_TURN: Duration = Duration::from_millis(100);
-/// How long a piece keeps a place of the third stage while others wait.
-const LONG_TURN: Duration = Duration::from_millis(250);
+/// How long a piece keeps a place while others wait. Most pieces end within it.
+pub(super) const TURN: Duration = Duration::from_millis(100);
+
 /// How far a piece has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
     First,
-    Second,
     Long,
 }
 
 impl Stage {
-    /// The stage of a piece that has worked for so long.
-    pub fn after(worked: Duration) -> Stage {
-        match worked {
-            worked if worked < FIRST => Stage::First,
-            worked if worked < SECOND => Stage::Second,
-            _ => Stage::Long,
-        }
-    }
-
-    pub fn turn(self) -> Duration {
+    /// Returns how long a piece counts as having worked when it enters.
+    pub fn begins(self) -> Duration {
         match self {
-            Stage::First => FIRST,
-            Stage::Second => SECOND_TURN,
-            Stage::Long => LONG_TURN,
+            Stage::First => Duration::ZERO,
+            Stage::Long => TURN,
         }
     }
+}
 
-    /// Pieces of a lower rank come first; those of equal rank take turns.
-    pub fn rank(self, worked: Duration) -> u128 {
-        if self == Stage::Second { worked.as_millis() / SECOND_TURN.as_millis() } else { 0 }
-    }
+/// Returns the rank of a piece that has worked for so long: the piece of the lowest rank has worked least.
+pub(super) fn rank(worked: Duration) -> u128 {
+    worked.as_millis() / TURN.as_millis()
 }
 
 /// The places of one stage, and who waits for them.
@@ -52,14 +37,16 @@ pub(super) struct StageQueue<G> {
     /// Places that nobody has; while there are any, all who wait have as many as one tenant may.
     pub free: usize,
     /// Places that one tenant may have.
-    pub of_one: usize,
+    of_one: usize,
     /// Pieces that may wait.
-    pub most_waiting: usize,
+    most_waiting: usize,
     /// Places that each tenant has; none of them 0.
     pub running: HashMap<Tenant, usize>,
     /// Tenants that wait, whose turn is next first; each has a queue.
     pub ring: VecDeque<Tenant>,
     pub queues: HashMap<Tenant, VecDeque<WaitingPiece<G>>>,
+    /// True if the next place goes round the tenants, and not to the piece that has worked least.
+    goes_round: bool,
 }
 
 /// A piece that waits for a place.
@@ -71,16 +58,16 @@ pub(super) struct WaitingPiece<G> {
 impl<G> StageQueue<G> {
     pub fn new(free: usize, of_one: usize, most_waiting: usize) -> Self {
         let (running, queues) = (HashMap::new(), HashMap::new());
-        StageQueue { free, of_one, most_waiting, running, ring: VecDeque::new(), queues }
+        StageQueue { free, of_one, most_waiting, running, ring: VecDeque::new(), queues, goes_round: false }
     }
 
     fn may(&self, tenant: &Tenant) -> bool {
         self.free > 0 && !self.is_full_of(tenant)
     }
 
-    /// Whether the tenant has as many places as it may.
+    /// Returns true if the tenant has as many places as it may.
     pub fn is_full_of(&self, tenant: &Tenant) -> bool {
-        self.running.get(tenant).copied().unwrap_or_default() >= self.of_one
+        self.running_of(tenant) >= self.of_one
     }
 
     fn take(&mut self, tenant: &Tenant) {
@@ -88,7 +75,7 @@ impl<G> StageQueue<G> {
         *self.running.entry(tenant.clone()).or_default() += 1;
     }
 
-    /// Takes a place if there is one for the tenant: `None`. Else waits for it.
+    /// Takes a place and returns `None` if there is one for the tenant; else queues for it.
     pub fn ask(&mut self, tenant: &Tenant, rank: u128) -> Option<oneshot::Receiver<G>> {
         if self.may(tenant) {
             self.take(tenant);
@@ -103,7 +90,7 @@ impl<G> StageQueue<G> {
         Some(granted)
     }
 
-    /// Takes a place back, and gives it to the piece of the lowest rank, of equal ones to that of the tenant whose turn is next.
+    /// Takes a place back and passes it on: by turns to the tenant that has waited longest, and to the piece of the lowest rank.
     pub fn give_back(&mut self, tenant: &Tenant) -> Option<(Tenant, oneshot::Sender<G>)> {
         self.free += 1;
         if let Some(running) = self.running.get_mut(tenant) {
@@ -113,11 +100,13 @@ impl<G> StageQueue<G> {
             }
         }
         self.forget_gone();
-        let next = self.ring.iter().filter(|tenant| self.may(tenant));
-        let tenant = next.min_by_key(|tenant| self.queues.get(*tenant).and_then(first).map(|(_, rank)| rank))?.clone();
+        let mut next = self.ring.iter().filter(|tenant| self.may(tenant));
+        let least = |tenant: &&Tenant| self.queues.get(*tenant).and_then(first).map(|(_, rank)| rank);
+        let tenant = if self.goes_round { next.next() } else { next.min_by_key(least) }?.clone();
         let queue = self.queues.get_mut(&tenant)?;
-        let (at, _) = first(queue)?;
-        let WaitingPiece { grant, .. } = queue.remove(at)?;
+        let (least, _) = first(queue)?;
+        let WaitingPiece { grant, .. } = queue.remove(if self.goes_round { 0 } else { least })?;
+        self.goes_round = !self.goes_round;
         // The tenant goes to the end of the ring.
         self.ring.retain(|waiting| *waiting != tenant);
         if queue.is_empty() {
@@ -129,9 +118,9 @@ impl<G> StageQueue<G> {
         Some((tenant, grant))
     }
 
-    /// Removes from a full queue the piece that should make room for one of `tenant`, if any should. Also returns whether its
-    /// tenant has more pieces in the queue.
-    pub fn give_up_one(&mut self, tenant: &Tenant, rank: u128) -> Option<(oneshot::Sender<G>, bool)> {
+    /// Removes from a full queue the piece that should make room for one of `tenant`, if any should. Also returns how many
+    /// pieces its tenant keeps in the queue.
+    pub fn give_up_one(&mut self, tenant: &Tenant, rank: u128) -> Option<(oneshot::Sender<G>, usize)> {
         self.forget_gone();
         let worst = |(tenant, queue): (&Tenant, &VecDeque<WaitingPiece<G>>)| {
             let (at, rank) = queue.iter().map(|waiting| waiting.rank).enumerate().max_by_key(|&(_, rank)| rank)?;
@@ -144,7 +133,7 @@ impl<G> StageQueue<G> {
         let queue = self.queues.get_mut(&loser)?;
         let WaitingPiece { grant, .. } = queue.remove(at)?;
         self.forget_gone();
-        Some((grant, count > 1))
+        Some((grant, count - 1))
     }
 
     /// Forgets the pieces that wait no more.
@@ -157,6 +146,15 @@ impl<G> StageQueue<G> {
         ring.retain(|tenant| queues.contains_key(tenant));
     }
 
+    /// Returns true if no more pieces may wait.
+    pub fn is_full(&self) -> bool {
+        self.waiting() >= self.most_waiting
+    }
+
+    pub fn running_of(&self, tenant: &Tenant) -> usize {
+        self.running.get(tenant).copied().unwrap_or_default()
+    }
+
     pub fn waiting(&self) -> usize {
         self.queues.keys().map(|tenant| self.waiting_of(tenant)).sum()
     }
@@ -166,7 +164,7 @@ impl<G> StageQueue<G> {
     }
 }
 
-/// The place in a queue, and the rank, of its first piece of the lowest rank.
+/// Returns the position in a queue, and the rank, of its first piece of the lowest rank.
 fn first<G>(queue: &VecDeque<WaitingPiece<G>>) -> Option<(usize, u128)> {
     queue.iter().map(|waiting| waiting.rank).enumerate().min_by_key(|&(_, rank)| rank)
 }
