@@ -83,11 +83,11 @@ fn specification(horizon: usize, length: usize, paths: usize, count: usize) -> S
     serde_json::from_value::<Specification>(value).unwrap().completed().unwrap()
 }
 
-fn holds(what: &str, estimated: usize, taken: usize) {
-    println!("{what}: estimated {:.1} MB, taken {:.1} MB", estimated as f64 / 1e6, taken as f64 / 1e6);
-    assert!(taken <= estimated, "{what}: {taken} bytes taken, {estimated} estimated");
-    let generous = GENEROSITY * taken as f64 + GRANTED as f64;
-    assert!(estimated as f64 <= generous, "{what}: {estimated} bytes estimated, {taken} taken");
+fn holds(what: &str, estimated: usize, peak: usize) {
+    println!("{what}: estimated {:.1} MB, peak {:.1} MB", estimated as f64 / 1e6, peak as f64 / 1e6);
+    assert!(peak <= estimated, "{what}: {peak} bytes at the peak, {estimated} estimated");
+    let generous = GENEROSITY * peak as f64 + GRANTED as f64;
+    assert!(estimated as f64 <= generous, "{what}: {estimated} bytes estimated, {peak} at the peak");
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
         ("the history", specification(2, 6000, 200, 40)),
         ("the horizon", specification(60, 12, 0, 80)),
     ] {
-        let (taken, policy) = most_bytes(|| {
+        let (peak, policy) = most_bytes(|| {
             let kept = Cache::new(estimate::kept_by_training(&specification));
             let policy = pool.install(|| Training::with(&specification, kept).unwrap().run(&watch).unwrap());
             // As a worker stores it.
@@ -110,7 +110,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
             drop(copies);
             policy
         });
-        holds(what, estimate::training(&specification, THREADS).bytes(), taken);
+        holds(what, estimate::training(&specification, THREADS).bytes(), peak);
         prepared(what, policy);
     }
     for (what, request) in [
@@ -118,7 +118,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
         ("frameworks", json!({ "frameworks": ["adaptive", "plug_in"], "paths": 100 })),
     ] {
         let request = evaluation(request);
-        let (taken, _) = most_bytes(|| {
+        let (peak, _) = most_bytes(|| {
             let kept = Cache::new(estimate::kept_by_evaluation(&request));
             let evaluation = Evaluation::new(request.clone()).unwrap().keeping(kept);
             pool.install(|| {
@@ -134,7 +134,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
                     .unwrap()
             })
         });
-        holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);
+        holds(what, estimate::evaluation(&request, THREADS).bytes(), peak);
     }
     walk_forwards(&pool);
     walks_of_assets(&pool);
@@ -162,12 +162,12 @@ fn frontiers() {
         let progress = |progress: StepProgress| stop.store(progress.done > 0, Ordering::Relaxed);
         let watch = Watch { stop: &stop, progress: &progress };
         let pool = TrainingPool::new(1).unwrap();
-        let (taken, ended) = most_bytes(|| {
+        let (peak, ended) = most_bytes(|| {
             let frontier = Frontier::new(question, kept);
             pool.install(|| frontier.run(&watch))
         });
         assert_eq!(ended.err(), Some(TrainError::Stopped), "{what}");
-        holds(what, estimated, taken);
+        holds(what, estimated, peak);
     }
 }
 
@@ -186,25 +186,25 @@ fn walks_of_assets(pool: &TrainingPool) {
     let watch = Watch::unwatched();
     let backtest = request(30, 1912, 1900);
     let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
-    let (taken, _) = most_bytes(|| {
+    let (peak, _) = most_bytes(|| {
         let balls = pool.install(|| backtest.balls(&watch, &|| {})).unwrap();
         // Within the whole radius, where the adversary has most ways.
         let whole = |strategy: &AssetsStrategy| strategy.rule.caution() == Some(CautionLevel::Paper);
         let strategies: Vec<AssetsStrategy> = backtest.strategies().into_iter().filter(whole).take(THREADS).collect();
         pool.install(|| pool::map(strategies, |strategy| backtest.decide(strategy, &balls, &watch, &|| {}).unwrap()))
     });
-    holds("a long window", estimated, taken);
+    holds("a long window", estimated, peak);
     let backtest = request(20, 4000, 24);
     let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
     let (strategies, lived) = (backtest.strategies().len(), backtest.lived().len());
-    let (taken, _) = most_bytes(|| {
+    let (peak, _) = most_bytes(|| {
         let share = |period: usize| (0..20).map(|asset| 0.003 * (period + asset) as f64 % 0.05).collect();
         let held = vec![(0..lived).map(share).collect::<Vec<Vec<f64>>>(); strategies];
         let ball = FundsBall { radius_factor: 1.0, radius: 0.0123456789, levels: None };
         let balls = [vec![ball; lived]];
         serde_json::to_string(&AssetsBacktestReport::new(&backtest.walked(&balls, held))).unwrap()
     });
-    holds("a record of several assets", estimated, taken);
+    holds("a record of several assets", estimated, peak);
 }
 
 /// What walk-forwards take: the trainings of a stretch side by side, and the books of a long record.
@@ -215,7 +215,7 @@ fn walk_forwards(pool: &TrainingPool) {
         Backtest::new(serde_json::from_value(request).unwrap()).unwrap()
     };
     let backtest = request(30, 700, 6);
-    let (taken, _) = most_bytes(|| {
+    let (peak, _) = most_bytes(|| {
         let strategies = backtest.plain_strategies();
         let common = SharedWork::of(&strategies, Cache::new(estimate::kept_by_backtest(&backtest, THREADS)));
         let watch = Watch::unwatched();
@@ -223,10 +223,10 @@ fn walk_forwards(pool: &TrainingPool) {
             |strategy| backtest.walk.decide_stretch(strategy, &backtest.periods, 0, &common, (&watch, &|| {})).unwrap();
         pool.install(|| pool::map(strategies, decide))
     });
-    holds("a stretch", estimate::backtest(&backtest, THREADS).bytes(), taken);
+    holds("a stretch", estimate::backtest(&backtest, THREADS).bytes(), peak);
     let backtest = request(4000, 10, 60);
     let estimated = estimate::backtest(&backtest, THREADS).bytes();
-    let (taken, _) = most_bytes(|| {
+    let (peak, _) = most_bytes(|| {
         let held = |period: &ActualPeriod| {
             let share = (40.0 * period.log_return).abs().min(1.0);
             Decision { band: Band::of(&[share]), radius: 0.1 * share, source: None }
@@ -235,7 +235,7 @@ fn walk_forwards(pool: &TrainingPool) {
         let decisions = vec![held; backtest.strategies.len()];
         serde_json::to_string(&BacktestReport::new(&backtest.walked(decisions))).unwrap()
     });
-    holds("a record", estimated, taken);
+    holds("a record", estimated, peak);
 }
 
 fn evaluation(mut request: Value) -> EvaluationRequest {
@@ -255,7 +255,7 @@ fn prepared(what: &str, policy: Policy) {
     let advisor = Advisor::with(policy, Cache::new(2 * weighed));
     let state = advisor.initial_state(None, None).unwrap();
     advisor.prepare(last, &state);
-    let taken = NOW.load(Ordering::Relaxed).saturating_sub(before);
+    let kept = NOW.load(Ordering::Relaxed).saturating_sub(before);
     let unit = 1 << 20;
-    assert!(taken <= weighed + weighed / 4 + unit, "{what}: {taken} bytes kept, {weighed} weighed");
+    assert!(kept <= weighed + weighed / 4 + unit, "{what}: {kept} bytes kept, {weighed} weighed");
 }

@@ -56,7 +56,7 @@ pub struct History {
 pub struct Observation {
     /// The answer when it was reported, with its present number.
     #[serde(flatten)]
-    pub told: Observed,
+    pub answered: Observed,
     /// The first report of it.
     pub reported: Report,
     pub observed_ms: i64,
@@ -106,7 +106,8 @@ pub struct Correction {
     #[serde(flatten)]
     pub correction: Correct,
     /// The answer to it.
-    pub told: Corrected,
+    #[serde(rename = "told")]
+    pub answered: Corrected,
     pub corrected_ms: i64,
 }
 
@@ -115,7 +116,7 @@ pub struct Correction {
 pub struct Renewal {
     /// The answer to it.
     #[serde(flatten)]
-    pub told: Renewed,
+    pub answered: Renewed,
     /// Number of last returns that the law was made of; null if it used all.
     pub window: Option<usize>,
     pub renewed_ms: i64,
@@ -222,11 +223,11 @@ fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction
             EntryKind::Observation => {}
             EntryKind::Correction => corrections.push(Correction {
                 correction: content(entry, periods.names())?,
-                told: answer(entry, periods.names())?,
+                answered: answer(entry, periods.names())?,
                 corrected_ms: entry.created_ms,
             }),
             EntryKind::Renewal => renewals.push(Renewal {
-                told: answer(entry, periods.names())?,
+                answered: answer(entry, periods.names())?,
                 window: content::<Renew>(entry, periods.names())?.window,
                 renewed_ms: entry.created_ms,
             }),
@@ -254,7 +255,7 @@ fn observations(
             None => (answer::<Observed>(entry, periods.names())?, content(entry, periods.names())?),
         };
         let (answered, corrections) = (Observed { period: index + 1, ..acknowledged }, period.corrections.clone());
-        Ok(Observation { told: answered, reported, observed_ms: entry.created_ms, corrections, now })
+        Ok(Observation { answered, reported, observed_ms: entry.created_ms, corrections, now })
     };
     periods.all.iter().enumerate().map(row).collect()
 }

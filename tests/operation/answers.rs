@@ -5,24 +5,10 @@
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 
-use crate::support::App;
+use crate::support::{App, labelled, labels};
 
 /// Answers up to this size are not counted.
 const COUNTED_FROM: usize = 64 << 10;
-/// A letter of four bytes.
-const NAME: &str = "\u{10348}";
-
-/// Returns labels at all their limits.
-fn labels() -> Value {
-    let tags: Vec<String> = (0..20).map(|tag| format!("{}{tag:02}", NAME.repeat(48))).collect();
-    json!({ "name": NAME.repeat(100), "notes": NAME.repeat(2000), "tags": tags })
-}
-
-fn labelled(mut body: Value) -> Value {
-    let labels = labels();
-    body.as_object_mut().unwrap().extend(labels.as_object().unwrap().clone());
-    body
-}
 
 fn returns(count: usize) -> Vec<f64> {
     (0..count).map(|k| 0.004 + 0.02 * (1.7 * k as f64).sin()).collect()
@@ -158,7 +144,7 @@ impl Store {
             "patch /policies/{id}" => body(&of_policy, labels()),
             "post /sessions/{id}/corrections" => body(
                 &format!("{of_session}/corrections"),
-                json!({ "correction": 1, "period": 3, "log_return": 0.002, "reason": NAME.repeat(200), "confirm": true }),
+                json!({ "correction": 1, "period": 3, "log_return": 0.002, "reason": "\u{10348}".repeat(200), "confirm": true }),
             ),
             "get /sessions/{id}/history" => large(&format!("{of_session}/history")),
             "post /sessions/{id}/renewals" => {

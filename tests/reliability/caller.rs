@@ -80,7 +80,7 @@ impl Caller {
         self.request_with(method, path, "")
     }
 
-    /// A question with a body of JSON, if any; the connection ends with the answer where there is one.
+    /// A question as it goes over the wire, with a body of JSON unless that is empty.
     pub fn request_with(&self, method: &str, path: &str, body: &str) -> String {
         let key = self.key.as_deref().unwrap_or_default();
         let head = format!("{method} {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {key}\r\n");

@@ -12,7 +12,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::caller::Caller;
-use crate::scene::{HORIZON, Outcome, Tally, import, specification, undisturbed};
+use crate::scene::{HORIZON, Outcome, Tally, import, large_specification, specification, undisturbed};
 use crate::server::Site;
 use crate::support::patience::{patience, within};
 use crate::tenants::{Tenants, sessions};
@@ -223,11 +223,7 @@ pub async fn listers(trials: usize) -> Outcome {
 /// Lists of as many large jobs as a tenant may queue.
 async fn list(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     const JOBS: usize = 100;
-    const RETURNS: usize = 20_000;
-    let mut large = specification(2);
-    let history = (0..RETURNS).map(|index| 0.02 * (f64::from(index as u32)).sin());
-    large["problem"]["history"] = history.map(Value::from).collect();
-    large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    let large = large_specification();
     let mut queued = 0;
     // Keeps the worker from what is queued behind it.
     tenants.neighbour.train(&format!("long-{}", tally.trials), &specification(HORIZON)).await;

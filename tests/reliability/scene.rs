@@ -28,6 +28,14 @@ pub fn specification(horizon: usize) -> Value {
     specification
 }
 
+/// A training whose request is some hundreds of kilobytes.
+pub fn large_specification() -> Value {
+    let mut large = specification(2);
+    large["problem"]["history"] = (0..20_000).map(|index| Value::from(0.02 * f64::from(index).sin())).collect();
+    large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    large
+}
+
 /// The policy that a training of so many steps gives when nothing disturbs it.
 pub fn undisturbed(steps: usize) -> Vec<u8> {
     static POLICIES: Mutex<BTreeMap<usize, Vec<u8>>> = Mutex::new(BTreeMap::new());

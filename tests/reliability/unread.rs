@@ -1,5 +1,5 @@
-//! Answers as large as they get, asked for by many of whom half read nothing: the process stays within its memory, and others
-//! do not wait.
+//! Many callers ask for the largest answers, and half of them read nothing. The process stays within its memory, and other
+//! callers do not wait.
 
 use std::time::{Duration, Instant};
 
@@ -10,15 +10,15 @@ use tokio::net::TcpSocket;
 
 use crate::caller::{Answer, Caller};
 use crate::neighbours::{ANSWERED, Attack, attack_time};
-use crate::scene::{Outcome, Tally, specification, undisturbed};
+use crate::scene::{Outcome, Tally, large_specification, specification, undisturbed};
 use crate::server::Site;
 use crate::support::patience::within;
-use crate::support::trained;
+use crate::support::{labelled, trained};
 use crate::tenants::{Pulse, Tenants};
 
-/// Callers at each door; every second one reads nothing.
+/// Callers of each large question; every second one reads nothing.
 const CALLERS: usize = 50;
-/// Resident at most, under a limit of 1 GB.
+/// Resident memory at most, under a limit of 1 GB.
 const MOST_MB: usize = 1200;
 /// Periods of a session for each second of an attack.
 const PERIODS: usize = 150;
@@ -27,7 +27,7 @@ const SESSIONS: usize = 300;
 const JOBS: usize = 20;
 /// Returns of a session, each of which a worst law explains.
 const RETURNS: usize = 2000;
-/// Bytes of a policy that is none.
+/// Bytes of a body that is not a policy.
 const NO_POLICY: usize = 8 << 20;
 const READ_AT_ONCE: usize = 64 << 10;
 
@@ -36,14 +36,14 @@ pub async fn unread(trials: usize) -> Outcome {
 }
 
 /// A question with a large answer or a large body.
-struct Door {
+struct LargeQuestion {
     name: &'static str,
     request: String,
 }
 
 pub async fn leave(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     let (mut calls, mut notes) = (0, Vec::new());
-    for Door { name, request } in doors(&tenants.neighbour).await? {
+    for LargeQuestion { name, request } in questions(&tenants.neighbour).await? {
         let alive = Pulse::of(tenants.owner.another(), "/livez".to_owned());
         let advice = tenants.pulse("").await?;
         calls += call(&tenants.server.url, &request).await;
@@ -61,19 +61,19 @@ pub async fn leave(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
     Ok(calls)
 }
 
-async fn doors(caller: &Caller) -> Result<Vec<Door>, String> {
-    let door = |name, request| Door { name, request };
+async fn questions(caller: &Caller) -> Result<Vec<LargeQuestion>, String> {
+    let question = |name, request| LargeQuestion { name, request };
     let long = long(caller).await?;
     let sweep = sweep(caller).await?;
     label(caller).await?;
     queue(caller).await?;
     let no_policy = format!("{{\"steps\":[{}0]}}", "0,".repeat(NO_POLICY / 2));
     Ok(vec![
-        door("history", caller.request("GET", &format!("/sessions/{long}/history"))),
-        door("sessions", caller.request("GET", "/sessions?limit=1000")),
-        door("jobs", caller.request("GET", "/jobs?limit=1000")),
-        door("what-if", caller.request_with("POST", "/what-if", &sweep)),
-        door("import", caller.request_with("POST", "/policies/import", &no_policy)),
+        question("history", caller.request("GET", &format!("/sessions/{long}/history"))),
+        question("sessions", caller.request("GET", "/sessions?limit=1000")),
+        question("jobs", caller.request("GET", "/jobs?limit=1000")),
+        question("what-if", caller.request_with("POST", "/what-if", &sweep)),
+        question("import", caller.request_with("POST", "/policies/import", &no_policy)),
     ])
 }
 
@@ -84,7 +84,7 @@ fn made_of(answer: Option<Answer>, name: &str) -> Result<String, String> {
     }
 }
 
-/// The name of a policy trained here, once it is imported.
+/// Imports a policy; returns its name.
 async fn imported(caller: &Caller, policy: &[u8]) -> Result<String, String> {
     let policy: Value = serde_json::from_slice(policy).map_err(|error| error.to_string())?;
     made_of(caller.post("/policies/import", &policy).await, "policy")
@@ -94,7 +94,7 @@ fn log_return(number: usize) -> f64 {
     0.004 + 0.02 * (1.7 * number as f64).sin()
 }
 
-/// A session that goes on for as many periods as there is time for.
+/// Opens a rolling session and reports periods in proportion to the length of the attack.
 async fn long(caller: &Caller) -> Result<String, String> {
     let mut training = specification(2);
     training["problem"]["learning"] = json!({ "kind": "decay", "half_life": 1 });
@@ -113,7 +113,7 @@ async fn long(caller: &Caller) -> Result<String, String> {
     Ok(session)
 }
 
-/// A question with the largest answer: so many points, each with the worst law of a session of many returns.
+/// Returns a sweep whose points each carry the worst law of a session of many returns.
 async fn sweep(caller: &Caller) -> Result<String, String> {
     let policy = imported(caller, &undisturbed(2)).await?;
     let history: Vec<f64> = (0..RETURNS).map(log_return).collect();
@@ -122,23 +122,19 @@ async fn sweep(caller: &Caller) -> Result<String, String> {
     Ok(json!({ "session": session, "explain": "worst_case", "sweep": { "radius_scale": range } }).to_string())
 }
 
-/// Sessions with labels at their limits.
+/// Opens sessions with labels at their limits.
 async fn label(caller: &Caller) -> Result<(), String> {
     let policy = imported(caller, &undisturbed(2)).await?;
-    let wide = "\u{10348}";
-    let tags: Vec<String> = (0..20).map(|tag| format!("{}{tag:02}", wide.repeat(48))).collect();
-    let opening = json!({ "policy": policy, "name": wide.repeat(100), "notes": wide.repeat(2000), "tags": tags });
+    let opening = labelled(json!({ "policy": policy }));
     for _ in 0..SESSIONS {
         made_of(caller.post("/sessions", &opening).await, "session")?;
     }
     Ok(())
 }
 
-/// Jobs of large requests behind one that does not end.
+/// Queues jobs of large requests.
 async fn queue(caller: &Caller) -> Result<(), String> {
-    let mut large = specification(2);
-    large["problem"]["history"] = (0..20_000).map(|number| Value::from(log_return(number))).collect();
-    large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    let mut large = large_specification();
     for number in 0..JOBS {
         large["seed"] = json!(number);
         let answer = caller.train(&format!("unread-{number}"), &large).await;
@@ -149,7 +145,7 @@ async fn queue(caller: &Caller) -> Result<(), String> {
     Ok(())
 }
 
-/// Asks from all callers for as long as an attack lasts; how often.
+/// Asks from all callers until the attack ends; returns the number of calls.
 async fn call(url: &str, request: &str) -> usize {
     let (address, end) = (url.trim_start_matches("http://"), Instant::now() + attack_time());
     let calling = (0..CALLERS).map(async |number| {
@@ -157,7 +153,7 @@ async fn call(url: &str, request: &str) -> usize {
         while Instant::now() < end {
             let call = ask(address, request, number % 2 == 0);
             let left = end.saturating_duration_since(Instant::now());
-            // One that was refused or cut off asks again soon.
+            // A caller that is refused or cut off asks again soon.
             if !matches!(tokio::time::timeout(left, call).await, Ok(Ok(()))) {
                 tokio::time::sleep(Duration::from_millis(20)).await;
             }
@@ -168,7 +164,7 @@ async fn call(url: &str, request: &str) -> usize {
     join_all(calling).await.into_iter().sum()
 }
 
-/// One question: its answer is read to the end, or not at all until the server gives up.
+/// Asks once. The answer is read to its end, or not at all until the server gives up.
 async fn ask(address: &str, request: &str, reads: bool) -> std::io::Result<()> {
     let socket = TcpSocket::new_v4()?;
     if !reads {

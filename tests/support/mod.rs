@@ -58,6 +58,19 @@ macro_rules! over_either_store {
     };
 }
 
+/// Returns labels at all their limits, in letters of four bytes.
+pub fn labels() -> Value {
+    let letters = |count| "\u{10348}".repeat(count);
+    let tags: Vec<String> = (0..20).map(|tag| format!("{}{tag:02}", letters(48))).collect();
+    json!({ "name": letters(100), "notes": letters(2000), "tags": tags })
+}
+
+/// Returns the object `body` with such labels.
+pub fn labelled(mut body: Value) -> Value {
+    body.as_object_mut().expect("an object").extend(labels().as_object().expect("an object").clone());
+    body
+}
+
 /// Returns of stocks, bonds and gold in ten periods.
 pub const ROWS: [[f64; 3]; 10] = [
     [0.0231, 0.004, -0.011],

@@ -94,7 +94,7 @@ def test_an_index_is_read_or_refused_and_never_dropped(ballast: Ballast) -> None
     refused: dict[str, Any] = {
         "source is of type dict: must be a table": {"fund": PRICES},
         "source is of type NoneType: must be a table": None,
-        "from 1990 to 1993, which may be years or rows": counted,
+        "from 1990 to 1993, which may be years or row numbers": counted,
         "has 2 levels: must have one": several,
     }
     for message, wrong in refused.items():

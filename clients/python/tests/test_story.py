@@ -327,7 +327,7 @@ def test_a_walk_forward_ends_in_a_report(ballast: Ballast) -> None:
     for quarter, found in zip(range(8, 12), stock["wealth"], strict=True):
         wealth *= 1.02 + 0.03 * math.sin(1.7 * quarter)
         assert found == pytest.approx(wealth, rel=1e-12)
-    assert report["sentences"][0].startswith("With “Cautious, learns” a year from 100 ")
+    assert report["sentences"][0].startswith("With “Cautious, learns” a year that starts at 100 ")
 
 
 def test_a_frontier_tells_what_caution_costs(ballast: Ballast) -> None:
