@@ -38,7 +38,7 @@ const LONG_RECORD: usize = 1000;
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
 pub struct FairQueue {
-    /// What the work is, in traces and metrics.
+    /// The name of the work in traces and metrics.
     pub name: &'static str,
     /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
     pub of_one: usize,
@@ -55,7 +55,7 @@ pub struct QueueSize {
     pub long: usize,
 }
 
-/// What a waiting piece gets.
+/// The answer to a waiting piece.
 type Granted = Result<Permit, ServiceError>;
 
 /// The right to work, given up when dropped.
@@ -81,7 +81,7 @@ struct PieceState {
     /// `None` while it waits.
     place: Option<Permit>,
     since: Instant,
-    /// What it had worked before.
+    /// The time it worked before.
     before: Duration,
 }
 
@@ -432,7 +432,7 @@ mod tests {
         all_free(&bounded, [1, 1]).await;
     }
 
-    /// Of many tenants with a long piece each, one that has worked long makes room for one that begins.
+    /// Many tenants have a long piece each, and a short one is hardly delayed.
     #[tokio::test]
     async fn a_short_piece_goes_before_long_ones_however_many_there_are() {
         let bounded = bounded(1, 1);
