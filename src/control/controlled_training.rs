@@ -6,7 +6,6 @@ use std::ops::Range;
 use rand::RngExt;
 
 use crate::control::bellman::controlled::{ControlledSolution, ControlledStep, ControlledValue};
-use crate::control::bellman::problem::Problem;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
@@ -18,11 +17,12 @@ use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, Specification, SurrogateTarget, UtilitySpecification};
 use crate::control::request::support::Support;
 use crate::control::surrogate::design::GUARDS;
-use crate::control::surrogate::features::Features;
+use crate::control::surrogate::features::{FeatureSelection, Features};
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, Counts, DesignFitting};
 use crate::control::surrogate::stored::Solution;
+use crate::control::uncertainty::laws::Laws;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
@@ -30,7 +30,8 @@ use crate::numerics::streams::stream;
 /// A controlled problem with the value of every step but the first, which is solved on request.
 pub struct ControlledPolicy<'a, P> {
     problem: &'a P,
-    laws: Problem,
+    laws: Laws,
+    selection: FeatureSelection,
     /// Values of steps 1, 2 and so on.
     values: Vec<ControlledValue>,
 }
@@ -69,19 +70,21 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
             let rule = "must be given for a problem without a floor";
             return Err(FieldError::new("problem.support", "none", rule).into());
         }
-        let laws = Problem::new(&specification);
+        let laws = Laws::new(&specification);
+        let selection = FeatureSelection::new(&specification, laws.radii.varies(), laws.summarises_ball());
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
         let law = continuous_law(sampling_law, &specification.problem);
         let history = specification.problem.learning.law(&specification.problem.history);
         let described = problem.describe(0, start).len();
         let mut names: Vec<String> = (0..described).map(|index| format!("state_{index}")).collect();
-        names.extend(laws.selection.names());
+        names.extend(selection.names());
         let design = specification.design.count.unwrap_or(DEFAULT_COUNT);
         let counts = Counts::new(design, true, GUARDS);
         let (mut values, mut after): (Vec<ControlledValue>, Option<Solution>) = (Vec::new(), None);
         for step in (1..specification.problem.horizon).rev() {
-            let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };
-            let states = SimulatedStates { bellman, start, history: &history, law: &law };
+            let bellman = ControlledStep { problem, laws: &laws, selection: &selection, step, next: values.last() };
+            let states =
+                SimulatedStates { bellman, specification: &specification, start, history: &history, law: &law };
             if names.is_empty() {
                 values.push(ControlledValue::Constant(states.solve(0, states.features_at(0))?.floor_gain));
                 continue;
@@ -96,19 +99,21 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
             after = Some(learned.solution);
         }
         values.reverse();
-        Ok(ControlledPolicy { problem, laws, values })
+        Ok(ControlledPolicy { problem, laws, selection, values })
     }
 
     /// Solves the robust step at a state with the law of the noise known by then, against the value of the step after.
     /// `step` must be below the horizon.
     pub fn solve(&self, step: usize, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
-        ControlledStep { problem: self.problem, laws: &self.laws, step, next: self.values.get(step) }.solve(state, law)
+        let ControlledPolicy { problem, laws, selection, values } = self;
+        ControlledStep { problem: *problem, laws, selection, step, next: values.get(step) }.solve(state, law)
     }
 }
 
 /// States of one step under randomised actions and the sampling law.
 struct SimulatedStates<'a, P: Controlled> {
     bellman: ControlledStep<'a, P>,
+    specification: &'a Specification,
     start: &'a P::State,
     history: &'a EmpiricalDistribution,
     law: &'a ContinuousLaw,
@@ -117,18 +122,18 @@ struct SimulatedStates<'a, P: Controlled> {
 impl<P: Controlled> SimulatedStates<'_, P> {
     /// Simulates a state and its law. Streams: ("controlled", t, index) for each step.
     fn state(&self, index: usize) -> (P::State, EmpiricalDistribution) {
-        let (ControlledStep { problem, laws, .. }, mut state) = (&self.bellman, self.start.clone());
+        let (problem, specification, mut state) = (self.bellman.problem, self.specification, self.start.clone());
         let mut seen = Vec::with_capacity(self.bellman.step);
         for earlier in 0..self.bellman.step {
-            let mut generator = stream(laws.specification.seed, "controlled", earlier, index);
+            let mut generator = stream(specification.seed, "controlled", earlier, index);
             let actions = problem.actions(earlier, &state);
             let action = actions.lowest + (actions.highest - actions.lowest) * generator.random::<f64>();
-            let log_return = admissible(self.law.draw(&mut generator), &laws.specification.problem);
+            let log_return = admissible(self.law.draw(&mut generator), &specification.problem);
             state = problem.next(earlier, &state, action, log_return);
             seen.push(log_return);
         }
         let mut law = self.history.clone();
-        if laws.specification.problem.framework.learns() {
+        if specification.problem.framework.learns() {
             law.extend(&seen);
         }
         (state, law)

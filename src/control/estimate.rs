@@ -122,11 +122,11 @@ impl Sizes {
         let count = if single { 1 } else { specification.design.count.unwrap_or(DEFAULT_COUNT) };
         let framed = Problem::new(specification);
         let paths = problem.radius_rule().paths();
-        let bridges = framed.sets.heaviest(history, horizon);
+        let bridges = framed.laws.radii.heaviest(history, horizon);
         let holdings = framed.holdings(if single { HOLDINGS_OF_ONE_LAW } else { HOLDINGS });
         let functions = holdings.count() + framed.dynamics(0).sides().len();
         let inputs = framed.selection.names().len();
-        let atoms = framed.centring.atom_count(history + horizon);
+        let atoms = framed.laws.centring.atom_count(history + horizon);
         Sizes { horizon, history, atoms, count, inputs, functions, paths, bridges }
     }
 

@@ -21,17 +21,15 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::StepSolution;
 use crate::control::surrogate::accuracy::Aim;
 use crate::control::surrogate::design::Design;
-use crate::control::surrogate::features::{Features, LawSummary};
+use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, DesignFitting, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
+use crate::control::uncertainty::laws::LawSummary;
 use crate::control::uncertainty::measured::SharedSummaries;
 
 /// Summaries of the laws of a design.
 pub type LawSummaryCache = SharedSummaries<LawSummary>;
-
-/// Placeholder for a wealth that no feature uses.
-const NO_WEALTH: f64 = 1.0;
 
 /// A prepared training job: the completed specification and its simulated design.
 pub struct Training {
@@ -150,20 +148,22 @@ struct DesignSolver<'a> {
 impl Candidates for DesignSolver<'_> {
     fn features(&self, some: Range<usize>) -> Vec<Features> {
         let (problem, step) = (self.bellman.problem, self.bellman.step);
-        let Some(alpha) = problem.sets.alpha().filter(|_| problem.selection.has_ball()) else {
+        let Some(alpha) = problem.laws.radii.alpha().filter(|_| problem.laws.summarises_ball()) else {
             return some.map(|index| problem.features(step, &self.state(index))).collect();
         };
         let states = LazyCell::new(|| some.clone().map(|index| self.state(index)).collect::<Vec<State>>());
         let laws = self.measured.level(alpha, (step, some.clone()), |alphas| {
-            problem.summaries_of(&states.iter().map(|state| &state.law).collect::<Vec<_>>(), alphas)
+            problem.laws.summaries_of(&states.iter().map(|state| &state.law).collect::<Vec<_>>(), alphas)
         });
         let features = |(index, law): (usize, LawSummary)| {
             if let Some(known) = self.radii.get(index) {
                 known.get_or_init(|| law.radii.radius);
             }
             // Laws do not depend on the holdings: states are only needed if wealth is a feature.
-            let wealth = if problem.selection.has_wealth() { states[index - some.start].wealth } else { NO_WEALTH };
-            problem.features_of(step, wealth, &law)
+            match problem.selection.has_wealth() {
+                true => problem.features_of(step, states[index - some.start].wealth, &law),
+                false => problem.selection.after(Vec::new(), &law),
+            }
         };
         some.clone().zip(laws).map(features).collect()
     }

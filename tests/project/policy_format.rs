@@ -121,7 +121,7 @@ fn question(solved: &Advisor, step: usize, state: &State) -> Value {
     let mut question = json!({ "step": step, "wealth": state.wealth, "holding": state.holding, "returns": returns });
     let problem = solved.policy().problem(Default::default());
     if problem.specification.problem.radius.as_ref().is_some_and(|rule| json!(rule)["rule"] == "bridge") {
-        let radii = problem.sets.radii(&state.law, solved.radius(state));
+        let radii = problem.laws.radii.radii(&state.law, solved.radius(state));
         (question["radius"], question["radius_ahead"]) = (json!(radii.radius), json!(radii.radius_ahead));
     }
     question
@@ -200,8 +200,8 @@ fn another_program_finds_the_bridge_radius_with_random_numbers_of_its_own() {
         let specification = crate::support::policies::specification(request).resolved(&Cache::default());
         let problem = ballast::control::bellman::problem::Problem::new(&specification);
         let law = problem.specification.problem.learning.law(&HISTORY);
-        let measure = problem.sets.measure(&law);
-        let radii = problem.sets.radii(&law, measure.radius);
+        let measure = problem.laws.measure(&law);
+        let radii = problem.laws.radii.radii(&law, measure.radius);
         let question = json!({ "learning": learning, "returns": HISTORY, "alpha": alpha, "paths": paths });
         let found = python(&["bridge"], &question);
         let sizes = [law.effective_size(), law.effective_sizes_ahead()[0]];

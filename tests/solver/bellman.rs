@@ -388,8 +388,8 @@ fn what_is_frozen_is_the_set_of_the_history_at_every_state() {
     let start = State::new(&HISTORY, 100.0, Learning::default()).unwrap();
     let mut later = start.clone();
     later.law.push(0.2);
-    assert_eq!(frozen.uncertainty_set(&later), frozen.uncertainty_set(&start));
-    assert_eq!(frozen.uncertainty_set(&start), learning.uncertainty_set(&start));
-    assert_eq!(frozen.measure(&later), learning.measure(&start));
-    assert_ne!(learning.uncertainty_set(&later), learning.uncertainty_set(&start));
+    assert_eq!(frozen.laws.uncertainty_set(&later.law), frozen.laws.uncertainty_set(&start.law));
+    assert_eq!(frozen.laws.uncertainty_set(&start.law), learning.laws.uncertainty_set(&start.law));
+    assert_eq!(frozen.laws.measure(&later.law), learning.laws.measure(&start.law));
+    assert_ne!(learning.laws.uncertainty_set(&later.law), learning.laws.uncertainty_set(&start.law));
 }

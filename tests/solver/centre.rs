@@ -207,7 +207,7 @@ fn a_mixed_ball_has_the_radius_of_the_share_seen_but_for_a_fixed_one() {
         for seen in [0.03, -0.02] {
             let size = law.sample_size() as f64;
             let share = if shared { size / (size + weight) } else { 1.0 };
-            let (plain, mixed) = (plain.sets.measure(&law), mixed.sets.measure(&law));
+            let (plain, mixed) = (plain.laws.measure(&law), mixed.laws.measure(&law));
             assert!((mixed.radius / (plain.radius * share) - 1.0).abs() < 1e-12, "{rule} {plain:?} {mixed:?}");
             assert_eq!(mixed.quantile, plain.quantile, "the quantile is of the returns seen");
             law.push(seen);

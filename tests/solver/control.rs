@@ -100,7 +100,7 @@ fn the_bridge_quantile_of_decaying_weights_agrees_with_a_million_paths() {
         let history = &problem.specification.problem.history;
         let law = problem.specification.problem.learning.law(history);
         assert!((law.effective_size() / number("effective_size") - 1.0).abs() < 1e-13);
-        let measure = problem.sets.measure(&law);
+        let measure = problem.laws.measure(&law);
         let found = measure.quantile.unwrap();
         // Beside the error of the million, what is interpolated between the times of the bridges: a thousandth.
         let allowed = 4.0 * number("standard_error") + 1e-3 * found;

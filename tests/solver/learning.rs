@@ -135,7 +135,7 @@ fn measured(record: &[f64]) -> (f64, f64, f64) {
     let resolved = specification(request(1, bridge(), decay())).resolved(&Cache::default());
     let law = resolved.problem.learning.law(record);
     let problem = ballast::control::bellman::problem::Problem::new(&resolved);
-    (problem.sets.measure(&law).radius, law.raw_moments(1)[0], law.effective_size())
+    (problem.laws.measure(&law).radius, law.raw_moments(1)[0], law.effective_size())
 }
 
 #[tokio::test(flavor = "multi_thread")]

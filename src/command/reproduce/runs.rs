@@ -2,7 +2,6 @@
 
 use std::error::Error;
 
-use ballast::control::bellman::problem::Problem;
 use ballast::control::evaluation::paths::{Evaluation, Follower};
 use ballast::control::evaluation::report::EvaluationReport;
 use ballast::control::kept::Cache;
@@ -12,6 +11,7 @@ use ballast::control::problem::utility::utility;
 use ballast::control::request::evaluation::EvaluationRequest;
 use ballast::control::request::framework::Framework;
 use ballast::control::request::specification::Specification;
+use ballast::control::uncertainty::laws::Laws;
 use ballast::control::uncertainty::radius::RadiusEstimator;
 use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::streams::stream;
@@ -101,7 +101,7 @@ pub fn section(plan: &ReproductionPlan, workshop: &ComparisonRun) -> Result<Sect
 fn seek(plan: &ReproductionPlan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
     let specification = request.specification(Framework::Adaptive, None);
-    let sets = Problem::new(&specification).sets;
+    let radii = Laws::new(&specification).radii;
     let law = continuous_law(&paper::mixture(), &request.problem);
     // A history belongs to a table by the bridges of its policy. For the law of Q each group of histories has its own
     // bridges, and is the unit of the intervals.
@@ -110,10 +110,10 @@ fn seek(plan: &ReproductionPlan, evaluation: &Evaluation) -> (Quantiles, [Vec<Ve
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
         let seen = EmpiricalDistribution::new(&history);
-        let quantile = |sets: &RadiusEstimator| sets.measure(&seen).quantile.unwrap_or(f64::NAN);
+        let quantile = |radii: &RadiusEstimator| radii.measure(&seen).quantile.unwrap_or(f64::NAN);
         let seed = stream(request.seed, "reproduce-seek", index / GROUP, 1).random();
         let own = Specification { seed, ..specification.clone() };
-        (quantile(&sets), quantile(&RadiusEstimator::new(&own, kept.clone())), history)
+        (quantile(&radii), quantile(&RadiusEstimator::new(&own, kept.clone())), history)
     };
     let mut quantiles: Vec<f64> = Vec::new();
     let mut close: [Vec<Vec<f64>>; 2] = Default::default();

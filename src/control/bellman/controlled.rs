@@ -8,13 +8,12 @@
 //! at fewer returns.
 
 use super::field::{Field, Payoffs};
-use super::problem::Problem;
 use super::{BestResponse, best_response};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::dynamics::{Dynamics, Trade};
-use crate::control::problem::state::State;
-use crate::control::surrogate::features::Features;
+use crate::control::surrogate::features::{FeatureSelection, Features};
 use crate::control::surrogate::fitted::ValueSurrogate;
+use crate::control::uncertainty::laws::Laws;
 use crate::numerics::chebyshev::local_cubic;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -22,15 +21,15 @@ use crate::numerics::empirical::EmpiricalDistribution;
 /// the description costs, a value has kinks. Cubics are then good to a twentieth of the jump of its second derivative
 /// times the distance's square.
 const EVEN_ACTIONS: usize = 33;
-/// Placeholder for the wealth, which a law does not have.
-const NO_WEALTH: f64 = 1.0;
 
 /// The robust step of a controlled problem at every state of one step.
 pub struct ControlledStep<'a, P> {
     /// The controlled problem.
     pub problem: &'a P,
-    /// The uncertainty sets and the features of laws.
-    pub laws: &'a Problem,
+    /// The uncertainty sets and the summaries of laws.
+    pub laws: &'a Laws,
+    /// The features of a law.
+    pub selection: &'a FeatureSelection,
     /// Periods observed before this step.
     pub step: usize,
     /// The value of the step after; `None` at the horizon.
@@ -72,13 +71,12 @@ pub struct ControlledSolution {
 impl<P: Controlled> ControlledStep<'_, P> {
     /// Returns the features of a state and its law: the description, then the features of the law.
     pub fn features(&self, state: &P::State, law: &EmpiricalDistribution) -> Features {
-        let law = State { wealth: NO_WEALTH, holding: 0.0, law: law.clone() };
-        self.laws.features(self.step, &law).after(self.problem.describe(self.step, state))
+        self.selection.after(self.problem.describe(self.step, state), &self.laws.summary(law))
     }
 
     /// Solves the step. Cost: a prediction at each of some hundreds of returns, and some thirty actions priced.
     pub fn solve(&self, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
-        let set = self.laws.uncertainty_set(&State { wealth: NO_WEALTH, holding: 0.0, law: law.clone() });
+        let set = self.laws.uncertainty_set(law);
         let (problem, actions) = (self.problem, self.problem.actions(self.step, state));
         let baseline = problem.baseline(self.step, state);
         let field = |returns: Vec<f64>| {
@@ -141,13 +139,13 @@ impl<P: Controlled> Field for ControlledField<'_, P> {
     }
 
     fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_> {
-        let ControlledStep { problem, laws, step, next } = *self.step;
+        let ControlledStep { problem, laws, selection, step, next } = *self.step;
         let mut gains = Vec::new();
         if let Some(value) = next {
-            for (law, &log_return) in laws.features_with(self.law, NO_WEALTH, returns).into_iter().zip(returns) {
+            for (law, &log_return) in laws.summaries_with(self.law, returns).iter().zip(returns) {
                 for &action in &self.actions {
                     let next = self.next(action, log_return);
-                    let gain = value.gain(&law.clone().after(problem.describe(step + 1, &next)));
+                    let gain = value.gain(&selection.after(problem.describe(step + 1, &next), law));
                     gains.push(if problem.has_floor() { gain.max(0.0) } else { gain });
                 }
             }

@@ -101,14 +101,14 @@ impl BellmanStep<'_> {
     /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced, twice as many if trading
     /// costs.
     pub fn solve(&self, state: &State) -> RobustSolution {
-        let set = self.problem.uncertainty_set(state);
+        let set = self.problem.laws.uncertainty_set(&state.law);
         self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
     /// Solves the step with another radius for the uncertainty set of this step alone; the value of the step after
     /// stays.
     pub fn solve_within(&self, state: &State, radius: f64) -> RobustSolution {
-        let set = self.problem.uncertainty_set_within(state, radius);
+        let set = self.problem.laws.uncertainty_set_within(&state.law, radius);
         self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
@@ -117,8 +117,8 @@ impl BellmanStep<'_> {
     pub fn solve_for_design(&self, state: &State, radius: Option<f64>, holdings: Holdings) -> DesignSolution {
         let actions = self.actions(state);
         let set = match radius {
-            Some(radius) => Cow::Owned(self.problem.uncertainty_set_within(state, radius)),
-            None => self.problem.uncertainty_set(state),
+            Some(radius) => Cow::Owned(self.problem.laws.uncertainty_set_within(&state.law, radius)),
+            None => self.problem.laws.uncertainty_set(&state.law),
         };
         let (utility, dynamics) = (self.utility(state), self.problem.dynamics(self.step));
         let unit = self.problem.unit_of_action(self.step, state);
@@ -155,7 +155,7 @@ impl BellmanStep<'_> {
     /// Returns the worth of one action, the best or not.
     pub fn price(&self, state: &State, action: f64) -> RobustSolution {
         let only = ActionInterval { lowest: action, highest: action };
-        self.optimum(state, &self.problem.uncertainty_set(state), only, |_, _| ()).0
+        self.optimum(state, &self.problem.laws.uncertainty_set(&state.law), only, |_, _| ()).0
     }
 
     fn actions(&self, state: &State) -> ActionInterval {

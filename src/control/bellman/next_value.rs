@@ -79,8 +79,9 @@ impl NextValue {
             NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
                 let moves = self.depends_on_wealth(&problem.selection);
-                let features = problem.features_with(&state.law, dynamics.total(state.wealth, 0.0), returns);
-                for (features, &log_return) in features.iter().zip(returns) {
+                let total = dynamics.total(state.wealth, 0.0);
+                for (law, &log_return) in problem.laws.summaries_with(&state.law, returns).iter().zip(returns) {
+                    let features = &problem.selection.of(total, law);
                     if moves {
                         let totals = trades.iter().map(|trade| after.total(wealth(trade, log_return), 0.0));
                         table.extend(surrogate.predictions(features, totals.map(|x| problem.selection.wealth(x))));

@@ -20,18 +20,18 @@ mod curve;
 use sha2::{Digest, Sha256};
 
 pub use self::curve::{AllocationCurve, OnePeriodInvestor};
-use crate::control::bellman::problem::Problem;
 use crate::control::kept::{Cache, Key};
 use crate::control::pool;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::annualised::premium;
 use crate::control::request::caution::{CautionLevel, CautionLevels, CautionScale};
+use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::uncertainty::centre::record;
+use crate::control::uncertainty::laws::Laws;
 use crate::control::uncertainty::radius::RadiusEstimator;
 use crate::numerics::block_bootstrap::circular_blocks;
-use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::streams::stream;
 
 /// Records drawn of a world. For long records the number is capped by the returns in all, but is at least the last
@@ -92,9 +92,9 @@ impl Specification {
 
     fn found(&self, kept: &Cache) -> CautionLevels {
         let history = record(&self.problem.history, &self.problem);
-        let problem = Problem::with(self, kept.clone());
+        let laws = Laws::with(self, kept.clone());
         let worlds = Worlds::of(&history, &self.problem);
-        let losses = worlds.losses(&problem, &history, self.seed);
+        let losses = worlds.losses(&laws, self.problem.learning, &history, self.seed);
         worlds.levels(&losses)
     }
 }
@@ -137,9 +137,8 @@ impl Worlds {
         }
     }
 
-    fn losses(&self, problem: &Problem, history: &[f64], seed: u64) -> SimulatedLosses {
+    fn losses(&self, laws: &Laws, learning: Learning, history: &[f64], seed: u64) -> SimulatedLosses {
         let count = (RETURNS / history.len()).clamp(LEAST_RECORDS, RECORDS);
-        let learning = problem.specification.problem.learning;
         let draw = |index: usize| {
             let indices = circular_blocks(history.len(), BLOCK, &mut stream(seed, "caution", 0, index));
             indices.into_iter().map(|index| history[index]).collect::<Vec<f64>>()
@@ -148,12 +147,11 @@ impl Worlds {
         let parts: Vec<usize> = (0..count).step_by(together).collect();
         let of_part = |first: usize| {
             let records: Vec<Vec<f64>> = (first..(first + together).min(count)).map(draw).collect();
-            let laws: Vec<EmpiricalDistribution> = records.iter().map(|record| learning.law(record)).collect();
-            let radii: Vec<f64> = laws.iter().map(|law| problem.sets.radius(law)).collect();
+            let radii: Vec<f64> = records.iter().map(|record| laws.radii.radius(&learning.law(record))).collect();
             let allocations = |shift: f64| {
                 let of_record = |(record, radius): (&Vec<f64>, &f64)| {
                     let shifted: Vec<f64> = record.iter().map(|z| z + shift).collect();
-                    let centre = problem.centring.centre(&learning.law(&shifted));
+                    let centre = laws.centring.centre(&learning.law(&shifted));
                     let curve = AllocationCurve::of(&centre, self.investor);
                     (0..=SCALES).map(|scale| curve.at(radius * share(scale))).collect::<Vec<f64>>()
                 };

@@ -89,7 +89,7 @@ impl Advisor {
 
     /// Returns the bytes of the largest bridges of a session of `periods` periods that starts from `sample_size` returns.
     pub fn heaviest_bridges(&self, sample_size: usize, periods: usize) -> usize {
-        self.problem.sets.heaviest(sample_size, periods)
+        self.problem.laws.radii.heaviest(sample_size, periods)
     }
 
     /// Returns the policy.
@@ -171,13 +171,13 @@ impl Advisor {
             Some((stored, prepared)) => (stored.count(), prepared.factor.is_in(&self.kept)),
             None => (0, true),
         };
-        let cost = self.problem.cost(state);
+        let cost = self.problem.laws.cost(&state.law);
         is_ready && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
     }
 
     /// Prepares what [`Self::is_prompt`] checks for.
     pub fn prepare(&self, step: usize, state: &State) {
-        self.problem.prepare(state);
+        self.problem.laws.prepare(&state.law);
         if let Some((stored, prepared)) = self.surrogates(step) {
             prepared.factor.process(&self.kept, stored);
         }
@@ -224,7 +224,7 @@ impl Advisor {
 
     /// Returns the radius of the uncertainty set at a state, as in an advice.
     pub fn radius(&self, state: &State) -> f64 {
-        self.problem.radius(state)
+        self.problem.laws.radius(&state.law)
     }
 
     /// Returns the allocation and the floor gain that the surrogates predict, for any state.
@@ -328,12 +328,12 @@ impl Advisor {
 
     /// Returns the least mean of e^Z, Z the return, among the laws of a state's ball.
     pub fn worst_mean(&self, state: &State) -> f64 {
-        self.problem.worst_mean(state)
+        self.problem.laws.worst_mean(&state.law)
     }
 
     /// Returns sample size, moments, quantile and radius of a state.
     pub fn uncertainty(&self, state: &State) -> Uncertainty {
-        let Measure { radius, quantile } = self.problem.measure(state);
+        let Measure { radius, quantile } = self.problem.laws.measure(&state.law);
         Uncertainty {
             sample_size: state.law.sample_size(),
             effective_size: state.law.effective_size(),

@@ -3,8 +3,7 @@
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::specification::{FeatureMap, Specification};
-use crate::control::uncertainty::radius::Radii;
-use crate::numerics::moments::CentralMoments;
+use crate::control::uncertainty::laws::LawSummary;
 
 /// Standard deviations below this count as this: the log stays finite.
 const SMALLEST_DEVIATION: f64 = 1e-8;
@@ -31,32 +30,10 @@ pub struct FeatureSelection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Features(pub(super) Vec<f64>);
 
-impl Features {
-    /// Returns the features of a law after those of a physical state.
-    pub fn after(self, mut described: Vec<f64>) -> Features {
-        described.extend(self.0);
-        Features(described)
-    }
-}
-
-/// The quantities of an empirical law and its ball from which the features are made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LawSummary {
-    /// Moments of the empirical law.
-    pub moments: CentralMoments,
-    /// Radii of its uncertainty set.
-    pub radii: Radii,
-    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball around the law of the returns seen: the gain of the first unit of
-    /// allocation against the worst law. If that law is the centre its sign decides whether anything is held at the
-    /// last step.
-    pub robust_excess: f64,
-    /// The variance of `e^Z / (1 + r)` under that law.
-    pub robust_variance: f64,
-}
-
 impl FeatureSelection {
-    /// Selects the features. `radius_varies` is true if laws of one sample size have different radii.
-    pub fn new(specification: &Specification, radius_varies: bool) -> Self {
+    /// Selects the features. `radius_varies` is true if laws of one sample size have different radii, and `ball` if
+    /// summaries of laws include the ball.
+    pub fn new(specification: &Specification, radius_varies: bool, ball: bool) -> Self {
         let problem = &specification.problem;
         let learns = problem.framework.learns();
         let parametric = problem.framework.is_parametric();
@@ -68,7 +45,7 @@ impl FeatureSelection {
             wealth: problem.depends_on_wealth(),
             moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
             radius: learns && radius_varies && map == FeatureMap::Standardized,
-            ball: learns && !parametric && map == FeatureMap::Standardized,
+            ball,
             risk_aversion: RelativeUtility::new(problem.utility, total).relative_risk_aversion(),
         }
     }
@@ -76,11 +53,6 @@ impl FeatureSelection {
     /// Returns true if wealth is the first feature.
     pub fn has_wealth(&self) -> bool {
         self.wealth
-    }
-
-    /// Returns true if the features depend on the ball and not on its centre alone.
-    pub fn has_ball(&self) -> bool {
-        self.ball
     }
 
     /// Returns the names of the features, in order.
@@ -123,11 +95,15 @@ impl FeatureSelection {
     /// investor with one period alone. The robust allocation and its value change most where the ratio passes 0 and 1;
     /// asinh compresses its ends, which matter less.
     pub fn of(&self, total: f64, law: &LawSummary) -> Features {
+        let described = if self.wealth { vec![self.wealth(total)] } else { Vec::new() };
+        self.after(described, law)
+    }
+
+    /// Returns the features of a law after those that describe the rest of a state.
+    pub fn after(&self, described: Vec<f64>, law: &LawSummary) -> Features {
         let LawSummary { moments, radii, robust_excess, robust_variance } = law;
-        let mut features = Vec::with_capacity(self.moments + 5);
-        if self.wealth {
-            features.push(self.wealth(total));
-        }
+        let mut features = described;
+        features.reserve_exact(self.moments + 4);
         for order in 1..=self.moments {
             features.push(match self.map {
                 FeatureMap::Standardized => moments.shape(order, SMALLEST_DEVIATION),

@@ -6,6 +6,7 @@
 
 pub mod centre;
 mod correction;
+pub mod laws;
 pub mod measured;
 pub mod radius;
 

@@ -1,0 +1,255 @@
+//! What is believed of the coming return: a framework turns the law of the returns seen into an uncertainty set, and
+//! into the summary from which the features of a law are made.
+//!
+//! No wealth, no action and no utility: every controlled problem uses the same laws.
+
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
+use super::UncertaintySet;
+use super::centre::{Centre, Centring};
+use super::radius::{Measure, Radii, RadiusEstimator};
+use crate::control::kept::Cache;
+use crate::control::request::framework::Framework;
+use crate::control::request::rules::LOG_RETURN;
+use crate::control::request::specification::{FeatureMap, Specification};
+use crate::control::request::support::{LawExtent, Support};
+use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
+use crate::numerics::moments::CentralMoments;
+
+/// Smallest variance of an estimated law. With decaying weights no other may be left; an accepted history varies more,
+/// however long its session lasts.
+const SMALLEST_VARIANCE: f64 = 1e-18;
+/// Radii in a summary that leaves the ball out.
+const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
+
+/// The uncertainty sets of a completed specification, and the summaries of its laws.
+pub struct Laws {
+    framework: Framework,
+    support: Support,
+    /// 1 + r, the growth of the bank per step.
+    bank: f64,
+    /// True if summaries include the ball, because features use it.
+    summarises_ball: bool,
+    /// Radii of the uncertainty sets.
+    pub radii: RadiusEstimator,
+    /// Centres of the uncertainty sets.
+    pub centring: Centring,
+    /// The centre of every ball, if nothing is learned.
+    fixed_centre: Option<Centre>,
+    /// The uncertainty set of every law, if nothing is learned; computed once.
+    fixed: OnceLock<FixedSet>,
+}
+
+struct FixedSet {
+    set: UncertaintySet,
+    measure: Measure,
+}
+
+/// A law and its ball in the quantities from which features are made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawSummary {
+    /// Moments of the empirical law.
+    pub moments: CentralMoments,
+    /// Radii of its uncertainty set.
+    pub radii: Radii,
+    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball around the law of the returns seen: the gain of the first unit of
+    /// allocation against the worst law. If that law is the centre its sign decides whether anything is held at the
+    /// last step.
+    pub robust_excess: f64,
+    /// The variance of `e^Z / (1 + r)` under that law.
+    pub robust_variance: f64,
+}
+
+impl Laws {
+    /// Builds the laws of a completed specification with an empty cache.
+    pub fn new(specification: &Specification) -> Self {
+        Laws::with(specification, Cache::default())
+    }
+
+    /// Builds the laws of a completed specification with `kept` as the cache of recomputable results.
+    pub fn with(specification: &Specification, kept: Cache) -> Self {
+        let problem = &specification.problem;
+        let framework = problem.framework;
+        let learns = framework.learns() && !problem.centre.takes_order();
+        let is_ball = framework.learns() && !framework.is_parametric();
+        Laws {
+            framework,
+            support: problem.support_rule(),
+            bank: 1.0 + problem.rate_per_step,
+            summarises_ball: is_ball && specification.surrogate.features == FeatureMap::Standardized,
+            radii: RadiusEstimator::new(specification, kept),
+            centring: Centring::of(problem),
+            fixed_centre: (!learns).then(|| Centre::frozen(problem)),
+            fixed: OnceLock::new(),
+        }
+    }
+
+    fn learns(&self) -> bool {
+        self.fixed_centre.is_none()
+    }
+
+    /// Returns true if summaries include the ball.
+    pub fn summarises_ball(&self) -> bool {
+        self.summarises_ball
+    }
+
+    /// Returns the uncertainty set at a law: around the law itself if the framework learns.
+    pub fn uncertainty_set(&self, law: &EmpiricalDistribution) -> Cow<'_, UncertaintySet> {
+        match &self.fixed_centre {
+            None => Cow::Owned(self.learned_set(law, self.radii.radius(law))),
+            Some(centre) => Cow::Borrowed(&self.fixed(centre).set),
+        }
+    }
+
+    /// Returns the uncertainty set with this radius, in the same unit: the known radius of the law, or a hypothetical
+    /// one.
+    pub fn uncertainty_set_within(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
+        match &self.fixed_centre {
+            None => self.learned_set(law, radius),
+            Some(centre) => self.fixed(centre).set.clone().with_radius(radius, self.support),
+        }
+    }
+
+    /// Returns the radius of the uncertainty set at a law.
+    pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
+        match &self.fixed_centre {
+            None => self.radii.radius(law),
+            Some(centre) => self.fixed(centre).measure.radius,
+        }
+    }
+
+    /// Returns the radius at a law and its parts.
+    pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
+        match &self.fixed_centre {
+            None => self.radii.measure(law),
+            Some(centre) => self.fixed(centre).measure,
+        }
+    }
+
+    /// Returns how many numbers are read to measure a law, or `None` if these are yet to be computed.
+    pub fn cost(&self, law: &EmpiricalDistribution) -> Option<usize> {
+        if self.learns() { self.radii.cost(law.sample_size()) } else { self.fixed.get().map(|_| 0) }
+    }
+
+    /// Computes the data that measuring a law reads.
+    pub fn prepare(&self, law: &EmpiricalDistribution) {
+        match &self.fixed_centre {
+            None => self.radii.prepare(law.sample_size()),
+            Some(centre) => _ = self.fixed(centre),
+        }
+    }
+
+    /// Returns the least mean of e^Z, Z the return, among the laws of the ball around a law.
+    pub fn worst_mean(&self, law: &EmpiricalDistribution) -> f64 {
+        let lowest = self.lowest_return(|| extent(law, CentralMoments::of(law), None));
+        let radius = self.radii.of_returns(self.radius(law), law.effective_size());
+        ExponentialMean::of(law).worst(radius, lowest).mean
+    }
+
+    /// Returns an upper bound on the returns of the centre while `periods` more returns are learned, each of them at
+    /// most the bound before it. For estimates that are learned, it is the best return accepted.
+    pub fn best_return(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
+        match (&self.fixed_centre, self.framework.is_parametric()) {
+            (Some(centre), _) => self.fixed(centre).set.best_return(),
+            (None, true) => LOG_RETURN,
+            (None, false) => self.centring.highest(law, periods),
+        }
+    }
+
+    fn fixed(&self, centre: &Centre) -> &FixedSet {
+        self.fixed.get_or_init(|| {
+            let history = &self.radii.learned;
+            let measure = self.radii.measure(history);
+            let set = match self.framework.is_parametric() {
+                true => self.learned_set(history, measure.radius),
+                false => UncertaintySet::around(centre.clone(), measure.radius, self.support),
+            };
+            FixedSet { set, measure }
+        })
+    }
+
+    /// Returns the set of the framework around an empirical law.
+    fn learned_set(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
+        if !self.framework.is_parametric() {
+            return UncertaintySet::around(self.centring.centre(law), radius, self.support);
+        }
+        let moments = CentralMoments::of(law);
+        let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance().max(SMALLEST_VARIANCE) };
+        UncertaintySet::Region(ConfidenceRegion { estimate, radius })
+    }
+
+    /// Returns the summary of a law.
+    pub fn summary(&self, law: &EmpiricalDistribution) -> LawSummary {
+        self.summary_within(law, if self.summarises_ball { self.radius(law) } else { 0.0 })
+    }
+
+    /// Returns the summary of a law whose radius is known already.
+    pub fn summary_within(&self, law: &EmpiricalDistribution, radius: f64) -> LawSummary {
+        match self.summarises_ball {
+            true => self.summaries_within(law, &[self.radii.radii(law, radius)])[0],
+            false => without_ball(CentralMoments::of(law)),
+        }
+    }
+
+    /// Returns the summaries of laws of one size with their balls: law by law, at each miscoverage.
+    pub fn summaries_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<LawSummary>> {
+        let radii = self.radii.radii_of(laws, alphas);
+        laws.iter().zip(radii).map(|(law, radii)| self.summaries_within(law, &radii)).collect()
+    }
+
+    /// Returns the summaries of one law within each of `radii`.
+    fn summaries_within(&self, law: &EmpiricalDistribution, radii: &[Radii]) -> Vec<LawSummary> {
+        let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law));
+        let lowest = self.lowest_return(|| extent(law, moments, None));
+        let of_returns = |radius: f64| self.radii.of_returns(radius, law.effective_size());
+        radii
+            .iter()
+            .map(|&radii| self.with_ball(moments, radii, mean.worst(of_returns(radii.radius), lowest)))
+            .collect()
+    }
+
+    /// Returns the summaries of the laws that follow from `law` when each of `returns` (ascending) is learned.
+    pub fn summaries_with(&self, law: &EmpiricalDistribution, returns: &[f64]) -> Vec<LawSummary> {
+        let before = CentralMoments::of(law);
+        if !self.learns() {
+            return vec![without_ball(before); returns.len()];
+        }
+        if !self.summarises_ball {
+            return returns.iter().map(|&log_return| without_ball(before.with(log_return))).collect();
+        }
+        let (mean, [size, _]) = (ExponentialMean::of(law), law.effective_sizes_ahead());
+        let summary = |(&log_return, radii): (&f64, Radii)| {
+            let moments = before.with(log_return);
+            let lowest = self.lowest_return(|| extent(law, moments, Some(log_return)));
+            let worst = mean.worst_with(log_return, self.radii.of_returns(radii.radius, size), lowest);
+            self.with_ball(moments, radii, worst)
+        };
+        returns.iter().zip(self.radii.radii_with(law, returns)).map(summary).collect()
+    }
+
+    fn with_ball(&self, moments: CentralMoments, radii: Radii, worst: WorstExponential) -> LawSummary {
+        let WorstExponential { mean, variance } = worst;
+        let [robust_excess, robust_variance] = [mean / self.bank - 1.0, variance / (self.bank * self.bank)];
+        LawSummary { moments, radii, robust_excess, robust_variance }
+    }
+
+    /// Returns the least return to which a seen return may be moved.
+    fn lowest_return(&self, law: impl FnOnce() -> LawExtent) -> f64 {
+        self.support.around(law).map_or(f64::NEG_INFINITY, |support| support.min)
+    }
+}
+
+/// Returns the extent of a law of these moments, including one more return if there is one.
+fn extent(law: &EmpiricalDistribution, moments: CentralMoments, added: Option<f64>) -> LawExtent {
+    let atoms = law.atoms();
+    let seen = [atoms.first(), atoms.last()].map(|end| end.copied().or(added).unwrap_or_default());
+    let ends = added.map_or(seen, |z| [seen[0].min(z), seen[1].max(z)]);
+    LawExtent { ends, mean: moments.mean(), variance: moments.variance() }
+}
+
+fn without_ball(moments: CentralMoments) -> LawSummary {
+    LawSummary { moments, radii: NO_BALL, robust_excess: 0.0, robust_variance: 0.0 }
+}
