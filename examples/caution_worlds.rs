@@ -15,9 +15,9 @@ use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::annualised::premium;
 use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
-use ballast::numerics::block_bootstrap::circular_blocks;
-use ballast::numerics::streams::stream;
-use ballast::service::advise::Advise;
+use ballast::numerics::machine::streams::stream;
+use ballast::numerics::statistics::block_bootstrap::circular_blocks;
+use ballast::service::advice::advise::Advise;
 
 const MONTHS: [usize; 4] = [60, 120, 240, 480];
 const PARTS: [f64; 3] = [0.0, 0.5, 1.0];

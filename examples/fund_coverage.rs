@@ -10,8 +10,8 @@
 
 use std::error::Error;
 
-use ballast::numerics::fund_bridges::{FundBridges, fund_returns};
-use ballast::numerics::streams::stream;
+use ballast::numerics::bridge::funds::{FundBridges, fund_returns};
+use ballast::numerics::machine::streams::stream;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

@@ -17,7 +17,7 @@ use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::controlled::Controlled;
 use ballast::control::progress::Watch;
 use ballast::control::request::specification::Specification;
-use ballast::numerics::empirical::EmpiricalDistribution;
+use ballast::numerics::law::empirical::EmpiricalDistribution;
 use serde_json::json;
 
 const PERIODS: usize = 3;

@@ -11,10 +11,10 @@ use ballast::control::progress::Watch;
 use ballast::control::request::specification::Specification;
 use ballast::control::surrogate::stored::Solution;
 use ballast::control::training::Training;
-use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::gp::{GaussianProcess, Hyperparameters};
-use ballast::numerics::minimise::maximise_concave_scalar;
-use ballast::numerics::wasserstein::{WassersteinBall, WorstLaw};
+use ballast::numerics::law::empirical::EmpiricalDistribution;
+use ballast::numerics::search::minimise::maximise_concave_scalar;
+use ballast::numerics::transport::wasserstein::{WassersteinBall, WorstLaw};
 use nalgebra::DMatrix;
 use serde_json::json;
 

@@ -6,7 +6,7 @@ mod command;
 
 use std::process::ExitCode;
 
-use ballast::service::config::Config;
+use ballast::service::process::config::Config;
 use clap::{Parser, Subcommand};
 use command::{
     advise, audit, backtest, backup, bench, check, coverage, demo, evaluate, frontier, healthcheck, keys, loadtest,

@@ -4,17 +4,17 @@
 use std::sync::{Arc, LazyLock, Mutex};
 
 use ballast::control::policy::Policy;
-use ballast::http::decode;
+use ballast::http::gate::decode;
 use ballast::service::Service;
-use ballast::service::allowance::{Allowance, HeavyPermit, Limits};
-use ballast::service::answer::Observed;
-use ballast::service::clock::Clock;
-use ballast::service::config::Config;
-use ballast::service::keys::Caller;
+use ballast::service::callers::allowance::{Allowance, HeavyPermit, Limits};
+use ballast::service::entries::answer::Observed;
+use ballast::service::process::clock::Clock;
+use ballast::service::process::config::Config;
+use ballast::service::callers::keys::Caller;
 use ballast::store::labels::Relabel;
-use ballast::service::report::Observe;
+use ballast::service::entries::report::Observe;
 use ballast::service::sessions::SessionStart;
-use ballast::service::shutdown::Shutdown;
+use ballast::service::process::shutdown::Shutdown;
 use libfuzzer_sys::fuzz_target;
 use tokio::runtime::Runtime;
 

@@ -3,7 +3,7 @@
 
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::Policy;
-use ballast::http::decode;
+use ballast::http::gate::decode;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|body: &[u8]| {

@@ -2,7 +2,7 @@
 #![no_main]
 
 use ballast::control::request::specification::Specification;
-use ballast::http::decode;
+use ballast::http::gate::decode;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|body: &[u8]| {

@@ -10,8 +10,8 @@ use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::learning::Learning;
 use ballast::control::request::rules::BRIDGE_NUMBERS;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
-use ballast::service::advise::Advise;
-use ballast::service::advise_assets::AdviseAssets;
+use ballast::service::advice::advise::Advise;
+use ballast::service::advice::advise_assets::AdviseAssets;
 use clap::Args;
 
 use super::caution::{self, CautionArgs};

@@ -3,8 +3,8 @@
 
 use std::path::PathBuf;
 
-use ballast::service::clock::Clock;
-use ballast::service::config::StoreLocation;
+use ballast::service::process::clock::Clock;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::{self, Damage};
 use clap::Args;
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::Inspection;
 use clap::Args;
 

@@ -4,8 +4,8 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use ballast::http::{RunningServer, serve};
-use ballast::service::config::Config;
-use ballast::service::shutdown::Shutdown;
+use ballast::service::process::config::Config;
+use ballast::service::process::shutdown::Shutdown;
 use thiserror::Error;
 
 #[derive(Debug, Error)]

@@ -4,9 +4,9 @@ use std::io::Write;
 use std::time::Duration;
 
 use ballast::control::error::FieldError;
-use ballast::service::clock::Clock;
-use ballast::service::config::StoreLocation;
-use ballast::service::keys::{REFRESH, Secret, issue, rotate};
+use ballast::service::callers::keys::{REFRESH, Secret, issue, rotate};
+use ballast::service::process::clock::Clock;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::{KeyRing, KeyRole, KeyRoles, KeyRow, StoredKeys, Tenant};
 use clap::{Args, Subcommand, ValueEnum};
 

@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use ballast::http::dashboard;
-use ballast::numerics::summary::Estimate;
+use ballast::http::site::dashboard;
+use ballast::numerics::statistics::summary::Estimate;
 use ballast::report::{self, Csv};
 use clap::Args;
 use serde::Serialize;

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use ballast::http;
-use ballast::service::allowance::Limits;
-use ballast::service::config::{Config, DAY, Role, TlsFiles};
-use ballast::service::memory::{ByteSize, MemoryLimit};
-use ballast::service::shutdown::Shutdown;
+use ballast::service::callers::allowance::Limits;
+use ballast::service::process::config::{Config, DAY, Role, TlsFiles};
+use ballast::service::process::memory::{ByteSize, MemoryLimit};
+use ballast::service::process::shutdown::Shutdown;
 use ballast::store::Quotas;
 use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};

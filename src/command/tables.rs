@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use ballast::control::evaluation::report::{EvaluationReport, StrategyReport};
-use ballast::numerics::summary::Estimate;
+use ballast::numerics::statistics::summary::Estimate;
 use ballast::report::Csv;
 
 /// Returns the estimates of a strategy, by name.

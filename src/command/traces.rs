@@ -8,7 +8,7 @@
 
 use std::io::IsTerminal;
 
-use ballast::service::spans;
+use ballast::service::process::spans;
 use opentelemetry::trace::TracerProvider;
 use opentelemetry_otlp::SpanExporter;
 use opentelemetry_sdk::Resource;

@@ -23,9 +23,9 @@ use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, Counts, DesignFitting};
 use crate::control::surrogate::stored::Solution;
 use crate::control::uncertainty::laws::Laws;
-use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::streams::stream;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::machine::streams::stream;
 
 /// A controlled problem with the value of every step but the first, which is solved on request.
 pub struct ControlledPolicy<'a, P> {

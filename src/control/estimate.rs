@@ -19,8 +19,8 @@ use super::request::specification::Specification;
 use super::surrogate::design::GUARDS;
 use super::surrogate::learning::{CANDIDATES_PER_POINT, LAW_BYTES, together};
 use super::surrogate::stored::Solution;
+use crate::numerics::bridge::grown;
 use crate::numerics::gp::GaussianProcess;
-use crate::numerics::grown_bridges;
 
 /// Bytes of a double.
 const NUMBER: usize = 8;
@@ -160,7 +160,7 @@ impl Sizes {
 
     fn statistics(&self, threads: usize) -> usize {
         let statistics = product(&[threads, self.paths, STATISTICS + self.together(), NUMBER]);
-        statistics.saturating_add(product(&[threads, grown_bridges::table_bytes(self.history, self.horizon)]))
+        statistics.saturating_add(product(&[threads, grown::table_bytes(self.history, self.horizon)]))
     }
 
     /// Returns how many states of a design a thread measures together.

@@ -15,7 +15,7 @@
 //! |---|---|---|---|---|
 //! | X, A, S, the loss | `Controlled` | 2 | `control/problem/controlled.rs` | `tests/solver/controlled.rs::the_investor_s_problem_is_solved_alike_by_the_general_solver` |
 //! | S | `next` | (2.1) | `control/problem/dynamics.rs` | `src/control/evaluation/account.rs::three_months_agree_with_pencil_and_paper` |
-//! | F^, R | `EmpiricalDistribution` | (2.3) | `numerics/empirical.rs` | `tests/solver/parametric.rs::the_order_of_returns_and_the_way_they_arrive_change_nothing` |
+//! | F^, R | `EmpiricalDistribution` | (2.3) | `numerics/law/empirical.rs` | `tests/solver/parametric.rs::the_order_of_returns_and_the_way_they_arrive_change_nothing` |
 //! | H | `directional_statistic` | 2.1, after (2.4) | `numerics/bridge.rs` | `src/numerics/bridge.rs::the_statistic_is_the_plain_sum_to_single_precision` |
 //! | Q^H(1 - alpha) | `bridge_quantile` | 2.1, after (2.4) | `numerics/bridge.rs` | `tests/solver/control.rs::the_bridge_quantile_agrees_with_a_million_paths` |
 //! | radius of C | `RadiusEstimator` | (2.5), (2.7) | `control/uncertainty/radius.rs` | `src/control/uncertainty/radius.rs::every_rule_of_the_sample_size_has_its_formula` |
@@ -23,15 +23,15 @@
 //! | y, G | `next_state` | (2.8) | `control/problem/state.rs` | `tests/service/sessions.rs::a_live_session_equals_the_simulator_bit_for_bit` |
 //! | V_T | `utility` | (3.1) | `control/problem/utility.rs` | `src/control/problem/utility.rs::relative_utility_is_an_affine_map_of_the_utility` |
 //! | V_t | `BellmanStep` | (3.2) | `control/bellman/mod.rs` | `tests/solver/control.rs::the_last_step_agrees_with_a_direct_solve` |
-//! | min over C | `worst_expectation` | (3.3) | `numerics/wasserstein.rs` | `tests/solver/transport.rs::worst_expectation_agrees_with_the_transport_programme` |
-//! | V^gamma | `envelope` | (3.4) | `numerics/wasserstein.rs` | `src/numerics/wasserstein.rs::primal_and_dual_meet_on_any_payoff` |
+//! | min over C | `worst_expectation` | (3.3) | `numerics/transport/wasserstein.rs` | `tests/solver/transport.rs::worst_expectation_agrees_with_the_transport_programme` |
+//! | V^gamma | `envelope` | (3.4) | `numerics/transport/wasserstein.rs` | `src/numerics/transport/wasserstein.rs::primal_and_dual_meet_on_any_payoff` |
 //! | psi* | `WorstCase` | 2.2, (3.2) | `control/policy/worst_case.rs` | `tests/solver/parametric.rs::the_multiplier_is_the_utility_lost_per_unit_of_radius` |
 //! | y^i_t, N | `Design` | 3.1 | `control/surrogate/design.rs` | `tests/solver/control.rs::the_same_seed_gives_the_same_bytes_on_any_number_of_threads_and_through_json` |
 //! | y-check | `FeatureSelection` | 3.1 | `control/surrogate/features.rs` | `tests/project/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
-//! | k | `weighted_sum` | 3.1 | `numerics/matern.rs` | `src/numerics/matern.rs::the_fast_sum_equals_the_plain_formula` |
+//! | k | `weighted_sum` | 3.1 | `numerics/gp/matern.rs` | `src/numerics/gp/matern.rs::the_fast_sum_equals_the_plain_formula` |
 //! | V-check | `Surrogate` | 3.1 | `control/surrogate/fitted.rs` | `tests/project/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
 //! | phi-check | `policy_target` | 3.1 | `control/surrogate/policy_target.rs` | `src/control/surrogate/policy_target.rs::a_parabola_is_continued_to_its_optimum` |
-//! | hyperparameters | `fit` | 3.1 | `numerics/gp_fit.rs` | `tests/solver/gp.rs::a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes` |
+//! | hyperparameters | `fit` | 3.1 | `numerics/gp/fit.rs` | `tests/solver/gp.rs::a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes` |
 //! | steps 1 to 6 | `Training` | 3.1 | `control/training.rs` | `tests/solver/control.rs::whole_horizons_agree_with_nested_grids` |
 //! | V-hat_0, N' | `Evaluation` | 3.1 | `control/evaluation/paths.rs` | `tests/solver/evaluate.rs::a_simulated_path_is_the_advisor_s_own` |
 //!

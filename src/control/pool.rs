@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::numerics::interruption;
+use crate::numerics::machine::interruption;
 
 /// A pool of lowest-priority threads; work installed on it is spread over them.
 pub struct TrainingPool(rayon::ThreadPool);

@@ -12,16 +12,17 @@ use thiserror::Error;
 use tokio::task::JoinHandle;
 use tokio_rustls::TlsAcceptor;
 
-use super::connections::{ConnectionLimits, Connections};
-use super::listener::{Door, Manners};
-use super::patient::Patience;
-use super::tls::{Certificate, TlsError};
-use super::{router, telemetry};
+use crate::http::connection::connections::{ConnectionLimits, Connections};
+use crate::http::connection::listener::{Door, Manners};
+use crate::http::connection::patient::Patience;
+use crate::http::connection::tls::{Certificate, TlsError};
+use crate::http::gate::telemetry;
+use crate::http::router;
 use crate::service::Service;
-use crate::service::clock::Clock;
-use crate::service::config::Config;
 use crate::service::error::ServiceError;
-use crate::service::shutdown::Shutdown;
+use crate::service::process::clock::Clock;
+use crate::service::process::config::Config;
+use crate::service::process::shutdown::Shutdown;
 use crate::store::StoreError;
 
 /// Time within which a client must send its request head.

@@ -9,15 +9,25 @@
 //!
 //! H is simulated over the directions of bridges, and the quantile integrates their lengths out. H is the length, which
 //! has a chi law, times the statistic over the direction; the two are independent. Source: paper, section 2.1, (2.4).
+//!
+//! Beside it: the law of the statistic, its paths, its quantiles for laws that grow, and for funds of several assets.
+
+pub mod calibration;
+pub mod funds;
+pub mod gap_places;
+pub mod grown;
+pub mod limit;
+pub mod paths;
+pub mod scale_mixture;
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use super::bridge_paths::{AbsoluteBridges, PATHS, Share, Times};
-use super::dispatch::dispatched;
-use super::empirical::EmpiricalDistribution;
-use super::gap_places::{SizedGaps, Statistic};
-use super::scale_mixture::LastQuantile;
+use crate::numerics::bridge::gap_places::{SizedGaps, Statistic};
+use crate::numerics::bridge::paths::{AbsoluteBridges, PATHS, Share, Times};
+use crate::numerics::bridge::scale_mixture::LastQuantile;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::machine::dispatch::dispatched;
 
 /// A simulated quantile and the standard error of its simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,14 +3,21 @@
 //!   k(x, y) = s2 (1 + sqrt5 r + 5 r^2 / 3) exp(-sqrt5 r),   r^2 = sum_i ((x_i - y_i) / l_i)^2
 //!
 //! Source: Rasmussen and Williams 2006, sections 2.2 and 5.4.
+//!
+//! Beside it: kernel, likelihood, fit, linear systems and the selection of points.
+
+pub mod cholesky;
+pub mod farthest;
+pub mod fit;
+pub mod likelihood;
+pub mod matern;
 
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::cholesky::{Cholesky, Singular, factor_with_jitter};
-use super::matern;
+use crate::numerics::gp::cholesky::{Cholesky, Singular, factor_with_jitter};
 
 /// Hyperparameters of a Gaussian process: l_i in the units of input i, s2 and noise in the units of the target squared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

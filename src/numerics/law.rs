@@ -1,9 +1,19 @@
 //! Laws that can be sampled and integrated against.
+//!
+//! Beside it: empirical laws and their moments, and what is estimated from them.
+
+pub mod confidence_region;
+pub mod empirical;
+pub mod exponential_mean;
+pub mod law_distance;
+pub mod moments;
+pub mod student;
+pub mod volatility;
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal, StudentT};
 
-use super::student::{normal_cdf, normal_density, student_cdf, student_density};
+use crate::numerics::law::student::{normal_cdf, normal_density, student_cdf, student_density};
 
 /// A continuous law on the line.
 #[derive(Debug, Clone)]
@@ -162,7 +172,7 @@ impl ContinuousLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::streams::stream;
+    use crate::numerics::machine::streams::stream;
 
     #[test]
     fn quadrature_has_the_moments_of_the_law() {

@@ -4,7 +4,7 @@
 //! Text does not say what its numbers are. If their meaning follows from the text, it is used and stated in a sentence;
 //! if it does not follow, the caller is asked. A cell that cannot be right is refused by its line, its column and its
 //! value. Nothing is skipped silently, because a misread record gives wrong advice that looks right. Checked by:
-//! `tests/service/returns.rs`.
+//! `tests/service/advice/returns.rs`.
 
 mod bank;
 mod cells;

@@ -1,7 +1,7 @@
 //! The mean, the deviation and their robust forms. A column is judged by the bulk of its numbers, so one odd cell does
 //! not change the judgement.
 
-use crate::numerics::student::student_two_sided;
+use crate::numerics::law::student::student_two_sided;
 
 /// The standard deviation of a normal law, in units of its median distance from the median.
 const DEVIATIONS: f64 = 1.4826;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::allowance::Refused;
-use super::gate::Doubts;
 use crate::control::error::FieldError;
+use crate::service::callers::allowance::Refused;
+use crate::service::entries::gate::Doubts;
 use crate::store::StoreError;
 
 #[derive(Debug, Error)]

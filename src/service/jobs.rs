@@ -1,17 +1,19 @@
 //! Jobs as their users see them; each tenant sees only its own.
+//!
+//! Beside it: the worker that runs jobs, their progress, and the renewer, which trains the next policies of sessions.
+
+pub(super) mod due;
+pub(super) mod idempotency;
+pub mod progress;
+pub mod renewer;
+pub(super) mod trainer;
 
 use std::sync::Arc;
 
 use serde::Serialize;
 use tokio::sync::watch;
 
-use super::clock::Clock;
 use super::error::ServiceError;
-use super::idempotency;
-use super::identity;
-use super::keys::Caller;
-use super::memory::{Large, Memory};
-use super::progress::{ProgressBoard, RunningProgress};
 use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::backtest::Backtest;
@@ -21,6 +23,11 @@ use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
+use crate::service::callers::identity;
+use crate::service::callers::keys::Caller;
+use crate::service::jobs::progress::{ProgressBoard, RunningProgress};
+use crate::service::process::clock::Clock;
+use crate::service::process::memory::{Large, Memory};
 use crate::store::{
     Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Relabel, SessionTraining, Store, Tenant, TrainingRequest,
 };

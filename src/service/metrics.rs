@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogram, gauge};
 
-use super::keys::KeyFigures;
+use crate::service::callers::keys::KeyFigures;
 use crate::store::StoreError;
 
 use crate::store::{OldestJobs, StoreSpace};

@@ -3,10 +3,25 @@
 //! A session is its rows. The state in memory is a replay of them, or the start of one, and the slot is empty during a
 //! write. So memory never runs ahead of the disk. Before every use the state is compared with the store, and a state of
 //! other rows is dropped. So no process advises from an outdated law, or from one that a restored database never had.
-//! One lock per session orders its observations in this process (see `super::slots`).
+//! One lock per session orders its observations in this process (see `crate::service::sessions::slots`).
 //!
 //! A session belongs to its tenant and does not exist for others. Slots are named by tenant and session, so no call
 //! waits for, fills or empties the slot of another tenant.
+//!
+//! Beside it: the state of one session in memory, its rows, its slots and its sequence of policies. What is recorded of a
+//! session is decided in [`crate::service::entries`].
+
+pub mod assets;
+pub(super) mod content;
+pub mod fund_advice;
+pub mod known;
+pub mod live;
+pub(super) mod peers;
+pub mod plan;
+pub(super) mod rows;
+pub(super) mod slots;
+pub(super) mod standing;
+pub(super) mod sync;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,30 +30,30 @@ use serde::Serialize;
 use tokio::sync::mpsc::Sender;
 use tracing::Instrument;
 
-use super::allowance::HeavyPermit;
-use super::assets::Assets;
-use super::bounded::{FairQueue, QueueSize};
-use super::clock::Clock;
-use super::config::Config;
 use super::error::ServiceError;
-use super::idempotency;
-use super::identity;
-use super::keys::Caller;
-use super::known::InitialHistory;
-use super::live::{AdviceContext, LiveSession, SESSION_BYTES};
-use super::memory::Memory;
-use super::plan::{Renewing, SessionPlan};
-use super::policies::Policies;
-use super::slots::{Generation, SlotGuard, Slots};
-use super::spans;
-use super::standing::SessionState;
-use super::turns::CallTurns;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
 use crate::control::problem::state::State;
 use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
+use crate::service::callers::allowance::HeavyPermit;
+use crate::service::callers::bounded::{FairQueue, QueueSize};
+use crate::service::callers::identity;
+use crate::service::callers::keys::Caller;
+use crate::service::callers::turns::CallTurns;
+use crate::service::catalogue::policies::Policies;
+use crate::service::jobs::idempotency;
+use crate::service::process::clock::Clock;
+use crate::service::process::config::Config;
+use crate::service::process::memory::Memory;
+use crate::service::process::spans;
+use crate::service::sessions::assets::Assets;
+use crate::service::sessions::known::InitialHistory;
+use crate::service::sessions::live::{AdviceContext, LiveSession, SESSION_BYTES};
+use crate::service::sessions::plan::{Renewing, SessionPlan};
+use crate::service::sessions::slots::{Generation, SlotGuard, Slots};
+use crate::service::sessions::standing::SessionState;
 use crate::store::{CreateSession, Relabel, RequestKey, SessionRow, Store, Tenant};
 
 /// Lists of sessions read concurrently. These are fewer than the store's connections for lists, so that the lists of

@@ -64,7 +64,7 @@ test("every view where there is something, of one asset and of several", async (
     `#/compare?policies=${one},${several}`,
     `#/compare?sessions=${lived},${other}`,
   ];
-  const routes = [...(await readFile(new URL("../../src/http/dashboard/main.js", import.meta.url), "utf8")).matchAll(/^ {2}\[\/(\S+)\/, /gm)].map(([, route]) => new RegExp(route));
+  const routes = [...(await readFile(new URL("../../src/http/site/dashboard/main.js", import.meta.url), "utf8")).matchAll(/^ {2}\[\/(\S+)\/, /gm)].map(([, route]) => new RegExp(route));
   assert.ok(routes.length > 15, `${routes}`);
   const unseen = routes.filter((route) => ![...BARE, ...places].some((place) => route.test(place)));
   assert.deepEqual(unseen, [], "a view is on no list of this test");

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::support::patience::{assert_within, patience, until, within};
 use crate::support::process::Process;
 use crate::support::{App, process, read, specification, trained};
-use ballast::service::allowance::Limits;
+use ballast::service::callers::allowance::Limits;
 use futures_util::future::join_all;
 use reqwest::StatusCode;
 use serde_json::{Value, json};

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::support::patience::within;
 use crate::support::{App, execute, postgres, specification};
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::{Append, CreateSession, EntryRow, Relabel, SessionFacts, SessionRow, Store};
 use futures_util::future::join_all;
 use futures_util::stream::{self, StreamExt};

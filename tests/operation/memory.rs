@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::support::App;
 use ballast::control::kept::Cache;
-use ballast::service::memory::MemoryLimit;
+use ballast::service::process::memory::MemoryLimit;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use tokio::io::AsyncWriteExt;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::support::patience::until;
 use crate::support::{App, postgres, specification};
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::Quotas;
 use futures_util::StreamExt;
 use futures_util::stream;

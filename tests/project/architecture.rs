@@ -564,7 +564,7 @@ fn a_broken_rule_is_found() {
     assert_eq!(faults_of("control/progress.rs", "use utoipa::ToSchema;").len(), 0);
     assert_eq!(faults_of("store/jobs.rs", "fn f() { let now = Instant::now(); }").len(), 1);
     assert_eq!(faults_of("control/backward.rs", "fn f() { std::thread::sleep(PAUSE); }").len(), 1);
-    assert_eq!(faults_of("service/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);
+    assert_eq!(faults_of("service/process/figures/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);
     assert_eq!(faults_of("http/a.rs", "fn f() { g().unwrap(); panic!(\"no\"); todo!() }").len(), 3);
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(70))).len(), 1);
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(69))).len(), 0);

@@ -7,9 +7,9 @@ use std::process::Command;
 use crate::support::certificates::Authority;
 use crate::support::patience::until;
 use crate::support::{App, specification};
-use ballast::service::clock::Clock;
-use ballast::service::config::TlsFiles;
-use ballast::service::keys;
+use ballast::service::callers::keys;
+use ballast::service::process::clock::Clock;
+use ballast::service::process::config::TlsFiles;
 use ballast::store::KeyRing;
 use serde_json::{Value, json};
 

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use crate::support::place::Place;
 use ballast::service::Service;
-use ballast::service::clock::Clock;
-use ballast::service::config::{Config, StoreLocation};
-use ballast::service::shutdown::Shutdown;
+use ballast::service::process::clock::Clock;
+use ballast::service::process::config::{Config, StoreLocation};
+use ballast::service::process::shutdown::Shutdown;
 use ballast::store::{Actor, AuditFilter, CreateJob, JobKind, NewJob, Relabel, Store, Tenant};
 
 const DAY_MS: i64 = 24 * 60 * 60 * 1000;

@@ -7,7 +7,7 @@ use ballast::control::kept::Cache;
 use ballast::control::progress::Watch;
 use ballast::control::request::frontier::FrontierRequest;
 use ballast::control::request::specification::ProblemSpecification;
-use ballast::service::advise::Advise;
+use ballast::service::advice::advise::Advise;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 

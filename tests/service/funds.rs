@@ -12,8 +12,8 @@ use ballast::control::request::fund::FundSpecification;
 use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
-use ballast::numerics::fund_bridges::fund_returns;
-use ballast::numerics::levelling::inverse_volatility;
+use ballast::numerics::bridge::funds::fund_returns;
+use ballast::numerics::transport::levelling::inverse_volatility;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use std::process::Command;
 use crate::support::patience::{self, patience};
 use crate::support::process::Process;
 use crate::support::{App, issue_key, postgres, process, read, specification};
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::{KeyRing, KeyRole};
 use reqwest::header::{AUTHORIZATION, WWW_AUTHENTICATE};
 use reqwest::{Client, Method, StatusCode};

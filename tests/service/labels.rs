@@ -1,7 +1,7 @@
 //! What policies and sessions are called: said when they are made, changed later, and no part of what they are.
 
 use crate::support::{App, postgres, specification};
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::{Inspection, Quotas};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use crate::support::patience::{patience, until};
 use crate::support::{App, issue_key, postgres, specification};
-use ballast::service::allowance::Limits;
-use ballast::service::config::StoreLocation;
+use ballast::service::callers::allowance::Limits;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::KeyRing;
 use futures_util::future::join_all;
 use reqwest::{Client, Method, StatusCode};
@@ -245,7 +245,7 @@ async fn no_law_is_stale(mut app: App, outside: Outside) {
     assert!(answered > PERIODS && refused > PERIODS && faults > FAULTS, "nothing was tried");
 }
 
-fn unlimited(config: &mut ballast::service::config::Config) {
+fn unlimited(config: &mut ballast::service::process::config::Config) {
     config.limits = Limits::new([0; 3], 64);
 }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::support::patience::within;
 use crate::support::{App, execute, postgres, specification};
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use futures_util::{StreamExt, stream};
 use reqwest::Method;
 use serde_json::{Value, json};

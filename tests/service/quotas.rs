@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::support::patience::{patience, until};
 use crate::support::{App, entry_bytes, execute, postgres, several_assets, specification};
-use ballast::service::config::StoreLocation;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::{Inspection, Quotas};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};

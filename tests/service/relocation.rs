@@ -55,7 +55,7 @@ async fn a_folder_moves_into_a_database_and_goes_on() {
     assert!(complaint(&relocate(&app, &url)).contains("has rows"), "the database is not empty");
 
     let store = url.parse().unwrap();
-    app.start_over(ballast::service::config::StoreLocation::Postgres(store)).await;
+    app.start_over(ballast::service::process::config::StoreLocation::Postgres(store)).await;
     assert_eq!(shown(&app, &paths).await, before);
     let report = json!({ "log_returns": { "stocks": 0.02, "bonds": 0.001, "gold": 0.01 }, "confirm": true });
     assert_eq!(app.report(2, report).await.0, 200);

@@ -2,8 +2,8 @@
 
 use crate::support::patience::until;
 use crate::support::{App, issue_key, postgres, specification, trained};
-use ballast::service::allowance::Limits;
-use ballast::service::config::StoreLocation;
+use ballast::service::callers::allowance::Limits;
+use ballast::service::process::config::StoreLocation;
 use ballast::store::KeyRing;
 use serde_json::{Value, json};
 

@@ -8,8 +8,8 @@ use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
 use ballast::control::request::support::Support;
 use ballast::control::uncertainty::centre::Centring;
-use ballast::numerics::empirical::EmpiricalDistribution;
-use ballast::numerics::streams::stream;
+use ballast::numerics::law::empirical::EmpiricalDistribution;
+use ballast::numerics::machine::streams::stream;
 use rand::RngExt;
 
 use crate::support::policies::advisor;

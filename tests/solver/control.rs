@@ -66,7 +66,8 @@ fn the_last_step_on_real_returns_agrees_with_a_direct_solve() {
 
 #[test]
 fn the_bridge_quantile_agrees_with_a_million_paths() {
-    use ballast::numerics::{bridge_paths::AbsoluteBridges, empirical::EmpiricalDistribution};
+    use ballast::numerics::bridge::paths::AbsoluteBridges;
+    use ballast::numerics::law::empirical::EmpiricalDistribution;
     let oracle: Value = serde_json::from_str(include_str!("../data/bridge.json")).unwrap();
     let cases = oracle["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 3);

@@ -8,7 +8,7 @@ use ballast::control::progress::Watch;
 use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::Specification;
 use ballast::control::training::Training;
-use ballast::numerics::empirical::EmpiricalDistribution;
+use ballast::numerics::law::empirical::EmpiricalDistribution;
 use serde_json::{Value, json};
 
 const BASIS_POINTS: f64 = 1e4;

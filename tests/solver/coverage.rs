@@ -11,8 +11,8 @@ use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{Specification, UtilitySpecification};
 use ballast::control::uncertainty::radius::RadiusEstimator;
-use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::law::ContinuousLaw;
+use ballast::numerics::law::empirical::EmpiricalDistribution;
 use serde_json::json;
 
 /// Independent draws of two returns, each with probability one half.

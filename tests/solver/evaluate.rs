@@ -14,7 +14,7 @@ use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
 use ballast::control::request::evaluation::EvaluationRequest;
 use ballast::control::request::framework::Framework;
-use ballast::numerics::summary::Estimate;
+use ballast::numerics::statistics::summary::Estimate;
 use reqwest::Method;
 use serde_json::{Value, json};
 

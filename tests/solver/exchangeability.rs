@@ -1,9 +1,9 @@
 //! The bet against exchangeability: its p-values and its capital against their definitions, its false alarms against Ville's
 //! bound, and how soon it tells a doubled volatility.
 
-use ballast::numerics::empirical::EmpiricalDistribution;
-use ballast::numerics::exchangeability::{TestMartingale, p_value};
-use ballast::numerics::streams::stream;
+use ballast::numerics::law::empirical::EmpiricalDistribution;
+use ballast::numerics::machine::streams::stream;
+use ballast::numerics::statistics::exchangeability::{TestMartingale, p_value};
 use rand::{Rng, RngExt};
 
 fn normal(random: &mut impl Rng) -> f64 {

@@ -3,10 +3,10 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use ballast::numerics::gp::fit::{self, Bounds, Fit, FitError};
+use ballast::numerics::gp::likelihood::log_likelihood_and_gradient;
 use ballast::numerics::gp::{GaussianProcess, GpMean, Hyperparameters};
-use ballast::numerics::gp_fit::{self, Bounds, Fit, FitError};
-use ballast::numerics::gp_likelihood::log_likelihood_and_gradient;
-use ballast::numerics::minimise::{SearchOutcome, minimise_bounded};
+use ballast::numerics::search::minimise::{SearchOutcome, minimise_bounded};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 
@@ -193,7 +193,7 @@ fn fit(
     bounds: &Bounds,
     start: Option<&Hyperparameters>,
 ) -> Result<Fit, FitError> {
-    gp_fit::fit(inputs, &[targets.to_vec()], bounds, start, &AtomicBool::new(false))
+    fit::fit(inputs, &[targets.to_vec()], bounds, start, &AtomicBool::new(false))
 }
 
 /// Of one function of the inputs.
@@ -217,7 +217,7 @@ fn the_likelihood_of_several_functions_is_the_sum_of_theirs() {
 #[test]
 fn a_fit_asked_to_stop_says_so() {
     let (inputs, targets) = smooth_sample(50, 2);
-    let stopped = gp_fit::fit(&inputs, &[targets], &wide_bounds(), None, &AtomicBool::new(true));
+    let stopped = fit::fit(&inputs, &[targets], &wide_bounds(), None, &AtomicBool::new(true));
     assert_eq!(stopped, Err(FitError::Stopped));
 }
 

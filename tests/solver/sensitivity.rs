@@ -6,7 +6,7 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::problem::state::State;
 use ballast::control::request::specification::{ProblemSpecification, Specification, default_seed};
-use ballast::numerics::empirical::EmpiricalDistribution;
+use ballast::numerics::law::empirical::EmpiricalDistribution;
 use serde_json::{Value, json};
 
 const HISTORY: [f64; 12] = [0.061, -0.034, 0.052, 0.013, -0.041, 0.083, -0.022, 0.037, 0.013, -0.067, 0.052, 0.029];

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::support::policies::specification;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::surrogate::design::Design;
-use ballast::numerics::streams::stream;
+use ballast::numerics::machine::streams::stream;
 use rand::RngExt;
 use serde_json::{Value, json};
 

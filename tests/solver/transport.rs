@@ -1,6 +1,6 @@
 //! The exact inner solve against a linear-programming solver.
 
-use ballast::numerics::wasserstein::WassersteinBall;
+use ballast::numerics::transport::wasserstein::WassersteinBall;
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {

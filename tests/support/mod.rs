@@ -14,10 +14,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use ballast::http::{self, RunningServer};
-use ballast::service::clock::Clock;
-use ballast::service::config::{Config, StoreLocation};
-use ballast::service::keys;
-use ballast::service::shutdown::Shutdown;
+use ballast::service::callers::keys;
+use ballast::service::process::clock::Clock;
+use ballast::service::process::config::{Config, StoreLocation};
+use ballast::service::process::shutdown::Shutdown;
 use ballast::store::{Append, EntryRow, KeyRing, Store, Tenant};
 use reqwest::header::{AUTHORIZATION, HeaderMap};
 use reqwest::{Client, Method, Response, StatusCode};

@@ -9,8 +9,8 @@ use ballast::control::error::FieldError;
 use ballast::control::policy::advice::{Advice, AdviceSource};
 use ballast::control::policy::sensitivity::{NextAdvice, ReturnAndLog, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
-use ballast::numerics::digits;
-use ballast::service::advise::Advised;
+use ballast::numerics::machine::digits;
+use ballast::service::advice::advise::Advised;
 
 pub use several::describe_several;
 
@@ -201,7 +201,7 @@ fn signed(share: f64) -> String {
 mod tests {
     use ballast::control::policy::worst_case::TransportedMass;
     use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
-    use ballast::service::advise::Advise;
+    use ballast::service::advice::advise::Advise;
 
     use super::*;
 

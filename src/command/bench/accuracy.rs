@@ -24,8 +24,8 @@ use ballast::control::request::specification::{
 use ballast::control::solved_step::StepSolution;
 use ballast::control::surrogate::design::Design;
 use ballast::control::training::Training;
-use ballast::numerics::streams::stream;
-use ballast::numerics::summary::quantile;
+use ballast::numerics::machine::streams::stream;
+use ballast::numerics::statistics::summary::quantile;
 use clap::Args;
 use rand::RngExt;
 use serde_json::json;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use ballast::control::request::specification::InitialLaws;
-use ballast::numerics::summary::quantile;
+use ballast::numerics::statistics::summary::quantile;
 use clap::Args;
 use serde_json::{Map, Value, json};
 

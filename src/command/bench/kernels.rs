@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use ballast::numerics::cholesky::Cholesky;
-use ballast::numerics::elementary::exp;
 use ballast::numerics::gp::GaussianProcess;
-use ballast::numerics::gp_fit::{Bounds, fit};
-use ballast::numerics::streams::stream;
-use ballast::numerics::wasserstein::WassersteinBall;
+use ballast::numerics::gp::cholesky::Cholesky;
+use ballast::numerics::gp::fit::{Bounds, fit};
+use ballast::numerics::machine::elementary::exp;
+use ballast::numerics::machine::streams::stream;
+use ballast::numerics::transport::wasserstein::WassersteinBall;
 use clap::Args;
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt};

@@ -6,7 +6,7 @@ use ballast::control::request::specification::{
     InitialLaws, ProblemSpecification, Specification, UtilitySpecification,
 };
 use ballast::numerics::law::ContinuousLaw;
-use ballast::numerics::streams::stream;
+use ballast::numerics::machine::streams::stream;
 
 /// Returns the law of the paper's section 3.
 pub fn mixture() -> SamplingLaw {

@@ -1,6 +1,6 @@
 //! Summary figures of a measurement.
 
-use ballast::numerics::summary::quantile;
+use ballast::numerics::statistics::summary::quantile;
 
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)

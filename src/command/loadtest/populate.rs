@@ -9,7 +9,7 @@ use ballast::control::progress::Watch;
 use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::service::error::ServiceError;
-use ballast::service::plan::SessionPlan;
+use ballast::service::sessions::plan::SessionPlan;
 use ballast::store::{CreateSession, Relabel, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;

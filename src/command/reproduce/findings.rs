@@ -4,8 +4,8 @@ use std::fmt;
 
 use ballast::control::evaluation::report::{StrategyReport, UtilityReport};
 use ballast::control::request::framework::Framework;
-use ballast::numerics::digits::fixed;
-use ballast::numerics::summary::Estimate;
+use ballast::numerics::machine::digits::fixed;
+use ballast::numerics::statistics::summary::Estimate;
 use serde::Serialize;
 
 use super::ReproductionPlan;

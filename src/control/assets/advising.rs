@@ -15,7 +15,7 @@ use crate::control::request::fund::CompositionRule;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{LawExtent, Support};
-use crate::numerics::fund_bridges::FundBridges;
+use crate::numerics::bridge::funds::FundBridges;
 
 /// Paths of the joint factor: its relative standard error is then a hundredth.
 pub const FACTOR_PATHS: usize = 1000;
@@ -107,7 +107,7 @@ impl AssetsAdvice {
     /// of wealth; and the reason if nothing is held. Cost: its levels of caution, if one is followed, and the joint
     /// factor under `bridge` and `calibrated`. Also [`PortfolioStep::solve_from`], twice if a return may fall below those
     /// seen, and once for each level of a short record.
-    /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
+    /// Checked by: `tests/service/advice/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     ///
     /// # Errors

@@ -9,8 +9,8 @@
 
 use super::PortfolioStep;
 use crate::control::problem::utility::RelativeUtility;
-use crate::numerics::interruption;
-use crate::numerics::levelling::{FillingPhase, Levelling};
+use crate::numerics::machine::interruption;
+use crate::numerics::transport::levelling::{FillingPhase, Levelling};
 
 /// Largest number of Newton steps for a local minimum; they approach it from one side, and double the digits from about
 /// the third on.

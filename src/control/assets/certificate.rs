@@ -4,7 +4,7 @@ use super::PortfolioStep;
 use super::cuts::dot;
 use super::interior::Interior;
 use super::trading::Tangent;
-use crate::numerics::dispatch::dispatched;
+use crate::numerics::machine::dispatch::dispatched;
 
 /// Other assets enter if they raise the bound by more than this share of the gap without them. With the one that raises
 /// it most, those of at least this share of its slope enter.

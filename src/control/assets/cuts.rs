@@ -11,7 +11,7 @@
 use super::PortfolioStep;
 use super::branches::Branches;
 use crate::control::request::assets::MOST_ASSETS;
-use crate::numerics::dispatch::dispatched;
+use crate::numerics::machine::dispatch::dispatched;
 
 /// A move found before is kept while it has this share of its atom's mass.
 const LEAST_MASS: f64 = 0.01;
@@ -265,8 +265,8 @@ mod tests {
     use crate::control::assets::ReturnScenarios;
     use crate::control::problem::actions::ActionInterval;
     use crate::control::problem::utility::RelativeUtility;
-    use crate::numerics::levelling::{GroundMetric, inverse_volatility};
-    use crate::numerics::streams::stream;
+    use crate::numerics::machine::streams::stream;
+    use crate::numerics::transport::levelling::{GroundMetric, inverse_volatility};
 
     /// Compares with branches found anew at each point, and with differences of the move's own payoffs.
     #[test]

@@ -26,8 +26,8 @@ use crate::control::request::fund::FundSpecification;
 use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification,
 };
-use crate::numerics::fund_bridges::fund_returns;
-use crate::numerics::levelling::inverse_volatility;
+use crate::numerics::bridge::funds::fund_returns;
+use crate::numerics::transport::levelling::inverse_volatility;
 
 /// The assets of a session's fund, with its composition and holdings.
 #[derive(Debug, Clone, PartialEq)]

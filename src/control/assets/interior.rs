@@ -21,7 +21,7 @@ use super::PortfolioStep;
 use super::branches::Branches;
 use super::cuts::{Cut, Cuts, dot};
 use super::trading::Tangent;
-use crate::numerics::interruption;
+use crate::numerics::machine::interruption;
 
 /// Largest number of calls of the adversary, and of steps between two.
 const ROUNDS: usize = 60;

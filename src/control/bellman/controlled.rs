@@ -14,8 +14,8 @@ use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::surrogate::features::{FeatureSelection, Features};
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::uncertainty::laws::Laws;
-use crate::numerics::chebyshev::local_cubic;
-use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::search::chebyshev::local_cubic;
 
 /// Even actions at which gains are predicted if the description of the next state depends on the action. If changing
 /// the description costs, a value has kinks. Cubics are then good to a twentieth of the jump of its second derivative

@@ -19,7 +19,7 @@ use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
-use crate::numerics::chebyshev::{Chebyshev, local_cubic};
+use crate::numerics::search::chebyshev::{Chebyshev, local_cubic};
 
 /// Chebyshev nodes in the action. Over the action interval the log of the next wealth, which is the feature, is nearly
 /// a parabola: a cubic through four nodes is good to 1e-6 of the gain.

@@ -45,8 +45,8 @@ use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::surrogate::policy_target::policy_target;
 use crate::control::uncertainty::{Reach, UncertaintySet};
-use crate::numerics::interruption;
-use crate::numerics::minimise::maximise_concave_scalar;
+use crate::numerics::machine::interruption;
+use crate::numerics::search::minimise::maximise_concave_scalar;
 
 /// Largest number of doublings of an uncertified window: sixteen times the first reach takes a return to e^-9.6.
 const WINDOW_GROWTHS: usize = 4;

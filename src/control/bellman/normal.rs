@@ -11,7 +11,7 @@ use super::Pricing;
 use super::field::{Field, Payoffs};
 use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
 use crate::control::problem::dynamics::Trade;
-use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw, Quadrature, WorstNormal};
+use crate::numerics::law::confidence_region::{ConfidenceRegion, NormalLaw, Quadrature, WorstNormal};
 
 /// The worst law of every action is itself computed to 1e-6 of an angle: a finer action would be noise.
 const ACTION_TOLERANCE: f64 = 1e-6;

@@ -1,8 +1,8 @@
 //! The result of a robust step.
 
 use crate::control::problem::actions::Band;
-use crate::numerics::confidence_region::NormalLaw;
-use crate::numerics::wasserstein::Move;
+use crate::numerics::law::confidence_region::NormalLaw;
+use crate::numerics::transport::wasserstein::Move;
 
 /// Relative utility that sums of a few hundred roundings may lose: a law that loses no more is not reported as worse.
 pub(super) const LOSS_OF_ROUNDING: f64 = 1e-14;

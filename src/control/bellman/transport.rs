@@ -8,7 +8,7 @@ use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
 use crate::control::problem::dynamics::Trade;
 use crate::control::uncertainty::COINCIDENT;
 use crate::control::uncertainty::centre::Centre;
-use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
+use crate::numerics::transport::wasserstein::{WassersteinBall, WorstLaw};
 
 /// The floor gain is flat at the best action: an action off by this costs less than rounding.
 const ACTION_TOLERANCE: f64 = 1e-7;

@@ -31,8 +31,8 @@ use crate::control::request::specification::{ProblemSpecification, Specification
 use crate::control::uncertainty::centre::record;
 use crate::control::uncertainty::laws::Laws;
 use crate::control::uncertainty::radius::RadiusEstimator;
-use crate::numerics::block_bootstrap::circular_blocks;
-use crate::numerics::streams::stream;
+use crate::numerics::machine::streams::stream;
+use crate::numerics::statistics::block_bootstrap::circular_blocks;
 
 /// Records drawn of a world. For long records the number is capped by the returns in all, but is at least the last
 /// constant.

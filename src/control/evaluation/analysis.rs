@@ -9,7 +9,7 @@ use crate::control::evaluation::yearly_worth::{
     INITIAL_WEALTH, MixBooks, Scale, YearlyWorth, at_once, present_at_once,
 };
 use crate::control::problem::actions::Band;
-use crate::numerics::long_run_mean::LongRunMean;
+use crate::numerics::statistics::long_run_mean::LongRunMean;
 
 /// One strategy with its decisions and its account.
 pub struct StrategyLine {

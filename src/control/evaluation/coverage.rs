@@ -23,12 +23,12 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
 use crate::control::uncertainty::centre::Centre;
-use crate::numerics::block_bootstrap::circular_blocks;
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::law_distance::{LawDistance, Placed, distance_of_masses};
-use crate::numerics::minimise::maximise_concave_scalar;
-use crate::numerics::streams::stream;
-use crate::numerics::summary::{Clustered, Estimate};
+use crate::numerics::law::law_distance::{LawDistance, Placed, distance_of_masses};
+use crate::numerics::machine::streams::stream;
+use crate::numerics::search::minimise::maximise_concave_scalar;
+use crate::numerics::statistics::block_bootstrap::circular_blocks;
+use crate::numerics::statistics::summary::{Clustered, Estimate};
 
 /// Basis points in one.
 const BASIS_POINTS: f64 = 1e4;

@@ -45,8 +45,8 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::*;
-    use crate::numerics::streams::stream;
-    use crate::numerics::summary::Clustered;
+    use crate::numerics::machine::streams::stream;
+    use crate::numerics::statistics::summary::Clustered;
 
     /// Counts over 200 reports of 300 paths of twelve months in stocks. The first count is how often the 90 % interval
     /// of the certainty equivalent holds the truth. The second is how often the sentence appears.

@@ -24,8 +24,8 @@ use crate::control::request::specification::Specification;
 use crate::control::training::Training;
 use crate::control::uncertainty::centre::{Centring, record};
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::law_distance::{LawDistance, Placed};
-use crate::numerics::streams::stream;
+use crate::numerics::law::law_distance::{LawDistance, Placed};
+use crate::numerics::machine::streams::stream;
 
 /// Progress is reported about this often.
 const REPORTS: usize = 100;

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::control::problem::utility::{marginal_utility, utility};
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::framework::Framework;
-use crate::numerics::summary::Estimate;
+use crate::numerics::statistics::summary::Estimate;
 
 /// Name and version of the report format.
 pub const FORMAT: &str = "ballast-evaluation-1";

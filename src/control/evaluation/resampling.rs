@@ -3,10 +3,10 @@
 use crate::control::evaluation::account::{Account, Annual};
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 use crate::control::evaluation::yearly_worth::{CONFIDENCE, Scale, YEAR_BLOCK};
-use crate::numerics::block_bootstrap::circular_blocks;
-use crate::numerics::streams::stream;
-use crate::numerics::student::{normal_cdf, student_two_sided};
-use crate::numerics::summary::{quantile, share_interval};
+use crate::numerics::law::student::{normal_cdf, student_two_sided};
+use crate::numerics::machine::streams::stream;
+use crate::numerics::statistics::block_bootstrap::circular_blocks;
+use crate::numerics::statistics::summary::{quantile, share_interval};
 
 /// Number of resamples; a block of periods is one year.
 pub const RESAMPLES: usize = 2000;

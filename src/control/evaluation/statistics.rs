@@ -16,7 +16,7 @@ use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::ProblemSpecification;
-use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
+use crate::numerics::statistics::summary::{Clustered, Estimate, interpolated_quantile};
 
 /// Number of bins of the histograms.
 const BINS: usize = 40;

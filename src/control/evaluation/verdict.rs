@@ -10,7 +10,7 @@ use crate::control::evaluation::resampling::intervals;
 use crate::control::evaluation::rolling::Decision;
 use crate::control::evaluation::yearly_worth::CONFIDENCE;
 use crate::control::policy::advice::AdviceSource;
-use crate::numerics::digits::{fixed, signed};
+use crate::numerics::machine::digits::{fixed, signed};
 
 /// Fewer years say too little about the next one. A crash that comes once in ten years is missing from 35 % of ten-year
 /// records, 12 % of twenty-year ones and 4 % of thirty-year ones. An interval counts only what is in the record.

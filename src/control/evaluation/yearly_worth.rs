@@ -4,7 +4,7 @@ use crate::control::evaluation::account::Account;
 use crate::control::evaluation::backtest_report::BootstrapEstimate;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::specification::UtilitySpecification;
-use crate::numerics::long_run_mean::{DRAWS, LongRunMean, simultaneous_spread};
+use crate::numerics::statistics::long_run_mean::{DRAWS, LongRunMean, simultaneous_spread};
 
 /// Wealth at the start of the record, and of every year whose utility is taken.
 pub const INITIAL_WEALTH: f64 = 100.0;
@@ -124,7 +124,7 @@ mod tests {
     use crate::control::evaluation::account::keep;
     use crate::control::evaluation::rolling::ActualPeriod;
     use crate::control::problem::actions::Band;
-    use crate::numerics::streams::stream;
+    use crate::numerics::machine::streams::stream;
 
     #[test]
     fn the_worth_is_the_certainty_equivalent_and_its_parts_are_what_a_year_adds() {

@@ -6,8 +6,8 @@ use utoipa::ToSchema;
 use crate::control::bellman::solution::{Adversary, RobustSolution};
 use crate::control::policy::advice::Advice;
 use crate::control::request::centre::CentreSpecification;
-use crate::numerics::confidence_region::NormalLaw;
-use crate::numerics::wasserstein::Move;
+use crate::numerics::law::confidence_region::NormalLaw;
+use crate::numerics::transport::wasserstein::Move;
 
 /// Radius, in log-return, for which the sentence gives the price.
 const RADIUS_UNIT: f64 = 0.001;

@@ -4,7 +4,7 @@ use crate::control::error::FieldError;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::learning::Learning;
 use crate::control::request::rules;
-use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::law::empirical::EmpiricalDistribution;
 
 /// The realised values of a period.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,8 +5,8 @@
 //! the investor, at any wealth and risk aversion.
 
 use crate::control::request::specification::UtilitySpecification;
-use crate::numerics::dispatch::dispatched;
-use crate::numerics::elementary::{exp_m1, ln};
+use crate::numerics::machine::dispatch::dispatched;
+use crate::numerics::machine::elementary::{exp_m1, ln};
 
 /// Largest exponent used: exp(600) is finite, and a loss that deep is never chosen.
 const LARGEST_EXPONENT: f64 = 600.0;

@@ -4,8 +4,8 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::control::request::specification::ProblemSpecification;
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::moments::CentralMoments;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::moments::CentralMoments;
 
 /// Annual rate and returns of a problem, with p periods in a year. All are fractions, capped at the largest double.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]

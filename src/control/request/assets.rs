@@ -17,8 +17,8 @@ use super::specification::{InitialLaws, ProblemSpecification, Specification, Uti
 use super::support::Support;
 use super::text::check_text;
 use crate::control::error::FieldError;
-use crate::numerics::fund_bridges::fund_returns;
-use crate::numerics::levelling::inverse_volatility;
+use crate::numerics::bridge::funds::fund_returns;
+use crate::numerics::transport::levelling::inverse_volatility;
 
 /// Largest number of assets.
 pub const MOST_ASSETS: usize = 30;

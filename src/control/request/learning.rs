@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
-use crate::numerics::empirical::{EmpiricalDistribution, weights};
+use crate::numerics::law::empirical::{EmpiricalDistribution, weights};
 
 /// Allowed half-lives: the number of periods in which a return's weight halves. Below 1 the newest return would
 /// outweigh all others together, however many there are: at 1 the effective sample size is at most 3. Above the

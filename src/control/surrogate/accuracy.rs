@@ -15,7 +15,7 @@ use super::fitting::DesignPoint;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::specification::{DesignSpecification, Specification};
 use crate::control::solved_step::{ExpectedError, StepDiagnostics};
-use crate::numerics::streams::stream;
+use crate::numerics::machine::streams::stream;
 
 /// Number of fresh states that are solved to judge a fit.
 pub const CHECKS: usize = 100;

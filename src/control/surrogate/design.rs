@@ -17,10 +17,10 @@ use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, ProblemSpecification, Specification};
 use crate::control::request::support::Interval;
 use crate::control::uncertainty::centre::Centre;
-use crate::numerics::confidence_region::{self, ConfidenceRegion, NormalLaw};
-use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::streams::stream;
+use crate::numerics::law::confidence_region::{self, ConfidenceRegion, NormalLaw};
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::machine::streams::stream;
 
 /// Largest number of states that set the guard: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;

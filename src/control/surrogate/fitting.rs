@@ -13,9 +13,9 @@ use crate::control::problem::holdings::Holdings;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::SurrogateDiagnostics;
+use crate::numerics::gp::fit::{self, Bounds, FitError};
 use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
-use crate::numerics::gp_fit::{self, Bounds, FitError};
-use crate::numerics::summary::quantile;
+use crate::numerics::statistics::summary::quantile;
 
 /// Share of the states of the design's own law that lie within the guard. The limit is itself the quantile of few
 /// states beyond. Over six seeds 98.8 to 99.6 % of fresh states pass; with a share of 0.99, 97.7 to 99.4 % passed, with
@@ -240,14 +240,14 @@ impl Fitting<'_> {
         inputs: &DMatrix<f64>,
         targets: &[Vec<f64>],
         start: Option<&Hyperparameters>,
-    ) -> Result<gp_fit::Fit, TrainError> {
+    ) -> Result<fit::Fit, TrainError> {
         let bounds = self.specification.surrogate.bounds;
         let bounds = Bounds {
             lengthscale: bounds.lengthscale,
             signal_variance: bounds.signal_variance,
             noise_variance: bounds.noise_variance,
         };
-        gp_fit::fit(inputs, targets, &bounds, start, self.watch.stop).map_err(|error| match error {
+        fit::fit(inputs, targets, &bounds, start, self.watch.stop).map_err(|error| match error {
             FitError::Singular(singular) => self.singular(surrogate, singular.jitter),
             FitError::Stopped => TrainError::Stopped,
         })

@@ -18,7 +18,7 @@ use crate::control::error::TrainError;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::{StepDiagnostics, StepSolution};
-use crate::numerics::farthest::farthest_points;
+use crate::numerics::gp::farthest::farthest_points;
 
 /// Largest number of states whose features are computed together, to share their common work.
 const MOST_TOGETHER: usize = 256;

@@ -6,8 +6,8 @@ use crate::control::request::framework::Framework;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{Interval, LawExtent};
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::volatility::rescaled;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::volatility::rescaled;
 
 /// Smallest mass of an atom: less is lost in rounding, so an atom that decayed to it is left out.
 const NO_MASS: f64 = 1e-18;

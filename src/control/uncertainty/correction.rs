@@ -4,7 +4,7 @@
 use super::radius::RadiusEstimator;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::RADIUS_CORRECTION;
-use crate::numerics::gap_places::Statistic;
+use crate::numerics::bridge::gap_places::Statistic;
 
 impl RadiusEstimator {
     /// Returns the factor on simulated quantiles that makes the one of the history exact. `None` under a calibration,
@@ -49,9 +49,9 @@ mod tests {
     use super::*;
     use crate::control::kept::Cache;
     use crate::control::request::specification::Specification;
-    use crate::numerics::bridge_paths::AbsoluteBridges;
-    use crate::numerics::empirical::EmpiricalDistribution;
-    use crate::numerics::streams::stream;
+    use crate::numerics::bridge::paths::AbsoluteBridges;
+    use crate::numerics::law::empirical::EmpiricalDistribution;
+    use crate::numerics::machine::streams::stream;
 
     #[test]
     fn a_corrected_radius_is_exact_and_stays_near_as_returns_are_learned() {

@@ -14,10 +14,10 @@ use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{FeatureMap, Specification};
 use crate::control::request::support::{LawExtent, Support};
-use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
-use crate::numerics::moments::CentralMoments;
+use crate::numerics::law::confidence_region::{ConfidenceRegion, NormalLaw};
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::exponential_mean::{ExponentialMean, WorstExponential};
+use crate::numerics::law::moments::CentralMoments;
 
 /// Smallest variance of an estimated law. With decaying weights no other may be left; an accepted history varies more,
 /// however long its session lasts.

@@ -12,7 +12,7 @@ pub mod radius;
 
 use self::centre::Centre;
 use crate::control::request::support::{Interval, Support};
-use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
+use crate::numerics::law::confidence_region::{ConfidenceRegion, NormalLaw};
 
 /// Log-returns closer than this count as equal.
 pub const COINCIDENT: f64 = 1e-12;

@@ -9,13 +9,13 @@ use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::control::uncertainty::centre::record;
-use crate::numerics::bridge_law::BridgeLaw;
-use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
-use crate::numerics::calibration::calibration_factor;
-use crate::numerics::chebyshev::local_cubic;
-use crate::numerics::confidence_region;
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::gap_places::Statistic;
+use crate::numerics::bridge::calibration::calibration_factor;
+use crate::numerics::bridge::gap_places::Statistic;
+use crate::numerics::bridge::limit::BridgeLaw;
+use crate::numerics::bridge::paths::{AbsoluteBridges, GRADED_FROM};
+use crate::numerics::law::confidence_region;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::search::chebyshev::local_cubic;
 
 /// If the oldest return of the last law weighs at least this share of the newest, the decay of weights is treated as
 /// rounding: times lie within 1/8000 of i/n, and |B| is read from the bridges of n.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use ballast::service::advise_assets::AssetsAdvised;
+use ballast::service::advice::advise_assets::AssetsAdvised;
 
 use super::{caution, money, percent};
 

@@ -5,8 +5,8 @@ use nalgebra::DMatrix;
 use super::Interior;
 use crate::control::assets::cuts::dot;
 use crate::control::request::assets::MOST_ASSETS;
-use crate::numerics::cholesky::Cholesky;
-use crate::numerics::dispatch::dispatched;
+use crate::numerics::gp::cholesky::Cholesky;
+use crate::numerics::machine::dispatch::dispatched;
 
 /// Steps keep this share of the distance to a bound.
 const TO_BOUND: f64 = 0.95;

@@ -8,8 +8,8 @@ use crate::control::request::backtest::days;
 use crate::control::request::backtest_assets::{AssetsBacktestRequest, MOST_HELD, MOST_READ};
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::warnings::Warning;
-use crate::numerics::fund_bridges::fund_returns;
-use crate::numerics::levelling::inverse_volatility;
+use crate::numerics::bridge::funds::fund_returns;
+use crate::numerics::transport::levelling::inverse_volatility;
 
 impl AssetsBacktest {
     /// Checks and completes a request, and bounds its size.

@@ -305,7 +305,7 @@ mod tests {
     use crate::control::evaluation::rolling::{ActualPeriod, Decision};
     use crate::control::evaluation::yearly_worth::Scale;
     use crate::control::problem::actions::Band;
-    use crate::numerics::fund_bridges::FundBridges;
+    use crate::numerics::bridge::funds::FundBridges;
 
     const BANK: f64 = 0.002;
     const COST: f64 = 0.001;

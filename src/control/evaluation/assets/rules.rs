@@ -10,8 +10,8 @@ use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::fund::GroundNorm;
-use crate::numerics::least_variance::least_variance;
-use crate::numerics::levelling::inverse_volatility;
+use crate::numerics::transport::least_variance::least_variance;
+use crate::numerics::transport::levelling::inverse_volatility;
 
 /// A rule that chooses shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]

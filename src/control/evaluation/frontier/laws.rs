@@ -7,7 +7,7 @@ use super::report::Bootstrap;
 use crate::control::error::FieldError;
 use crate::control::request::learning::SMALLEST_DEVIATION;
 use crate::control::request::support::Interval;
-use crate::numerics::streams::stream;
+use crate::numerics::machine::streams::stream;
 
 /// Approximate number of atoms of a smoothed law; each past return is spread over equally many atoms, at least two.
 const ATOMS: usize = 4096;

@@ -33,10 +33,10 @@ use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::annualised::premium;
 use crate::control::request::frontier::FrontierQuestion;
 use crate::control::uncertainty::radius::RadiusEstimator;
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::fund_bridges::fund_returns;
-use crate::numerics::levelling::inverse_volatility;
-use crate::numerics::summary::{Clustered, Estimate};
+use crate::numerics::bridge::funds::fund_returns;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::statistics::summary::{Clustered, Estimate};
+use crate::numerics::transport::levelling::inverse_volatility;
 
 /// Confidence level of all intervals.
 const LEVEL: f64 = 0.9;

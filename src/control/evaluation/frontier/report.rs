@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::request::frontier::FrontierRequest;
-use crate::numerics::summary::Estimate;
+use crate::numerics::statistics::summary::Estimate;
 
 /// Name and version of the report format.
 pub const FORMAT: &str = "ballast-frontier-1";

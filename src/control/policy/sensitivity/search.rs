@@ -11,8 +11,8 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::request::support::Interval;
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::summary::interpolated_quantile;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::statistics::summary::interpolated_quantile;
 
 /// Most returns that are left out in turn: all of thirty years of months.
 const MOST_LEFT_OUT: usize = 360;

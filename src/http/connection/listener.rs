@@ -1,0 +1,95 @@
+//! A listener: the address that it listens on, and the connections that it accepts.
+//!
+//! A client is accepted or asked to retry at once: nobody waits in the kernel's queue behind an idle connection.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use hyper_util::server::graceful::GracefulShutdown;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_rustls::TlsAcceptor;
+
+use crate::http::connection::connections::{ConnectionGuard, Connections};
+use crate::http::connection::conversation::{self, Stopping};
+use crate::http::connection::patient::Patience;
+use crate::service::metrics::CONNECTIONS_REFUSED;
+use crate::service::process::shutdown::Shutdown;
+
+/// Pause after a failed accept; most likely the process is out of descriptors.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+/// The answer to clients that get no connection. It is written once, because it fits the empty socket buffer.
+const NO_PLACE: &[u8] =
+    b"HTTP/1.1 503 Service Unavailable\r\nretry-after: 1\r\nconnection: close\r\ncontent-length: 0\r\n\r\n";
+
+pub struct Door {
+    pub address: SocketAddr,
+    listener: TcpListener,
+}
+
+/// Settings for accepted connections.
+#[derive(Clone)]
+pub struct Manners {
+    pub application: Router,
+    pub connections: Arc<Connections>,
+    pub patience: Patience,
+    /// `None` if connections are not encrypted.
+    pub encryption: Option<TlsAcceptor>,
+}
+
+impl Door {
+    /// Binds to the address.
+    ///
+    /// # Errors
+    /// The address is in use, or is not one of this machine.
+    pub async fn at(address: SocketAddr) -> io::Result<Self> {
+        let listener = TcpListener::bind(address).await?;
+        Ok(Door { address: listener.local_addr()?, listener })
+    }
+
+    /// Accepts connections until the shutdown begins.
+    pub async fn open(&self, manners: Manners, shutdown: &Shutdown, stopping: &GracefulShutdown) {
+        loop {
+            let accepted = tokio::select! {
+                accepted = self.listener.accept() => accepted,
+                () = shutdown.begun() => return,
+            };
+            let Ok((stream, caller)) = accepted else {
+                tokio::time::sleep(ACCEPT_PAUSE).await;
+                continue;
+            };
+            match manners.connections.place(caller.ip()) {
+                Some(held) => {
+                    let stopping = Stopping { shutdown: shutdown.clone(), watcher: stopping.watcher() };
+                    tokio::spawn(let_in(stream, held, manners.clone(), stopping));
+                }
+                None => {
+                    metrics::counter!(CONNECTIONS_REFUSED).increment(1);
+                    // A TLS client could not read it. If the write fails, the client is gone.
+                    if manners.encryption.is_none() {
+                        let _ = stream.try_write(NO_PLACE);
+                    }
+                }
+            }
+        }
+    }
+}
+
+async fn let_in(stream: TcpStream, held: ConnectionGuard, manners: Manners, stopping: Stopping) {
+    let Manners { application, patience, encryption, .. } = manners;
+    let Ok(local) = stream.local_addr() else { return };
+    let Some(acceptor) = encryption else {
+        return conversation::hold(stream, &held, local, patience, application, stopping).await;
+    };
+    let shaken = tokio::select! {
+        shaken = tokio::time::timeout(patience.for_head, acceptor.accept(stream)) => shaken,
+        () = held.connection.gave_way() => return,
+    };
+    match shaken {
+        Ok(Ok(stream)) => conversation::hold(stream, &held, local, patience, application, stopping).await,
+        Ok(Err(error)) => tracing::debug!(%error, "a TLS handshake failed"),
+        Err(_) => tracing::debug!("a TLS handshake timed out"),
+    }
+}

@@ -1,0 +1,6 @@
+//! Estimates with intervals, resampling, and tests.
+
+pub mod block_bootstrap;
+pub mod exchangeability;
+pub mod long_run_mean;
+pub mod summary;

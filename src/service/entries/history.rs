@@ -1,0 +1,310 @@
+//! The answers that a session was given, and what they would be after its corrections.
+
+use std::collections::BTreeMap;
+
+use jiff::civil::Date;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::control::assets::advice::named;
+use crate::control::policy::advice::{Advice, Uncertainty};
+use crate::control::policy::advisor::AdviceMode;
+use crate::control::request::terms::Terms;
+use crate::service::callers::allowance::HeavyPermit;
+use crate::service::entries::answer::{Corrected, Observed};
+use crate::service::entries::periods::{Periods, Replay, ReplayedPeriod, SessionPeriod};
+use crate::service::entries::report::{Correct, Report};
+use crate::service::error::ServiceError;
+use crate::service::process::memory::Large;
+use crate::service::sessions::Sessions;
+use crate::service::sessions::assets::{Composition, ObservedAssets};
+use crate::service::sessions::content::{answer, content};
+use crate::service::sessions::known::InitialHistory;
+use crate::service::sessions::plan::{Renew, Renewed, SessionPlan};
+use crate::service::sessions::standing::SessionState;
+use crate::store::{EntryKind, SessionFacts, SessionRow, Tenant};
+
+/// The start of a session, and everything recorded since.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct History {
+    pub session: String,
+    /// The first policy.
+    pub policy: String,
+    /// Rate, cost and flows of its periods, unless a report gives others.
+    pub terms: Terms,
+    pub initial_wealth: f64,
+    /// Share of wealth in the risky asset.
+    pub initial_holding: f64,
+    /// Radius of the uncertainty set before the first period, in the unit of an advice's radius.
+    pub initial_radius: f64,
+    /// Names of the assets, if there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assets: Option<Vec<String>>,
+    /// Figures of the assets at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub composed: Option<Composition>,
+    /// Log-returns known at the start.
+    pub history: InitialHistory,
+    pub observations: Vec<Observation>,
+    pub corrections: Vec<Correction>,
+    /// The policies that followed the first.
+    pub renewals: Vec<Renewal>,
+}
+
+/// One period, observed or inserted later.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Observation {
+    /// The answer when it was reported, with its present number.
+    #[serde(flatten)]
+    pub answered: Observed,
+    /// The first report of it.
+    pub reported: Report,
+    pub observed_ms: i64,
+    /// Numbers of the corrections that inserted it or reported it again.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub corrections: Vec<usize>,
+    /// The answer after all corrections; present from the first period that a correction changed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub now: Option<Now>,
+}
+
+/// A period after all corrections.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Now {
+    /// Its present report, if it was corrected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reported: Option<Report>,
+    /// Null if it is missing.
+    pub log_return: Option<f64>,
+    /// Figures of several assets by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assets: Option<AssetsNow>,
+    /// The allocation that would have been advised for it.
+    pub advised_allocation: f64,
+    pub executed_allocation: f64,
+    /// Wealth at its end.
+    pub wealth: f64,
+    /// Share of wealth in the risky asset.
+    pub holding: f64,
+    /// Its last day, if it is known.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
+    /// Radius of the uncertainty set after it, in the unit of an advice's radius.
+    pub radius: f64,
+}
+
+/// A period of several assets after all corrections.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct AssetsNow {
+    /// Log-returns by asset name; null if they are missing.
+    pub log_returns: Option<BTreeMap<String, f64>>,
+}
+
+/// One correction, as it was made.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Correction {
+    #[serde(flatten)]
+    pub correction: Correct,
+    /// The answer to it.
+    #[serde(rename = "told")]
+    pub answered: Corrected,
+    pub corrected_ms: i64,
+}
+
+/// One renewal, as it was made.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Renewal {
+    /// The answer to it.
+    #[serde(flatten)]
+    pub answered: Renewed,
+    /// Number of last returns that the law was made of; null if it used all.
+    pub window: Option<usize>,
+    pub renewed_ms: i64,
+}
+
+impl Sessions {
+    /// Reads the session's start and every entry. From the first corrected period on, periods are replayed and advised
+    /// again.
+    /// Each needs a permit to solve.
+    ///
+    /// # Errors
+    /// There is no such session, or too much is being solved already.
+    pub async fn history(
+        &self,
+        tenant: &Tenant,
+        session: &str,
+        turn: &HeavyPermit,
+    ) -> Result<Large<History>, ServiceError> {
+        let Large { value: facts, room } = self.facts(tenant, session).await?;
+        let is_large = room.is_some();
+        let reading = move || {
+            let periods = Periods::of(&facts)?;
+            let (corrections, renewals) = amendments(&facts, &periods)?;
+            Ok::<_, ServiceError>((facts, periods, corrections, renewals))
+        };
+        let (facts, periods, corrections, renewals) = self.apart(tenant, is_large, reading).await??;
+        let first = periods.first_changed();
+        let changed = match first < periods.all.len() {
+            true => {
+                turn.begin().await?;
+                self.changed(tenant, session, &periods, first).await?
+            }
+            false => Vec::new(),
+        };
+        let SessionPlan { terms, assets, .. } = SessionPlan::of(&facts.row)?;
+        let start = periods.at_start(terms.learning);
+        let listing = move || Ok::<_, ServiceError>((observations(&facts, &periods, first, changed)?, facts.row));
+        let (observations, row) = self.apart(tenant, is_large, listing).await??;
+        let first = self.policies.advisor(tenant, &row.policy).await?;
+        let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
+        let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
+        let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = row;
+        let value = History {
+            session,
+            policy,
+            terms,
+            initial_wealth,
+            initial_holding,
+            initial_radius,
+            history: InitialHistory::of(history, assets.as_ref().map(Vec::len)),
+            assets,
+            composed,
+            observations,
+            corrections,
+            renewals,
+        };
+        Ok(Large { value, room })
+    }
+
+    /// Returns each period from `first` on, the first that differs from its acknowledgement. Each waits for its own
+    /// permit to be advised. So a long session starves nobody, and a disconnected caller stops the work.
+    async fn changed(
+        &self,
+        tenant: &Tenant,
+        session: &str,
+        periods: &Periods,
+        first: usize,
+    ) -> Result<Vec<Changed>, ServiceError> {
+        let (mut passage, mut changed): (Replay<'_>, Vec<Changed>) = (periods.passage()?, Vec::new());
+        for (step, period) in periods.all.iter().enumerate() {
+            let stretch = passage.stretch();
+            let passed = passage.next().map_err(ServiceError::of_recorded)?;
+            let Some(passed) = passed.filter(|_| step >= first) else { continue };
+            let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
+            let before = passed.before.clone().with_law(stretch.terms.learning).state;
+            let (law, after) = (advising.clone(), passage.stands().state);
+            let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
+            let advice = self.resolving.run(tenant, advise).await?;
+            // The radius after a period is the one of the next advice.
+            changed.last_mut().into_iter().for_each(|(before, _)| before.radius = advice.radius);
+            let inserted = match period.is_inserted() {
+                true => {
+                    let uncertainty = self.resolving.run(tenant, move || law.uncertainty(&after)).await?;
+                    let name = (session, step + 1);
+                    Some(inserted(name, &passed, &passage.standing, (&advice, uncertainty)))
+                }
+                false => None,
+            };
+            changed.push((now(period, passed, &passage.standing, &advice), inserted));
+        }
+        let (measuring, policy) = (passage.stands().state, &periods.current().policy);
+        let advisor = self.policies.advisor(tenant, policy).await?;
+        let radius = self.resolving.run(tenant, move || advisor.radius(&measuring)).await?;
+        changed.last_mut().into_iter().for_each(|(last, _)| last.radius = radius);
+        Ok(changed)
+    }
+}
+
+/// Returns the corrections and the renewals, each in order.
+fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction>, Vec<Renewal>), ServiceError> {
+    let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
+    for entry in &facts.entries {
+        match entry.kind {
+            EntryKind::Observation => {}
+            EntryKind::Correction => corrections.push(Correction {
+                correction: content(entry, periods.names())?,
+                answered: answer(entry, periods.names())?,
+                corrected_ms: entry.created_ms,
+            }),
+            EntryKind::Renewal => renewals.push(Renewal {
+                answered: answer(entry, periods.names())?,
+                window: content::<Renew>(entry, periods.names())?.window,
+                renewed_ms: entry.created_ms,
+            }),
+        }
+    }
+    Ok((corrections, renewals))
+}
+
+/// A period after all corrections. For an inserted period also the substitute for the answer to its observation.
+type Changed = (Now, Option<Observed>);
+
+/// Returns every period; `changed` holds those from `first` on.
+fn observations(
+    facts: &SessionFacts,
+    periods: &Periods,
+    first: usize,
+    changed: Vec<Changed>,
+) -> Result<Vec<Observation>, ServiceError> {
+    let mut changed = changed.into_iter();
+    let row = |(index, period): (usize, &SessionPeriod)| {
+        let entry = &facts.entries[period.entry];
+        let (now, inserted) = if index >= first { changed.next() } else { None }.unzip();
+        let (acknowledged, reported) = match inserted.flatten() {
+            Some(observed) => (observed, content::<Correct>(entry, periods.names())?.report()),
+            None => (answer::<Observed>(entry, periods.names())?, content(entry, periods.names())?),
+        };
+        let (answered, corrections) = (Observed { period: index + 1, ..acknowledged }, period.corrections.clone());
+        Ok(Observation { answered, reported, observed_ms: entry.created_ms, corrections, now })
+    };
+    periods.all.iter().enumerate().map(row).collect()
+}
+
+/// Builds the period that leaves the session in the state `after`.
+fn now(period: &SessionPeriod, passed: ReplayedPeriod, after: &SessionState, advice: &Advice) -> Now {
+    let ReplayedPeriod { before, seen, log_return, executed_allocation, .. } = passed;
+    let names = before.assets.as_ref().map(|assets| &assets.names);
+    Now {
+        reported: (!period.corrections.is_empty()).then(|| period.report.clone()),
+        log_return,
+        assets: names.map(|names| AssetsNow { log_returns: seen.row().map(|row| named(names, row)) }),
+        advised_allocation: advice.allocation,
+        executed_allocation,
+        wealth: after.state.wealth,
+        holding: after.state.holding,
+        date: after.days.last,
+        radius: f64::NAN,
+    }
+}
+
+/// Builds the answer for an inserted period as if it had been observed. The executed allocation counts as the advised
+/// one, because none was advised.
+fn inserted(
+    (session, period): (&str, usize),
+    passed: &ReplayedPeriod,
+    after: &SessionState,
+    (advice, uncertainty): (&Advice, Uncertainty),
+) -> Observed {
+    let assets = passed.before.assets.as_ref().map(|assets| ObservedAssets {
+        log_returns: passed.seen.row().map(|row| named(&assets.names, row)),
+        advised_allocations: named(&assets.names, &passed.executed),
+        executed_allocations: named(&assets.names, &passed.executed),
+        composed: assets.composed(),
+    });
+    Observed {
+        session: session.to_owned(),
+        period,
+        log_return: passed.log_return,
+        band: advice.band,
+        advised_allocation: passed.executed_allocation,
+        executed_allocation: passed.executed_allocation,
+        wealth: after.state.wealth,
+        holding: after.state.holding,
+        assets,
+        wealth_change: after.state.wealth - passed.before.state.wealth,
+        date: after.days.last,
+        completed: false,
+        drift: after.bet.drift(),
+        uncertainty,
+    }
+}

@@ -1,0 +1,17 @@
+//! The entries of a session: reports, corrections and renewals, how each is decided, recorded, replayed and shown.
+//! Nothing here answers a question that records nothing; those live in [`crate::service::advice`].
+
+pub(super) mod acknowledged;
+pub mod answer;
+pub mod change;
+pub(super) mod corrections;
+pub(super) mod days;
+pub mod drift;
+pub mod gate;
+pub mod history;
+pub mod periods;
+pub(super) mod record;
+pub(super) mod recording;
+pub(super) mod renewal;
+pub mod report;
+pub mod reports;

@@ -1,0 +1,249 @@
+//! Records the entries of a session: observations of periods, and corrections of them.
+//!
+//! An entry is computed from all entries before it, and appended after them. If another process wrote meanwhile, the
+//! append fails and the entry is computed again. So observations and corrections of all processes have one order.
+
+use jiff::Timestamp;
+use serde::Serialize;
+use tracing::Instrument;
+
+use crate::control::error::FieldError;
+use crate::service::callers::allowance::HeavyPermit;
+use crate::service::callers::keys::Caller;
+use crate::service::entries::answer::{Corrected, Observed};
+use crate::service::entries::corrections::AppliedCorrection;
+use crate::service::entries::drift::{self, DriftLevel};
+use crate::service::entries::periods::Periods;
+use crate::service::entries::report::{Correct, Observe};
+use crate::service::error::ServiceError;
+use crate::service::process::memory::Large;
+use crate::service::process::spans;
+use crate::service::sessions::content::{self, Packed, json};
+use crate::service::sessions::live::{LiveSession, with_uncertainty};
+use crate::service::sessions::plan::{Renewed, SessionPlan};
+use crate::service::sessions::slots::SlotGuard;
+use crate::service::sessions::{Name, Sessions};
+use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
+
+impl Sessions {
+    /// Records the return of a period exactly once, durably before the answer. Returns an [`Observed`] in JSON as it
+    /// was recorded. If the caller disconnects, the write may or may not commit; either way nothing of it stays in
+    /// memory.
+    ///
+    /// # Errors
+    /// A field breaks a rule, or the period was observed with other content, is not the next, or lies past the horizon.
+    pub async fn observe(
+        &self,
+        tenant: &Tenant,
+        observe: &Observe,
+        turn: &HeavyPermit,
+    ) -> Result<String, ServiceError> {
+        let (session, period) = (&observe.session, numbered("period", observe.period)?);
+        let report = observe.report();
+        let mut held = self.hold(tenant, session).await;
+        loop {
+            let live = held.current(&self.rows(tenant, session)).await?;
+            if period <= live.observed {
+                let names = live.standing.names();
+                return self.repeat(session, (EntryKind::Observation, period), &report, names).await;
+            }
+            live.check_next_period(period)?;
+            let means = self.means(tenant, live, turn).await?;
+            let (standing, answer) = live.after(observe, &report, (&means, self.clock.today())).await?;
+            let Packed { content_json, answer_json, numbers, sent } =
+                Packed::of(&report, &answer, live.standing.names())?;
+            let new = EntryRow {
+                session: session.clone(),
+                entry: live.seen.entries() + 1,
+                kind: EntryKind::Observation,
+                number: period,
+                content_json,
+                answer_json,
+                numbers,
+                created_ms: self.clock.now_milliseconds(),
+                key: observe.reported_by.to_string(),
+            };
+            let levels = (live.standing.bet.level(), answer.drift.level);
+            let next = LiveSession {
+                row: live.row.clone(),
+                standing,
+                observed: period,
+                corrections: live.corrections,
+                renewals: live.renewals,
+                current: live.current.clone(),
+                renew: live.renew,
+                seen: live.seen.followed_by(&new),
+                radius: Some(answer.uncertainty.radius),
+                advice: None,
+            };
+            if self.append(&self.store, &mut held, new, next, levels).await? {
+                return Ok(sent);
+            }
+        }
+    }
+
+    /// Records another report of an observed period, with the guarantees of [`Self::observe`]. Returns a [`Corrected`]
+    /// in JSON. Every later advice uses the corrected returns.
+    ///
+    /// # Errors
+    /// A field breaks a rule or makes a later period break one, or the correction was made with other content or is not
+    /// the next.
+    pub async fn correct(
+        &self,
+        caller: &Caller,
+        session: &str,
+        correct: &Correct,
+        turn: &HeavyPermit,
+    ) -> Result<String, ServiceError> {
+        let (number, tenant) = (numbered("correction", correct.correction)?, &caller.tenant);
+        correct.check()?;
+        let mut held = self.hold(tenant, session).await;
+        loop {
+            let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
+            let mut periods = Periods::of(&facts)?;
+            if is_repeat(EntryKind::Correction, number, periods.corrections)? {
+                return self.repeat(session, (EntryKind::Correction, number), correct, periods.names()).await;
+            }
+            let (renewals, current) = (periods.renewals(), periods.current().clone());
+            let advisor = self.policies.advisor(tenant, &current.policy).await?;
+            current.follows(correct.period, advisor.specification().problem.framework)?;
+            current.check_change(correct, periods.all.len())?;
+            let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
+            let AppliedCorrection { before, standing, observed, log_return, wealth_change } =
+                self.advising.run(tenant, move || periods.apply_correction(&putting, entry, today)).await??;
+            let step = current.step_from(observed, SessionPlan::of(&facts.row)?.renew, renewals);
+            let means = self.means_of(advisor, Some(turn));
+            let (standing, uncertainty) = with_uncertainty(&means, tenant, step, standing).await?;
+            let answer = Corrected {
+                session: session.to_owned(),
+                correction: number,
+                period: correct.period,
+                log_return,
+                observed,
+                wealth: standing.state.wealth,
+                holding: standing.state.holding,
+                assets: standing.assets.as_ref().map(|assets| assets.composed()),
+                wealth_change,
+                date: standing.days.last,
+                drift: standing.bet.drift(),
+                uncertainty,
+            };
+            let levels = (before.bet.level(), answer.drift.level);
+            let Packed { content_json, answer_json, numbers, sent } = Packed::of(correct, &answer, standing.names())?;
+            let new = EntryRow {
+                session: session.to_owned(),
+                entry: facts.seen.entries() + 1,
+                kind: EntryKind::Correction,
+                number,
+                content_json,
+                answer_json,
+                numbers,
+                created_ms: self.clock.now_milliseconds(),
+                key: caller.key().to_string(),
+            };
+            let next = LiveSession {
+                renew: SessionPlan::of(&facts.row)?.renew,
+                row: facts.row.into(),
+                standing,
+                observed,
+                corrections: number,
+                renewals,
+                current: current.into(),
+                seen: facts.seen.followed_by(&new),
+                radius: Some(answer.uncertainty.radius),
+                advice: None,
+            };
+            if self.append(&self.store.by(caller.actor()), &mut held, new, next, levels).await? {
+                return Ok(sent);
+            }
+        }
+    }
+
+    /// Returns the first answer to an entry that is already recorded, for a session with the assets `names`.
+    pub(in crate::service) async fn repeat(
+        &self,
+        session: &str,
+        (kind, number): (EntryKind, usize),
+        content: &(impl Serialize + Sync),
+        names: &[String],
+    ) -> Result<String, ServiceError> {
+        match self.store.entry(session, kind, number).await? {
+            Some(row) if content::records(&row, content, names)? => sent(row, names),
+            Some(row) if kind == EntryKind::Renewal => Err(ServiceError::RenewedAlready {
+                number,
+                by: if row.key.is_empty() { "the service".to_owned() } else { format!("the key {}", row.key) },
+                at: Timestamp::from_millisecond(row.created_ms)
+                    .map_or_else(|_| "?".to_owned(), |at| format!("{at:.0}")),
+            }),
+            _ => Err(ServiceError::Conflict { what: kind.counted(), number }),
+        }
+    }
+
+    /// Appends the entry that leads to `next`; returns false if another process wrote meanwhile. Counts a rise of the
+    /// drift level between the two `levels`. The slot is empty during the write, so that memory never runs ahead of the
+    /// disk.
+    async fn append(
+        &self,
+        store: &Store,
+        held: &mut SlotGuard<Name, LiveSession>,
+        new: EntryRow,
+        next: LiveSession,
+        levels: (DriftLevel, DriftLevel),
+    ) -> Result<bool, ServiceError> {
+        held.clear();
+        let due = next.is_due().then(|| (next.row.tenant.clone(), next.row.session.clone()));
+        let appended = store.append(new).instrument(spans::of_write("append an entry")).await?;
+        let is_appended = self.after_append(held, appended, next)?;
+        if is_appended {
+            drift::count(levels.0, levels.1);
+            // If the renewer's queue is full, its next round finds the session.
+            due.map(|name| self.due.try_send(name));
+        }
+        Ok(is_appended)
+    }
+
+    /// Handles the store's answer to an append as [`Self::append`] does.
+    pub(super) fn after_append(
+        &self,
+        held: &mut SlotGuard<Name, LiveSession>,
+        appended: Append,
+        next: LiveSession,
+    ) -> Result<bool, ServiceError> {
+        match appended {
+            Append::Appended => {
+                self.weigh(&next);
+                held.put(next);
+                Ok(true)
+            }
+            Append::NotNext => Ok(false),
+            Append::NoSession => Err(ServiceError::unknown("session", &next.row.session)),
+            Append::NoPolicy => Err(ServiceError::unknown("policy", &next.current.policy)),
+        }
+    }
+}
+
+/// Returns the answer of an entry as it was sent.
+fn sent(row: EntryRow, names: &[String]) -> Result<String, ServiceError> {
+    match row.kind {
+        _ if names.is_empty() => Ok(row.answer_json),
+        EntryKind::Observation => json(&content::answer::<Observed>(&row, names)?),
+        EntryKind::Correction => json(&content::answer::<Corrected>(&row, names)?),
+        EntryKind::Renewal => json(&content::answer::<Renewed>(&row, names)?),
+    }
+}
+
+/// Returns whether the entry with this number is among those `made`.
+///
+/// # Errors
+/// It is neither among them nor the next.
+pub(super) fn is_repeat(kind: EntryKind, number: usize, made: usize) -> Result<bool, ServiceError> {
+    let expected = made + 1;
+    if number > expected {
+        return Err(ServiceError::Gap { what: kind.counted(), given: number, expected });
+    }
+    Ok(number < expected)
+}
+
+pub(in crate::service) fn numbered(field: &str, number: usize) -> Result<usize, FieldError> {
+    if number == 0 { Err(FieldError::new(field, 0, "must be at least 1")) } else { Ok(number) }
+}

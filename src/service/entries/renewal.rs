@@ -1,0 +1,159 @@
+//! Renews a session: records the switch to its next policy.
+//!
+//! A renewal is an entry of its session. It names the next policy, which advises from the coming period on. It also
+//! holds the terms of the periods from there on, so that a replay does not need policies that no longer advise. The law
+//! is rebuilt from the corrected returns: all of them, or a window of the last ones.
+
+use std::sync::Arc;
+
+use tracing::Instrument;
+
+use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
+use crate::service::callers::allowance::HeavyPermit;
+use crate::service::entries::periods::Periods;
+use crate::service::entries::recording::{is_repeat, numbered};
+use crate::service::error::ServiceError;
+use crate::service::process::memory::Large;
+use crate::service::process::spans;
+use crate::service::sessions::Sessions;
+use crate::service::sessions::content::Packed;
+use crate::service::sessions::live::{LiveSession, with_uncertainty};
+use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewed, SessionPlan, check_window};
+use crate::service::sessions::standing::SessionState;
+use crate::store::{Actor, EntryKind, EntryRow, RenewalTarget, SessionFacts, Tenant};
+
+impl Sessions {
+    /// Switches to another policy from the coming period on, exactly once and durably before the answer. Returns a
+    /// [`Renewed`] in JSON.
+    ///
+    /// # Errors
+    /// A field breaks a rule, there is no such session or policy, or the renewal was made with other content or is not
+    /// the next.
+    pub async fn renew(
+        &self,
+        tenant: &Tenant,
+        by: Actor,
+        session: &str,
+        renew: &Renew,
+        turn: Option<&HeavyPermit>,
+    ) -> Result<String, ServiceError> {
+        let number = numbered("renewal", renew.renewal)?;
+        check_window("window", renew.window)?;
+        let mut held = self.hold(tenant, session).await;
+        loop {
+            let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
+            let periods = Periods::of(&facts)?;
+            if is_repeat(EntryKind::Renewal, number, periods.renewals())? {
+                return self.repeat(session, (EntryKind::Renewal, number), renew, periods.names()).await;
+            }
+            if number > MOST_RENEWALS {
+                let rule = format!("must be at most {MOST_RENEWALS}: open a new session with the present history");
+                return Err(FieldError::new("renewal", number, rule).into());
+            }
+            let DecidedRenewal { new, sent, onto, next } =
+                self.decided((tenant, turn), &by, facts, periods, renew).await?;
+            let store = self.store.by(by.clone());
+            held.clear();
+            let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
+            if self.after_append(&mut held, appended, next)? {
+                if turn.is_some() {
+                    // A caller renewed it, so the training that the session requested is no longer needed.
+                    let _ = self.due.try_send((tenant.clone(), session.to_owned()));
+                }
+                return Ok(sent);
+            }
+        }
+    }
+
+    /// Computes the next renewal of a session from `facts`.
+    async fn decided(
+        &self,
+        (tenant, turn): (&Tenant, Option<&HeavyPermit>),
+        by: &Actor,
+        facts: SessionFacts,
+        periods: Periods,
+        renew: &Renew,
+    ) -> Result<DecidedRenewal, ServiceError> {
+        let advisor = self.policies.advisor(tenant, &renew.policy).await?;
+        let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
+        let (plan, problem) = (SessionPlan::of(&facts.row)?, &advisor.specification().problem);
+        plan.renew.map_or(Ok(()), |renew| renew.check(problem))?;
+        let (onto, planned, Renew { policy, window, .. }) = (advisor.clone(), plan.clone(), renew.clone());
+        let go_on = move || {
+            let passage = periods.replay()?;
+            let dates = passage.record.last(window).len() / passage.record.assets();
+            let terms = planned.terms(&onto, dates, observed);
+            let terms = terms.map_err(|rule| FieldError::new("policy", policy, rule))?;
+            let standing = passage.standing.renewed(&passage.record, window, terms.learning)?;
+            accepts(&onto, passage.record.last(window), &standing)?;
+            Ok::<_, ServiceError>((standing, terms))
+        };
+        let (standing, terms) = self.advising.run(tenant, go_on).await??;
+        self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
+        let (standing, uncertainty) = with_uncertainty(&self.means_of(advisor, turn), tenant, 0, standing).await?;
+        let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
+        let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
+        let answer = Renewed {
+            session: facts.row.session.clone(),
+            renewal: renew.renewal,
+            policy: renew.policy.clone(),
+            period: observed + 1,
+            horizon,
+            terms: current.terms.clone(),
+            assets: standing.assets.as_ref().map(|assets| assets.composed()),
+            uncertainty,
+        };
+        let Packed { content_json, answer_json, numbers, sent } = Packed::of(renew, &answer, standing.names())?;
+        let new = EntryRow {
+            session: facts.row.session.clone(),
+            entry: facts.seen.entries() + 1,
+            kind: EntryKind::Renewal,
+            number: renew.renewal,
+            content_json,
+            answer_json,
+            numbers,
+            created_ms: self.clock.now_milliseconds(),
+            key: by.key.to_string(),
+        };
+        let due = plan.renew.and_then(|next| next.due(renew.renewal, &current));
+        let onto =
+            RenewalTarget { policy: renew.policy.clone(), horizon, periods: horizon.saturating_sub(before), due };
+        let next = LiveSession {
+            seen: facts.seen.followed_by(&new),
+            row: facts.row.into(),
+            standing,
+            observed,
+            corrections,
+            renewals: renew.renewal,
+            current: Arc::new(current),
+            renew: plan.renew,
+            radius,
+            advice: None,
+        };
+        Ok(DecidedRenewal { new, sent, onto, next })
+    }
+}
+
+/// A renewal to append, and the state it leads to.
+struct DecidedRenewal {
+    new: EntryRow,
+    /// The answer as it is sent.
+    sent: String,
+    onto: RenewalTarget,
+    next: LiveSession,
+}
+
+/// Checks that a session with this record and state can use the policy.
+fn accepts(advisor: &Advisor, record: &[f64], standing: &SessionState) -> Result<(), FieldError> {
+    let (own, fund) = (standing.assets.as_deref(), advisor.specification().fund.as_deref());
+    let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));
+    if own != of_policy {
+        let listed = |names: &[String]| if names.is_empty() { "one asset".to_owned() } else { names.join(", ") };
+        let rule = format!("must have the assets of the session, in the same order: {}", listed(own));
+        return Err(FieldError::new("policy", format!("a policy of {}", listed(of_policy)), rule));
+    }
+    let returns = standing.assets.as_ref().map(|assets| assets.fund.returns());
+    let state = advisor.initial_state(Some(returns.as_deref().unwrap_or(record)), Some(standing.state.wealth))?;
+    advisor.check_withdrawals(&state)
+}

@@ -1,0 +1,345 @@
+//! The report of a period, and how it is read.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+use crate::control::request::rules;
+use crate::service::entries::change::Change;
+use crate::service::entries::gate::Doubt;
+
+/// The range of prices: any currency, any quantity.
+pub const PRICE: (f64, f64) = (1e-12, 1e15);
+/// The most corrections of a session: a replay goes through all of them.
+pub const MOST_CORRECTIONS: usize = 1_000;
+/// The most characters of a reason.
+pub const LONGEST_REASON: usize = 200;
+const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
+const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
+pub(in crate::service) const OF_SEVERAL: &str =
+    "must be absent: the session has one asset, and the field is for several";
+pub(in crate::service) const OF_ONE: &str = "must be absent: the session has several assets, and the field is for one";
+
+/// Defines a struct with its own fields and those of a report.
+///
+/// They form one struct because `serde` can reject unknown and repeated fields only if nothing is flattened.
+macro_rules! reporting {
+    ($(#[$meta:meta])* $name:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty,)* }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$attribute])* pub $field: $kind,)*
+            #[schema(example = 0.012)]
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub log_return: Option<f64>,
+            /// `price / previous price - 1`.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub simple_return: Option<f64>,
+            /// Price at the end of the period.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub price: Option<f64>,
+            /// Price at the start of the period. Default: the price reported for the period before.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub previous_price: Option<f64>,
+            /// Log-returns of several assets by name; each has one.
+            #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub log_returns: Option<BTreeMap<String, f64>>,
+            /// `price / previous price - 1` of several assets by name.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub simple_returns: Option<BTreeMap<String, f64>>,
+            /// Prices of several assets at the end of the period.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub prices: Option<BTreeMap<String, f64>>,
+            /// Prices of several assets at the start of the period. Default: those reported for the period before.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub previous_prices: Option<BTreeMap<String, f64>>,
+            /// Given instead of a return if none is known: the law does not change, and the holdings count as unmoved.
+            #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+            pub missing: bool,
+            /// The last day of the period, later than that of the period before.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[schema(value_type = Option<String>, format = Date, example = "2008-09-30")]
+            pub date: Option<Date>,
+            /// Rate that the bank paid in the period. Default: the policy's rate.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub rate: Option<f64>,
+            /// Money added at the end of the period; negative if withdrawn. Default: the policy's contribution.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub flow: Option<f64>,
+            /// Share of wealth held in the risky asset through the period. Default: the advised allocation.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub executed_allocation: Option<f64>,
+            /// Share of wealth held in each of several assets through the period. Default: the advised allocations.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub executed_allocations: Option<BTreeMap<String, f64>>,
+            /// Wealth reached, with what was added, if it differs from what the fields above give.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub wealth: Option<f64>,
+        }
+    };
+}
+
+reporting! {
+    /// The record of a period: its return, given in exactly one of three ways or as missing, and the trades in it.
+    Report {}
+}
+
+reporting! {
+    /// The return of one period, given in exactly one of three ways or as missing, and the trades in it.
+    Observe {
+        #[schema(example = "session_0123456789abcdef0123456789abcdef")]
+        session: String,
+        /// Number of the period, from 1.
+        #[schema(example = 1)]
+        period: usize,
+        /// Confirms the report despite any doubts.
+        #[serde(default, skip_serializing_if = "never_recorded")]
+        confirm: bool,
+        /// Name of the key that reports it, never part of a body; empty if no key is needed.
+        #[serde(skip)]
+        reported_by: Arc<str>,
+        /// Doubts that the other reports of its list raise.
+        #[serde(skip)]
+        peer_doubts: Vec<Doubt>,
+    }
+}
+
+reporting! {
+    /// A change of observed periods: a period is reported again in full, inserted between others, or removed.
+    Correct {
+        /// Number of the correction, from 1.
+        #[schema(example = 1)]
+        correction: usize,
+        /// The period to correct or remove, or the one to insert before.
+        #[schema(example = 3)]
+        period: usize,
+        #[serde(default, skip_serializing_if = "Change::is_replace")]
+        change: Change,
+        /// The reason, in at most 200 characters.
+        #[schema(example = "the index was revised", max_length = 200)]
+        reason: String,
+        /// Confirms the correction despite any doubts.
+        #[serde(default, skip_serializing_if = "never_recorded")]
+        confirm: bool,
+    }
+}
+
+/// Returns true: such fields come with a report and are never part of its stored content.
+fn never_recorded(_: &bool) -> bool {
+    true
+}
+
+/// Implements what both structs have in common.
+macro_rules! report_of {
+    ($name:ident) => {
+        impl $name {
+            /// Returns the report alone, as it is recorded.
+            pub(in crate::service) fn report(&self) -> Report {
+                let $name { log_return, simple_return, price, previous_price, missing, date, .. } = *self;
+                let $name { rate, flow, executed_allocation, wealth, .. } = *self;
+                let $name { log_returns, simple_returns, prices, previous_prices, executed_allocations, .. } = self;
+                let done = Report { rate, flow, executed_allocation, wealth, ..Report::default() };
+                let one = Report { log_return, simple_return, price, previous_price, missing, date, ..done };
+                Report {
+                    log_returns: log_returns.clone(),
+                    simple_returns: simple_returns.clone(),
+                    prices: prices.clone(),
+                    previous_prices: previous_prices.clone(),
+                    executed_allocations: executed_allocations.clone(),
+                    ..one
+                }
+            }
+        }
+    };
+}
+
+report_of!(Observe);
+report_of!(Correct);
+
+/// Converts a simple return, named `field` in messages, to a log-return.
+pub(in crate::service) fn log_return_of(field: &str, simple_return: f64) -> Result<f64, FieldError> {
+    rules::within(field, simple_return, (-rules::LOG_RETURN).exp_m1(), rules::LOG_RETURN.exp_m1())?;
+    Ok(simple_return.ln_1p().clamp(-rules::LOG_RETURN, rules::LOG_RETURN))
+}
+
+impl Report {
+    /// Checks every field that can be checked without the session, except the return.
+    ///
+    /// # Errors
+    /// The first field that breaks its rule.
+    pub(in crate::service) fn check(&self) -> Result<(), FieldError> {
+        if let Some(allocation) = self.executed_allocation {
+            rules::share("executed_allocation", allocation)?;
+        }
+        if let Some(rate) = self.rate {
+            rules::within("rate", rate, rules::RATE.0, rules::RATE.1)?;
+        }
+        if let Some(flow) = self.flow {
+            rules::within("flow", flow, -rules::WEALTH.1, rules::WEALTH.1)?;
+        }
+        if let Some(wealth) = self.wealth {
+            rules::wealth("wealth", wealth)?;
+        }
+        match (self.previous_price, self.price) {
+            (Some(value), None) => {
+                Err(FieldError::new("previous_price", value, "must be absent unless price is given"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the log-return, `None` if it is missing; `known_price` is the price reported for the period before.
+    ///
+    /// # Errors
+    /// No return is given, more than one is, or one is out of bounds.
+    pub(in crate::service) fn log_return(&self, known_price: Option<f64>) -> Result<Option<f64>, FieldError> {
+        none_of(&self.of_several(), OF_SEVERAL)?;
+        match (self.log_return, self.simple_return, self.price, self.missing) {
+            (Some(value), None, None, false) => rules::log_return("log_return", value).map(|()| Some(value)),
+            (None, Some(value), None, false) => log_return_of("simple_return", value).map(Some),
+            (None, None, Some(price), false) => self.between_prices(price, known_price).map(Some),
+            (None, None, None, true) => Ok(None),
+            (None, None, None, false) => {
+                let rule = "must be given, or simple_return, price or missing instead of it";
+                Err(FieldError::new("log_return", "null", rule))
+            }
+            (.., true) => Err(FieldError::new("missing", true, ONE_RETURN)),
+            (Some(value), ..) => Err(FieldError::new("log_return", value, ONE_RETURN)),
+            (None, Some(value), ..) => Err(FieldError::new("simple_return", value, ONE_RETURN)),
+        }
+    }
+
+    /// Returns the log-returns of several assets with these names; `known` are the prices reported for the period
+    /// before.
+    ///
+    /// # Errors
+    /// They are not given in exactly one way, one is out of bounds, or an asset has none.
+    pub(in crate::service) fn log_returns(
+        &self,
+        names: &[String],
+        known: Option<&[f64]>,
+    ) -> Result<Option<Vec<f64>>, FieldError> {
+        let of_one = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
+        let values = [self.log_return, self.simple_return, self.price, self.previous_price, self.executed_allocation];
+        none_of(&std::array::from_fn::<_, 5, _>(|index| (of_one[index], values[index].is_some())), OF_ONE)?;
+        if self.previous_prices.is_some() && self.prices.is_none() {
+            return Err(FieldError::new("previous_prices", "an object", "must be absent unless prices are given"));
+        }
+        let read = |field: &str, values, of: &dyn Fn(&str, usize, f64) -> Result<f64, FieldError>| {
+            let values = by_name(field, values, names)?;
+            let one = |(asset, value): (usize, f64)| of(&format!("{field}.{}", names[asset]), asset, value);
+            values.into_iter().enumerate().map(one).collect::<Result<Vec<f64>, FieldError>>().map(Some)
+        };
+        match (&self.log_returns, &self.simple_returns, &self.prices, self.missing) {
+            (Some(values), None, None, false) => {
+                read("log_returns", values, &|field, _, value| rules::log_return(field, value).map(|()| value))
+            }
+            (None, Some(values), None, false) => {
+                read("simple_returns", values, &|field, _, value| log_return_of(field, value))
+            }
+            (None, None, Some(prices), false) => {
+                let given = self.previous_prices.as_ref().map(|before| by_name("previous_prices", before, names));
+                let given = given.transpose()?;
+                let before = given.as_deref().or(known).ok_or_else(|| {
+                    let rule = "must be given with prices if the period before was not reported with prices";
+                    FieldError::new("previous_prices", "null", rule)
+                })?;
+                read("prices", prices, &|field, asset, price| {
+                    between(field, price, (&format!("previous_{field}"), before[asset]))
+                })
+            }
+            (None, None, None, true) => Ok(None),
+            (None, None, None, false) => {
+                let rule = "must be given, or simple_returns, prices or missing instead of it";
+                Err(FieldError::new("log_returns", "null", rule))
+            }
+            (.., true) => Err(FieldError::new("missing", true, RETURNS_ONCE)),
+            (Some(_), ..) => Err(FieldError::new("log_returns", "an object", RETURNS_ONCE)),
+            (None, ..) => Err(FieldError::new("simple_returns", "an object", RETURNS_ONCE)),
+        }
+    }
+
+    /// Lists the fields of several assets, and whether each is given.
+    fn of_several(&self) -> [(&'static str, bool); 5] {
+        [
+            ("log_returns", self.log_returns.is_some()),
+            ("simple_returns", self.simple_returns.is_some()),
+            ("prices", self.prices.is_some()),
+            ("previous_prices", self.previous_prices.is_some()),
+            ("executed_allocations", self.executed_allocations.is_some()),
+        ]
+    }
+
+    /// Returns the field that gave the return of one of several assets, and its value.
+    pub(in crate::service) fn given_of(&self, asset: &str) -> (String, Option<f64>) {
+        let ways = [("simple_returns", &self.simple_returns), ("prices", &self.prices)];
+        let given = ways.into_iter().find_map(|(field, values)| values.as_ref().map(|values| (field, values)));
+        let (field, values) =
+            given.map_or(("log_returns", self.log_returns.as_ref()), |(field, all)| (field, Some(all)));
+        (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied()))
+    }
+
+    /// Returns the field that gave the return, and its value.
+    pub(in crate::service) fn given(&self) -> (&'static str, f64) {
+        match (self.log_return, self.simple_return, self.price) {
+            (_, Some(value), _) => ("simple_return", value),
+            (_, _, Some(value)) => ("price", value),
+            (value, ..) => ("log_return", value.unwrap_or(0.0)),
+        }
+    }
+
+    fn between_prices(&self, price: f64, known: Option<f64>) -> Result<f64, FieldError> {
+        let before = self.previous_price.or(known).ok_or_else(|| {
+            FieldError::new(
+                "previous_price",
+                "null",
+                "must be given with price if the period before was not reported with a price",
+            )
+        })?;
+        between("price", price, ("previous_price", before))
+    }
+}
+
+/// Checks that none of the fields is given.
+///
+/// # Errors
+/// The first of the fields that is given.
+pub(in crate::service) fn none_of(fields: &[(&'static str, bool)], rule: &str) -> Result<(), FieldError> {
+    let given = fields.iter().find(|(_, is_given)| *is_given);
+    given.map_or(Ok(()), |(field, _)| Err(FieldError::new(*field, "given", rule)))
+}
+
+/// Returns the values in the order of the assets, each of which must have one.
+pub(in crate::service) fn by_name(
+    field: &str,
+    values: &BTreeMap<String, f64>,
+    names: &[String],
+) -> Result<Vec<f64>, FieldError> {
+    if let Some((other, value)) = values.iter().find(|(name, _)| !names.contains(name)) {
+        let rule = format!("must name one of the assets: {}", names.join(", "));
+        return Err(FieldError::new(format!("{field}.{other}"), *value, rule));
+    }
+    let of = |name: &String| {
+        let value = values.get(name).copied();
+        value.ok_or_else(|| {
+            FieldError::new(format!("{field}.{name}"), "null", "must be given: every asset needs a value")
+        })
+    };
+    names.iter().map(of).collect()
+}
+
+/// Returns the log-return between two prices; messages use the names of their fields.
+fn between(field: &str, price: f64, (named, before): (&str, f64)) -> Result<f64, FieldError> {
+    rules::within(field, price, PRICE.0, PRICE.1)?;
+    rules::within(named, before, PRICE.0, PRICE.1)?;
+    let log_return = (price / before).ln();
+    let rule = format!("must give a log-return in [-{0}, {0}] from {before}", rules::LOG_RETURN);
+    rules::log_return(field, log_return).map_err(|_| FieldError::new(field, price, rule))?;
+    Ok(log_return)
+}

@@ -1,0 +1,210 @@
+//! Several assets in a session: reports by name, their state, and how answers show it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::assets::advice::{OneStep, named};
+use crate::control::assets::fund::Fund;
+use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
+use crate::control::problem::state::State;
+use crate::control::request::fund::CompositionRule;
+use crate::control::request::rules;
+use crate::control::request::specification::Specification;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::service::entries::report::{Report, by_name};
+
+/// The largest sum of shares of wealth, with room for rounding.
+const WHOLE: f64 = 1.0 + 1e-9;
+
+/// The assets of a session between two periods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assets {
+    /// The names, in the order of the columns.
+    pub names: Arc<[String]>,
+    pub fund: Fund,
+    /// The one-step problem behind the composition, as answers show it.
+    pub one_step: Option<OneStep>,
+    /// The prices reported for the last period, if any were.
+    pub prices: Option<Vec<f64>>,
+}
+
+/// Several assets before the coming period, by their names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Composition {
+    /// Share of each asset in the advised holdings; they sum to 1.
+    pub composition: BTreeMap<String, f64>,
+    /// Share of wealth in each asset, before trading.
+    pub holdings: BTreeMap<String, f64>,
+    /// The optimum one period ahead, if the composition is chosen by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub one_step: Option<OneStep>,
+}
+
+/// The assets of a session when it is opened.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlannedAssets {
+    pub(in crate::service) names: Vec<String>,
+    pub(in crate::service) composed: Composition,
+}
+
+/// A period of several assets, by their names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ObservedAssets {
+    /// Null if they are missing.
+    pub log_returns: Option<BTreeMap<String, f64>>,
+    /// Advised share of wealth in each asset.
+    pub advised_allocations: BTreeMap<String, f64>,
+    /// Executed share of wealth in each asset.
+    pub executed_allocations: BTreeMap<String, f64>,
+    /// Figures before the coming period.
+    #[serde(flatten)]
+    pub composed: Composition,
+}
+
+impl Assets {
+    /// Builds the assets from the observed `rows` and the shares of wealth held, 0 by default.
+    ///
+    /// # Errors
+    /// The holdings are not shares of wealth in these assets.
+    pub(in crate::service) fn at(
+        names: &[String],
+        rows: Vec<Vec<f64>>,
+        holdings: Option<&BTreeMap<String, f64>>,
+    ) -> Result<Self, FieldError> {
+        let holdings = match holdings {
+            Some(holdings) => shares("holdings", holdings, names)?,
+            None => vec![0.0; names.len()],
+        };
+        Ok(Assets { names: names.into(), fund: Fund::at(rows, holdings), one_step: None, prices: None })
+    }
+
+    /// Builds the assets as an answer showed them before the coming period.
+    ///
+    /// # Errors
+    /// The answer names other assets.
+    pub(in crate::service) fn with_composition(
+        names: &[String],
+        rows: Vec<Vec<f64>>,
+        reported: &Composition,
+    ) -> Result<Self, FieldError> {
+        let mut assets = Assets::at(names, rows, Some(&reported.holdings))?;
+        assets.take(reported)?;
+        Ok(assets)
+    }
+
+    /// Applies the composition of an answer.
+    ///
+    /// # Errors
+    /// It names other assets.
+    pub(in crate::service) fn take(&mut self, reported: &Composition) -> Result<(), FieldError> {
+        self.fund.take(by_name("composition", &reported.composition, &self.names)?);
+        self.one_step = reported.one_step.clone();
+        Ok(())
+    }
+
+    /// Returns the assets as the start of a session stores them.
+    pub(in crate::service) fn planned(&self) -> PlannedAssets {
+        PlannedAssets { names: self.names.to_vec(), composed: self.composed() }
+    }
+
+    /// Returns the assets as answers show them.
+    pub fn composed(&self) -> Composition {
+        Composition {
+            composition: named(&self.names, &self.fund.composition),
+            holdings: named(&self.names, &self.fund.holdings),
+            one_step: self.one_step.clone(),
+        }
+    }
+
+    /// Chooses the composition before the period after `step`, if the policy advises that period, and returns the state
+    /// of the fund. Cost: that of [`Fund::compose`].
+    pub(in crate::service) fn compose(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
+        let problem = &advisor.specification().problem;
+        let Some(of) = advisor.specification().fund.as_deref().filter(|_| step < problem.horizon) else {
+            self.one_step = None;
+            return State { law: problem.learning.law(&self.fund.returns()), ..*state };
+        };
+        let (composed, solution) = self.fund.compose(advisor, of, step, state);
+        let bank = 1.0 + problem.rate_per_step;
+        self.one_step = solution.map(|solution| self.fund.one_step(&self.names, &solution, state.wealth * bank));
+        composed
+    }
+
+    /// Chooses the composition again, from the one held when the present one was chosen.
+    pub(super) fn compose_anew(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
+        self.fund.composition.clone_from(&self.fund.before);
+        self.compose(advisor, step, state)
+    }
+
+    /// Returns whether choosing the composition before the period after `step` needs a solve of the one-step problem.
+    pub(super) fn must_solve(advisor: &Advisor, step: usize) -> bool {
+        let Specification { problem, fund, .. } = advisor.specification();
+        step < problem.horizon && fund.as_ref().is_some_and(|fund| fund.composition == CompositionRule::OneStep)
+    }
+
+    /// Returns the shares of wealth in the assets that sum to `total`.
+    pub fn shares(&self, total: f64) -> Vec<f64> {
+        self.fund.composition.iter().map(|share| total * share).collect()
+    }
+
+    /// Returns the shares of wealth held in a period, given the `advised` total.
+    ///
+    /// # Errors
+    /// A reported number is not a share of wealth, or not of these assets.
+    pub(in crate::service) fn executed(&self, report: &Report, advised: f64) -> Result<Vec<f64>, FieldError> {
+        match &report.executed_allocations {
+            Some(executed) => shares("executed_allocations", executed, &self.names),
+            None => Ok(self.shares(advised)),
+        }
+    }
+
+    /// Returns the log-returns of all assets, or `None` if they are missing.
+    ///
+    /// # Errors
+    /// They are not given in exactly one way, are not of these assets, or one breaks a rule.
+    pub(in crate::service) fn log_returns(&self, report: &Report) -> Result<Option<Vec<f64>>, FieldError> {
+        report.log_returns(&self.names, self.prices.as_deref())
+    }
+
+    /// Returns the mean and standard deviation of an asset's log-returns.
+    pub(in crate::service) fn moments(&self, asset: usize) -> (f64, f64) {
+        let rows = &self.fund.rows;
+        let average = |of: &dyn Fn(f64) -> f64| rows.iter().map(|row| of(row[asset])).sum::<f64>() / rows.len() as f64;
+        let mean = average(&|log_return| log_return);
+        (mean, average(&|log_return| (log_return - mean).powi(2)).sqrt())
+    }
+
+    /// Returns the law of the mean log-return of each date, which does not depend on the composition.
+    pub(in crate::service) fn means(rows: &[Vec<f64>]) -> EmpiricalDistribution {
+        EmpiricalDistribution::new(&rows.iter().map(|row| mean(row)).collect::<Vec<f64>>())
+    }
+}
+
+/// Returns the mean of the log-returns of a date.
+pub(in crate::service) fn mean(row: &[f64]) -> f64 {
+    row.iter().sum::<f64>() / row.len().max(1) as f64
+}
+
+/// Validates and returns the shares of wealth in the assets.
+///
+/// # Errors
+/// They are not of these assets, one is not a share, or they sum to more than 1.
+pub(in crate::service) fn shares(
+    field: &str,
+    values: &BTreeMap<String, f64>,
+    names: &[String],
+) -> Result<Vec<f64>, FieldError> {
+    let shares = by_name(field, values, names)?;
+    for (name, share) in names.iter().zip(&shares) {
+        rules::share(&format!("{field}.{name}"), *share)?;
+    }
+    let whole: f64 = shares.iter().sum();
+    if whole > WHOLE {
+        return Err(FieldError::new(field, format!("shares summing to {whole}"), "must sum to at most 1"));
+    }
+    Ok(shares)
+}

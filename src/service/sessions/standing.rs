@@ -1,0 +1,281 @@
+//! The state of a session, and the transition that a report causes.
+
+use std::sync::Arc;
+
+use crate::control::assets::advice::named;
+use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
+use crate::control::problem::dynamics::Dynamics;
+use crate::control::problem::state::{PeriodOutcome, State};
+use crate::control::request::assets::check_rows;
+use crate::control::request::learning::Learning;
+use crate::control::request::rules;
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::moments::CentralMoments;
+use crate::service::entries::days::Days;
+use crate::service::entries::drift::DriftTest;
+use crate::service::entries::gate::{self, Doubt};
+use crate::service::entries::record::{PeriodReturns, SessionRecord};
+use crate::service::entries::report::{Report, by_name};
+use crate::service::sessions::assets::{Assets, Composition, mean};
+
+/// The state of a session between two periods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionState {
+    /// For several assets, the state of their fund.
+    pub state: State,
+    /// The assets, if there are several.
+    pub assets: Option<Box<Assets>>,
+    /// The price reported for the last period, if one was.
+    pub price: Option<f64>,
+    /// The last days of the periods.
+    pub days: Days,
+    /// The test of whether returns still come from the same law.
+    pub bet: DriftTest,
+    /// All observed returns, if the law holds only the last ones. For several assets always present: the mean of each
+    /// date.
+    seen: Option<EmpiricalDistribution>,
+    session: Arc<str>,
+}
+
+/// The effect of a report of a period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    pub seen: PeriodReturns,
+    /// For several assets, the log-return of the holdings.
+    pub log_return: Option<f64>,
+    pub executed_allocation: f64,
+    /// Shares of wealth held in several assets; empty for one asset.
+    pub executed: Vec<f64>,
+    pub standing: SessionState,
+}
+
+impl SessionState {
+    /// Returns the state at the start of `session`.
+    pub(in crate::service) fn at(session: &str, state: State, assets: Option<Box<Assets>>) -> Self {
+        let seen = assets.as_ref().map(|assets| Assets::means(&assets.fund.rows));
+        SessionState {
+            state,
+            assets,
+            price: None,
+            days: Days::default(),
+            bet: DriftTest::default(),
+            seen,
+            session: session.into(),
+        }
+    }
+
+    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns.
+    ///
+    /// # Errors
+    /// They are not a valid history.
+    pub(in crate::service) fn renewed(
+        &self,
+        record: &SessionRecord,
+        window: Option<usize>,
+        learning: Learning,
+    ) -> Result<Self, FieldError> {
+        let last = record.last(window);
+        let mut assets = self.assets.clone();
+        let state = match &mut assets {
+            Some(assets) => {
+                assets.fund.rows = record.rows_of(last);
+                check_rows("history", &assets.fund.rows, &assets.names, None)?;
+                State { law: learning.law(&assets.fund.returns()), ..self.state }
+            }
+            None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
+        };
+        let seen = match &assets {
+            Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
+            None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
+        };
+        let SessionState { price, days, bet, .. } = *self;
+        Ok(SessionState { state, assets, price, days, bet, seen, session: self.session.clone() })
+    }
+
+    /// Returns the names of the assets if there are several; empty for one asset.
+    pub(in crate::service) fn names(&self) -> &[String] {
+        self.assets.as_ref().map_or(&[][..], |assets| &assets.names)
+    }
+
+    /// Reads the returns of the coming period from `report`.
+    ///
+    /// # Errors
+    /// A field breaks a rule, or the date is not after the last one.
+    pub(in crate::service) fn read(&self, report: &Report) -> Result<PeriodReturns, FieldError> {
+        report.check()?;
+        if let (Some(date), Some(last)) = (report.date, self.days.last)
+            && date <= last
+        {
+            return Err(FieldError::new(
+                "date",
+                date,
+                format!("must be later than {last}, the date of an earlier period"),
+            ));
+        }
+        match &self.assets {
+            Some(assets) => assets.log_returns(report).map(PeriodReturns::Several),
+            None => report.log_return(self.price).map(PeriodReturns::One),
+        }
+    }
+
+    /// Returns the effect of `report` on `period`, for which a total of `advised` was advised. A report without a day
+    /// takes the next one due, if `periods_per_year` is known.
+    ///
+    /// # Errors
+    /// As [`SessionState::read`], or wealth leaves the permitted range.
+    pub(in crate::service) fn after(
+        &self,
+        dynamics: Dynamics,
+        period: usize,
+        report: &Report,
+        (advised, periods_per_year): (f64, Option<f64>),
+    ) -> Result<Transition, FieldError> {
+        let seen = self.read(report)?;
+        let (executed, traded) = match &self.assets {
+            Some(assets) => {
+                let executed = assets.executed(report, advised)?;
+                let traded = assets.fund.traded(&executed);
+                (executed, Some(traded))
+            }
+            None => (Vec::new(), None),
+        };
+        let executed_allocation = match &self.assets {
+            Some(_) => executed.iter().sum::<f64>().min(1.0),
+            None => report.executed_allocation.unwrap_or(advised),
+        };
+        let log_return = match (&seen, &self.assets) {
+            (PeriodReturns::Several(Some(row)), Some(assets)) => Some(assets.fund.log_return(&executed, row)),
+            (PeriodReturns::One(log_return), _) => *log_return,
+            _ => None,
+        };
+        let Report { rate, flow, .. } = *report;
+        let realised = PeriodOutcome { action: executed_allocation, log_return, rate, flow, traded };
+        let mut state = self.state.next_state(dynamics, &realised);
+        state.wealth = match report.wealth {
+            Some(reported) => reported,
+            None => check_wealth_range(state.wealth, report)?,
+        };
+        let SessionState { assets, bet, seen: known, session, .. } = self;
+        let (assets, seen_before, session) = (assets.clone(), known.clone(), session.clone());
+        let days = self.days.after(report.date, periods_per_year);
+        let mut standing = SessionState { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
+        standing.learn(&seen, &executed, period);
+        standing.price_as(report);
+        Ok(Transition { seen, log_return, executed_allocation, executed, standing })
+    }
+
+    /// Returns the report of a period without trades unless it gives holdings.
+    pub(in crate::service) fn held_on(&self, reported: &Report) -> Report {
+        let mut report = reported.clone();
+        if let Some(assets) = &self.assets {
+            report.executed_allocations.get_or_insert_with(|| named(&assets.names, &assets.fund.holdings));
+        }
+        report
+    }
+
+    /// Updates the record, the drift test and the holdings after a period.
+    fn learn(&mut self, seen: &PeriodReturns, executed: &[f64], period: usize) {
+        let row = seen.row();
+        if let Some(assets) = &mut self.assets {
+            assets.fund.passed(executed, row, self.state.holding);
+        }
+        let log_return = match seen {
+            PeriodReturns::One(log_return) => *log_return,
+            PeriodReturns::Several(_) => row.map(mean),
+        };
+        self.seen.iter_mut().zip(log_return).for_each(|(seen, log_return)| seen.push(log_return));
+        self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), log_return, &self.session, period);
+    }
+
+    /// Takes over the prices reported with the last period.
+    pub(in crate::service) fn price_as(&mut self, report: &Report) {
+        self.price = report.price;
+        if let Some(assets) = &mut self.assets {
+            assets.prices = report.prices.as_ref().and_then(|prices| by_name("prices", prices, &assets.names).ok());
+        }
+    }
+
+    /// Applies a reported composition; the law must be rebuilt afterwards.
+    ///
+    /// # Errors
+    /// It names other assets.
+    pub(in crate::service) fn take(&mut self, reported: &Composition) -> Result<(), FieldError> {
+        self.assets.as_mut().map_or(Ok(()), |assets| assets.take(reported))
+    }
+
+    /// Returns the state with the law of the fund rebuilt, if there are several assets.
+    #[must_use]
+    pub(in crate::service) fn with_law(mut self, learning: Learning) -> Self {
+        if let Some(assets) = &self.assets {
+            self.state.law = learning.law(&assets.fund.returns());
+        }
+        self
+    }
+
+    /// Chooses the composition before the period after `step`, if there are several assets.
+    pub(in crate::service) fn compose(&mut self, advisor: &Advisor, step: usize) {
+        let Some(assets) = &mut self.assets else { return };
+        self.state = assets.compose(advisor, step, &self.state);
+    }
+
+    /// Replaces wealth, or the holdings of several assets, as of the last choice of the composition.
+    pub(in crate::service) fn suppose(
+        &mut self,
+        advisor: &Advisor,
+        step: usize,
+        wealth: Option<f64>,
+        holdings: Option<Vec<f64>>,
+    ) {
+        let Some(assets) = &mut self.assets else { return };
+        self.state.wealth = wealth.unwrap_or(self.state.wealth);
+        if let Some(holdings) = holdings {
+            self.state.holding = holdings.iter().sum::<f64>().min(1.0);
+            assets.fund.holdings = holdings;
+        }
+        self.state = assets.compose_anew(advisor, step, &self.state);
+    }
+
+    /// Returns the number of returns that the state holds.
+    pub(in crate::service) fn returns(&self) -> usize {
+        let seen = self.seen.as_ref().map_or(0, EmpiricalDistribution::sample_size);
+        let of_assets = self.assets.as_ref().map_or(0, |assets| assets.fund.rows.len() * assets.names.len());
+        self.state.law.sample_size() + seen + of_assets
+    }
+
+    /// Returns doubts about the returns of a report, each against the record of its asset.
+    pub(in crate::service) fn return_doubts(&self, report: &Report, seen: &PeriodReturns) -> Vec<Doubt> {
+        match (seen, &self.assets) {
+            (PeriodReturns::One(Some(log_return)), _) => {
+                let (field, value) = report.given();
+                let record = CentralMoments::of(&self.state.law);
+                let moments = (record.mean(), record.variance().sqrt());
+                gate::of_return(field, value, moments, *log_return).into_iter().collect()
+            }
+            (PeriodReturns::Several(Some(row)), Some(assets)) => {
+                let of_asset = |(asset, (name, log_return)): (usize, (&String, &f64))| {
+                    let (field, value) = report.given_of(name);
+                    let moments = assets.moments(asset);
+                    gate::of_return(&field, value.unwrap_or(*log_return), moments, *log_return)
+                };
+                assets.names.iter().zip(row).enumerate().filter_map(of_asset).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// Returns wealth as computed from return, allocation and flow.
+fn check_wealth_range(wealth: f64, report: &Report) -> Result<f64, FieldError> {
+    let (low, high) = rules::WEALTH;
+    if (low..=high).contains(&wealth) {
+        return Ok(wealth);
+    }
+    let leaves = format!(
+        "the return, the allocation and the amount added give a wealth of {wealth}, and wealth must lie in [{low}, {high}]"
+    );
+    Err(match report.flow {
+        Some(flow) => FieldError::new("flow", flow, format!("must leave an allowed wealth: {leaves}")),
+        None => FieldError::new("wealth", "null", format!("must be reported: {leaves}")),
+    })
+}
