@@ -1,6 +1,6 @@
 //! The slots of live sessions under many orders of their users, chosen by a checker of concurrency.
 //!
-//! `src/service/sessions/slots.rs` and `src/store/sqlite/changes.rs` are compiled here as they are, over the checker's locks and
+//! `src/service/sessions/slots.rs` and `src/store/engine/sqlite/changes.rs` are compiled here as they are, over the checker's locks and
 //! atomics. The store is a model: every step of a read or a write is one at which others may run, and reads fail by
 //! chance. An owner observes and asks for actions; others poll, delete what is not theirs, stop waiting, and push
 //! sessions out of memory.
@@ -10,7 +10,7 @@
 //! takes the slot from under those who wait for it, the checker finds the fault: so it could see it.
 
 #[allow(dead_code)]
-#[path = "../src/store/sqlite/changes.rs"]
+#[path = "../src/store/engine/sqlite/changes.rs"]
 mod changes;
 #[allow(dead_code)]
 #[path = "../src/service/sessions/slots.rs"]

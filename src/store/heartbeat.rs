@@ -3,8 +3,8 @@
 
 use futures_util::FutureExt;
 
-use super::query::{StoreRow, query};
-use super::{Engine, Store, StoreError};
+use crate::store::engine::query::{StoreRow, query};
+use crate::store::{Engine, Store, StoreError};
 
 impl Store {
     /// Returns the clock of the database, in milliseconds; `None` for a folder, which has none.

@@ -1,18 +1,28 @@
 //! Jobs as users see them: created once, listed, cancelled, and deleted after they have ended.
+//!
+//! Beside it: the life of a job, its leases, its turns and names, and the deletion of ended ones.
+
+pub(super) mod job;
+pub(super) mod leases;
+pub(super) mod retention;
+pub(super) mod session_trainings;
+pub(super) mod state;
+pub(super) mod training_names;
+pub(super) mod turns;
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditAction};
-use super::audit_chain;
-use super::codec::to_sql;
-use super::error::Failure;
-use super::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
-use super::job_state::{JobEvent, JobState};
 use super::labels::Relabel;
-use super::query::{StoreConnection, StoreRow, query};
-use super::quotas::{self, Quotas, ROW_BYTES, Usage};
-use super::tenant::Tenant;
-use super::{Store, StoreError, training_names, turns};
+use crate::store::engine::codec::to_sql;
+use crate::store::engine::error::Failure;
+use crate::store::engine::query::{StoreConnection, StoreRow, query};
+use crate::store::jobs::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
+use crate::store::jobs::state::{JobEvent, JobState};
+use crate::store::tenants::audit::{Actor, AuditAction};
+use crate::store::tenants::audit_chain;
+use crate::store::tenants::quotas::{self, Quotas, ROW_BYTES, Usage};
+use crate::store::tenants::tenant::Tenant;
+use crate::store::{Store, StoreError};
 
 impl Store {
     /// Queues a job and records its idempotency key, both or neither.

@@ -10,16 +10,16 @@ use futures_util::FutureExt;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use super::audit::AuditAction;
-use super::audit_chain;
-use super::error::Failure;
-use super::query::{StoreConnection, StoreRow, query};
-use super::quotas::{self, Usage};
-use super::tenant::Tenant;
-use super::words::{self, Labelled, Worded};
-use super::{Store, StoreError};
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
+use crate::store::engine::error::Failure;
+use crate::store::engine::query::{StoreConnection, StoreRow, query};
+use crate::store::sessions::words::{self, Labelled, Worded};
+use crate::store::tenants::audit::AuditAction;
+use crate::store::tenants::audit_chain;
+use crate::store::tenants::quotas::{self, Usage};
+use crate::store::tenants::tenant::Tenant;
+use crate::store::{Store, StoreError};
 
 /// The most letters of a name.
 pub const LONGEST_NAME: usize = 100;

@@ -23,82 +23,52 @@
 //!   log that damage cut short is rejected at startup.
 //! - Deleting old sessions and policies by age. The record of an investor is not ours to expire.
 
-mod audit;
-mod audit_chain;
-mod backup;
-mod care;
-mod check;
-mod codec;
-mod entries;
-mod error;
-mod head;
+mod engine;
 mod heartbeat;
-mod idempotency;
-mod job;
-mod job_state;
 mod jobs;
-mod key_mark;
-mod keys;
 mod labels;
-mod leases;
-mod migrations;
-mod overview;
+mod maintenance;
 mod policies;
-mod postgres;
-mod query;
-mod quotas;
-mod relocation;
-mod renewals;
-mod repair;
-mod retention;
-mod search;
-mod seen;
-mod session_trainings;
 mod sessions;
-mod sqlite;
-mod statement;
-mod tenant;
-mod training_names;
-mod turns;
-mod words;
+mod tenants;
 
 use std::path::Path;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 
-use error::Failure;
-use query::{Purpose, Query, StoreConnection, StoreRow};
+use engine::error::Failure;
+use engine::query::{Purpose, Query, StoreConnection, StoreRow};
 
-pub use audit::{Actor, AuditAction, AuditFilter, AuditRow};
-pub use audit_chain::AuditEnd;
-pub use backup::{Damage, backup, restore};
-pub use care::{Attention, CareCounts, FirstDay, Today};
-pub use check::Inspection;
-pub use entries::{Append, EntryKind, EntryRow};
-pub use error::{OverQuota, Quota, StoreError};
-pub use head::Head;
-pub use idempotency::RequestKey;
-pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
-pub use job_state::{IllegalTransition, JobEvent, JobState};
-pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotation, StoredKeys, Successor};
+pub use engine::error::{OverQuota, Quota, StoreError};
+pub use engine::postgres::{PostgresUrl, UrlError};
+pub use jobs::job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
+pub use jobs::retention::{DeleteJob, StoreSpace};
+pub use jobs::session_trainings::SessionTraining;
+pub use jobs::state::{IllegalTransition, JobEvent, JobState};
+pub use jobs::training_names::TrainingRequest;
 pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labels, MOST_TAGS, Relabel, given};
-pub use overview::{
+pub use maintenance::backup::{Damage, backup, restore};
+pub use maintenance::check::Inspection;
+pub use maintenance::relocation::relocate;
+pub use maintenance::repair::{Repair, repair};
+pub use policies::{DeletePolicy, PolicyRow, PolicySummary, Stored};
+pub use sessions::care::{Attention, CareCounts, FirstDay, Today};
+pub use sessions::entries::{Append, EntryKind, EntryRow};
+pub use sessions::head::Head;
+pub use sessions::idempotency::RequestKey;
+pub use sessions::overview::{
     Counted, SessionFilter, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
 };
-pub use policies::{DeletePolicy, PolicyRow, PolicySummary, Stored};
-pub use postgres::{PostgresUrl, UrlError};
-pub use quotas::{Quotas, Usage};
-pub use relocation::relocate;
-pub use renewals::RenewalTarget;
-pub use repair::{Repair, repair};
-pub use retention::{DeleteJob, StoreSpace};
-pub use seen::RowVersion;
-pub use session_trainings::SessionTraining;
+pub use sessions::renewals::RenewalTarget;
+pub use sessions::seen::RowVersion;
+pub use sessions::words::Labelled;
 pub use sessions::{CreateSession, SessionFacts, SessionRow};
-pub use tenant::Tenant;
-pub use training_names::TrainingRequest;
-pub use words::Labelled;
+pub use tenants::audit::{Actor, AuditAction, AuditFilter, AuditRow};
+pub use tenants::audit_chain::AuditEnd;
+pub use tenants::keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotation, StoredKeys, Successor};
+pub use tenants::quotas::{Quotas, Usage};
+pub use tenants::tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.
 ///
@@ -114,8 +84,8 @@ pub struct Store {
 
 #[derive(Clone)]
 enum Engine {
-    Sqlite(sqlite::Folder),
-    Postgres(postgres::Database),
+    Sqlite(engine::sqlite::Folder),
+    Postgres(engine::postgres::Database),
 }
 
 impl Store {
@@ -126,7 +96,7 @@ impl Store {
     /// [`StoreError::Locked`] if another process holds the folder, [`StoreError::NewerSchema`] if a later release wrote
     /// it, [`StoreError::OldEngine`] if SQLite is older than 3.51.3, else the error of the disk.
     pub async fn open(dir: &Path) -> Result<Store, StoreError> {
-        Ok(Store::over(Engine::Sqlite(sqlite::Folder::open(dir).await?)))
+        Ok(Store::over(Engine::Sqlite(engine::sqlite::Folder::open(dir).await?)))
     }
 
     /// Connects to a PostgreSQL database and brings its schema up to date. Other processes may use it at the same time,
@@ -135,7 +105,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::NewerSchema`] if a later release wrote it, else the error of the server.
     pub async fn connect(url: &PostgresUrl) -> Result<Store, StoreError> {
-        Ok(Store::over(Engine::Postgres(postgres::Database::connect(url).await?)))
+        Ok(Store::over(Engine::Postgres(engine::postgres::Database::connect(url).await?)))
     }
 
     fn over(engine: Engine) -> Store {

@@ -3,17 +3,17 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditAction};
-use super::audit_chain;
-use super::codec::to_sql;
-use super::error::Failure;
 use super::labels::{self, Labels};
-use super::query::{Query, StoreConnection, StoreRow, query};
-use super::quotas::{self, Quotas, ROW_BYTES, Usage};
-use super::tenant::Tenant;
-use super::words::{self, Labelled, Worded};
-use super::{Store, StoreError};
 use crate::control::policy::{content_hash, periods_per_year};
+use crate::store::engine::codec::to_sql;
+use crate::store::engine::error::Failure;
+use crate::store::engine::query::{Query, StoreConnection, StoreRow, query};
+use crate::store::sessions::words::{self, Labelled, Worded};
+use crate::store::tenants::audit::{Actor, AuditAction};
+use crate::store::tenants::audit_chain;
+use crate::store::tenants::quotas::{self, Quotas, ROW_BYTES, Usage};
+use crate::store::tenants::tenant::Tenant;
+use crate::store::{Store, StoreError};
 
 /// A policy as stored, its bytes verified against its name.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,22 +1,34 @@
 //! Sessions: the start of each live investor.
+//!
+//! Beside it: the entries of sessions, how a change is noticed, and the lists in which sessions are found.
+
+pub(super) mod care;
+pub(super) mod entries;
+pub(super) mod head;
+pub(super) mod idempotency;
+pub(super) mod overview;
+pub(super) mod renewals;
+pub(super) mod search;
+pub(super) mod seen;
+pub(super) mod words;
 
 use futures_util::FutureExt;
 
-use super::audit::{Actor, AuditAction, AuditRow};
-use super::audit_chain;
-use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
-use super::entries::EntryRow;
-use super::error::Failure;
-use super::head::Head;
-use super::idempotency::{self, RequestKey, Used};
 use super::labels::{self, Relabel};
-use super::query::{StoreConnection, StoreRow, query};
-use super::quotas::{self, Quotas, Usage};
-use super::seen::RowVersion;
-use super::tenant::Tenant;
-use super::training_names::withdraw_all;
-use super::words::{self, Labelled, Worded};
-use super::{Store, StoreError, policies};
+use crate::store::engine::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
+use crate::store::engine::error::Failure;
+use crate::store::engine::query::{StoreConnection, StoreRow, query};
+use crate::store::jobs::training_names::withdraw_all;
+use crate::store::sessions::entries::EntryRow;
+use crate::store::sessions::head::Head;
+use crate::store::sessions::idempotency::{RequestKey, Used};
+use crate::store::sessions::seen::RowVersion;
+use crate::store::sessions::words::{Labelled, Worded};
+use crate::store::tenants::audit::{Actor, AuditAction, AuditRow};
+use crate::store::tenants::audit_chain;
+use crate::store::tenants::quotas::{self, Quotas, Usage};
+use crate::store::tenants::tenant::Tenant;
+use crate::store::{Store, StoreError, policies};
 
 /// The outcome of opening a session.
 #[derive(Debug, Clone, PartialEq)]

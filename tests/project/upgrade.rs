@@ -11,7 +11,8 @@
 use std::path::PathBuf;
 
 use crate::support::{App, specification};
-use ballast::store::{Damage, Inspection, Store, backup, restore};
+use ballast::store::backup;
+use ballast::store::{Damage, Inspection, Store, restore};
 use serde_json::{Value, json};
 
 const RETURNS: [[f64; 2]; 2] = [[0.021, -0.034], [-0.012, 0.055]];
@@ -22,7 +23,7 @@ fn fixtures() -> PathBuf {
 
 /// The number of migrations.
 fn newest_schema() -> usize {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations/sqlite");
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src/store/engine/migrations/sqlite");
     std::fs::read_dir(folder).unwrap().count()
 }
 

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 use crate::support::patience::{assert_within, patience, until};
 use crate::support::process::Process;
 use crate::support::{App, process, specification};
-use ballast::store::{Damage, Store, backup};
+use ballast::store::backup;
+use ballast::store::{Damage, Store};
 use tempfile::TempDir;
 
 /// The exit code of a process whose store failed.
