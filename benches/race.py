@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Races Ballast against Python programs that do the same work, in one run, and prints medians and ratios.
 
-    cargo build --release
+    cargo build --release -p ballast-lab
     benches/race.py --opponents FOLDER [--runs 3] [--horizon 3]
 
 FOLDER holds `python_reference.py` (a training: numba for the robust step, scikit-learn for the surrogates) and
@@ -29,7 +29,7 @@ def last_json(text):
 
 
 def inner_by_highs():
-    """Seconds and values, by radius, of the inner problem of `ballast bench kernels` as a linear program in HiGHS:
+    """Seconds and values, by radius, of the inner problem of `ballast-lab bench kernels` as a linear program in HiGHS:
     max over gamma >= 0 and phi of mean(phi) - gamma radius, phi_j <= payoff_k + gamma |z_k - z_j| for every k."""
     import numpy as np
     from scipy.optimize import linprog
@@ -57,7 +57,7 @@ def main():
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--opponents", required=True)
-    parser.add_argument("--binary", default=os.path.join(root, "target", "release", "ballast"))
+    parser.add_argument("--binary", default=os.path.join(root, "target", "release", "ballast-lab"))
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--horizon", type=int, default=3)
     options = parser.parse_args()

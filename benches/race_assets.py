@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Races the robust step of several assets against cvxpy with Clarabel, in one run, and compares the values.
 
-    cargo build --release
+    cargo build --release -p ballast-lab
     benches/race_assets.py [--costs 60] [--assets 2,5,12] [--months 60,240]
 
 Under the norm `sup`, if the adversary moves date j at the cost D, the investor's wealth is (1 - sum a) + sum a_i g_ij e^(-D)
@@ -56,7 +56,7 @@ def by_clarabel(growths, radius, risk_aversion, count):
 def main():
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--binary", default=os.path.join(root, "target", "release", "ballast"))
+    parser.add_argument("--binary", default=os.path.join(root, "target", "release", "ballast-lab"))
     parser.add_argument("--file", default=os.path.join(root, "data", "us_industries_monthly.csv"))
     parser.add_argument("--costs", type=int, default=60)
     parser.add_argument("--assets", default="2,5,12")

@@ -8,10 +8,7 @@ use std::process::ExitCode;
 
 use ballast::service::process::config::Config;
 use clap::{Parser, Subcommand};
-use command::{
-    advise, audit, backtest, backup, bench, check, coverage, demo, evaluate, frontier, healthcheck, keys, loadtest,
-    reproduce, serve,
-};
+use command::{advise, audit, backtest, backup, check, demo, frontier, healthcheck, keys, serve};
 use tokio::runtime::Builder;
 
 /// Nonparametric adaptive robust control of an investor, as a service.
@@ -39,12 +36,6 @@ enum Command {
     Backtest(backtest::BacktestArgs),
     /// Report what more or less caution would cost on records like the one in a file.
     Frontier(frontier::FrontierArgs),
-    /// Report how often balls contain the law that records come from, and what they cost.
-    Coverage(coverage::CoverageArgs),
-    /// Compare frameworks out of sample, in this process.
-    Evaluate(evaluate::Evaluate),
-    /// Recompute the tables and figures of the paper's section 3.
-    Reproduce(reproduce::Reproduce),
     /// Manage the keys that allow callers to use a service.
     #[command(subcommand)]
     Keys(keys::KeysCommand),
@@ -62,11 +53,6 @@ enum Command {
     Repair(backup::RepairCommand),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
-    /// Measure this machine's speed and accuracy.
-    #[command(subcommand)]
-    Bench(bench::Bench),
-    /// Measure the load that the live service can bear on this machine.
-    Loadtest(loadtest::LoadTest),
     /// Print the OpenAPI description.
     Openapi,
 }
@@ -111,11 +97,6 @@ async fn outcome() -> ExitCode {
         Command::Advise(arguments) => tokio::task::block_in_place(|| advise::run(&arguments)),
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Frontier(arguments) => tokio::task::block_in_place(|| frontier::run(&arguments)),
-        Command::Coverage(arguments) => tokio::task::block_in_place(|| coverage::run(&arguments)),
-        Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
-        Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
-        Command::Loadtest(arguments) => tokio::task::block_in_place(|| loadtest::run(&arguments)),
-        Command::Bench(bench) => bench::run(bench).await,
         Command::Keys(arguments) => keys::run(arguments).await,
         Command::Audit(arguments) => audit::run(arguments).await,
         Command::Check(arguments) => check::run(arguments).await,

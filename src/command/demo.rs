@@ -7,10 +7,10 @@
 use std::net::SocketAddr;
 use std::time::Instant;
 
+use ballast::http::api_client::{ApiClient, ApiError};
 use clap::Args;
 use thiserror::Error;
 
-use super::api_client::{ApiClient, ApiError};
 use super::host::{Host, HostError};
 use super::returns::ReturnsError;
 

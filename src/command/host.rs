@@ -17,18 +17,14 @@ pub enum HostError {
 }
 
 /// A data folder that is removed with all its contents.
-pub struct DataFolder(PathBuf);
+struct DataFolder(PathBuf);
 
 impl DataFolder {
-    /// Makes a folder in `parent`, named after `purpose`.
-    pub fn make_in(parent: &Path, purpose: &str) -> Result<Self, HostError> {
-        let path = parent.join(format!("ballast-{purpose}-{}", std::process::id()));
+    /// Makes a temporary folder named after `purpose`.
+    fn make(purpose: &str) -> Result<Self, HostError> {
+        let path = std::env::temp_dir().join(format!("ballast-{purpose}-{}", std::process::id()));
         std::fs::create_dir(&path).map_err(|source| HostError::Folder { path: path.clone(), source })?;
         Ok(DataFolder(path))
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.0
     }
 }
 
@@ -50,8 +46,8 @@ pub struct Host {
 impl Host {
     /// Starts the service over a new folder named after `purpose`.
     pub async fn start(purpose: &str) -> Result<Self, HostError> {
-        let folder = DataFolder::make_in(&std::env::temp_dir(), purpose)?;
-        let mut config = Config::new(folder.path());
+        let folder = DataFolder::make(purpose)?;
+        let mut config = Config::new(&folder.0);
         config.listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let started = serve(config, Shutdown::new()).await;
         let running = started.map_err(|source| HostError::Start { source: source.into() })?;
@@ -59,7 +55,7 @@ impl Host {
     }
 
     pub fn folder(&self) -> &Path {
-        self.folder.path()
+        &self.folder.0
     }
 
     /// Drains the service and waits for its end.

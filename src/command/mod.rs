@@ -1,29 +1,21 @@
 //! The commands of the binary.
 
 pub mod advise;
-mod api_client;
 pub mod audit;
 pub mod backtest;
 pub mod backup;
-pub mod bench;
 mod caution;
 pub mod check;
-mod compare;
-pub mod coverage;
 pub mod demo;
-pub mod evaluate;
 pub mod frontier;
 pub mod healthcheck;
 mod host;
 pub mod keys;
-pub mod loadtest;
 mod moments;
 mod record;
-pub mod reproduce;
 mod returns;
 pub mod serve;
 mod store_location;
-mod tables;
 mod tls_client;
 mod traces;
 

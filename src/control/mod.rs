@@ -45,7 +45,7 @@
 //! - `estimate`, `kept`, `pool`: the cost of work, and the memory and threads that its caller lends.
 //!
 //! The method itself stays behind this interface: the solution of a step (`bellman`, `uncertainty`, `surrogate`) may
-//! change without any change in a higher floor. The binary measures the parts of the method one by one (`bench`), so
+//! change without any change in a higher floor. The crate in `lab` measures the parts of the method one by one, so
 //! they are public to it. Everything has one path, the one of its file; only a policy's document is named by its
 //! folder.
 //!

@@ -1,5 +1,6 @@
 //! Floor 4: translates between the wire and the use cases, and does nothing else.
 
+pub mod api_client;
 mod connection;
 mod description;
 pub mod gate;

@@ -11,7 +11,10 @@ import { promisify } from "node:util";
 import { chromium } from "playwright-core";
 
 const run = promisify(execFile);
-export const BINARY = process.env.BALLAST_BINARY ?? fileURLToPath(new URL("../../target/release/ballast", import.meta.url));
+const built = (name) => fileURLToPath(new URL(`../../target/release/${name}`, import.meta.url));
+export const BINARY = process.env.BALLAST_BINARY ?? built("ballast");
+/** The program of the measurements and experiments. */
+export const LAB = process.env.BALLAST_LAB_BINARY ?? built("ballast-lab");
 /** Where the page's files are read from, in the place of those in the binary: a change of them needs no build to be looked at. */
 const FILES = process.env.BALLAST_DASHBOARD;
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";

@@ -8,7 +8,7 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
 import { promisify } from "node:util";
-import { BINARY, browser } from "./ballast.js";
+import { BINARY, LAB, browser } from "./ballast.js";
 import { accessible, plain, usable } from "./page.js";
 
 const run = promisify(execFile);
@@ -26,7 +26,7 @@ before(async () => {
   const asked = ["--rate", "0.006", "--window", "24"];
   await run(BINARY, ["backtest", join(folder, "one.csv"), "--out", join(folder, "one"), "--count", "10", "--every", "2", "--horizon", "3", "--alpha", "0.5", ...asked]);
   await run(BINARY, ["backtest", join(folder, "two.csv"), "--out", join(folder, "two"), ...asked]);
-  await run(BINARY, ["reproduce", "--quick", "--out", join(folder, "paper")]);
+  await run(LAB, ["reproduce", "--quick", "--out", join(folder, "paper")]);
   page = await (await chromium.newContext({ viewport: { width: 1280, height: 900 } })).newPage();
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));

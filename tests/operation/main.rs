@@ -1,8 +1,6 @@
 //! Load, kills, races and memory: real processes, several at a time, with time limits.
 
-#[macro_use]
-#[path = "../support/mod.rs"]
-mod support;
+use ballast_test_support as support;
 
 mod abuse;
 mod answers;

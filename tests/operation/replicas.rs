@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use crate::support::patience::{assert_within, until};
 use crate::support::postgres::{database, private_cluster};
 use crate::support::process::{serve, steps_solved};
+use crate::support::values::number;
 use crate::support::{App, several_assets, specification};
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
@@ -126,10 +127,6 @@ async fn a_job_is_followed_and_cancelled_through_a_replica_that_does_not_run_it(
     // The worker is free again.
     let next = api.app.queue(&specification(1)).await;
     api.app.until(&next, |job| job["state"] == "succeeded").await;
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 /// Every action of either replica is the simulator's for exactly the returns acknowledged by then.

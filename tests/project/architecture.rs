@@ -460,15 +460,20 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-fn sources() -> Vec<Source> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+/// Every file of a folder, by its path from `root`.
+fn sources_of(root: &str, folder: &str) -> Vec<Source> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(root);
     let mut paths = Vec::new();
-    rust_files(&src, &mut paths);
+    rust_files(&root.join(folder), &mut paths);
     let read = |path: &PathBuf| {
-        let name = path.strip_prefix(&src).unwrap().to_string_lossy().replace('\\', "/");
+        let name = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
         Source::new(&name, &fs::read_to_string(path).unwrap())
     };
     paths.iter().map(read).collect()
+}
+
+fn sources() -> Vec<Source> {
+    sources_of("src", "")
 }
 
 /// Files reached from the crate roots by their `mod` declarations, as the compiler reaches them.
@@ -496,7 +501,10 @@ fn the_source_keeps_the_rules_of_the_house() {
     }
     assert!(DOCUMENTS.iter().all(|file| visited.contains(*file)), "a document is no file");
     let tests: BTreeSet<String> = sources.iter().flat_map(Source::test_files).collect();
-    let faults: Vec<String> = sources.iter().filter(|source| !tests.contains(&source.path)).flat_map(faults).collect();
+    let lab = sources_of("", "lab/src");
+    assert!(lab.len() > 20, "{} files of the lab", lab.len());
+    let kept = sources.iter().filter(|source| !tests.contains(&source.path)).chain(&lab);
+    let faults: Vec<String> = kept.flat_map(faults).collect();
     assert!(faults.is_empty(), "{} broken rules:\n{}", faults.len(), faults.join("\n"));
 }
 
@@ -595,7 +603,7 @@ fn comments_literals_and_tests_break_no_rule() {
 
 #[test]
 fn no_unsafe_code_is_allowed_anywhere() {
-    for root in ["src/lib.rs", "src/main.rs"] {
+    for root in ["src/lib.rs", "src/main.rs", "lab/src/main.rs"] {
         let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(root)).unwrap();
         assert!(text.lines().any(|line| line == "#![forbid(unsafe_code)]"), "{root}");
     }

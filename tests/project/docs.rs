@@ -13,8 +13,20 @@ use serde_json::{Value, json};
 
 const README_BYTES: usize = 10_000;
 /// Folders at the root whose files the pages name in backticks.
-const FOLDERS: [&str; 11] =
-    [".ci/", "api/", "benches/", "clients/", "data/", "docker/", "docs/", "examples/", "fuzz/", "src/", "tests/"];
+const FOLDERS: [&str; 12] = [
+    ".ci/",
+    "api/",
+    "benches/",
+    "clients/",
+    "data/",
+    "docker/",
+    "docs/",
+    "examples/",
+    "fuzz/",
+    "lab/",
+    "src/",
+    "tests/",
+];
 /// What a name in backticks may be in its file.
 const KINDS: [&str; 7] = ["fn", "struct", "enum", "trait", "const", "mod", "type"];
 

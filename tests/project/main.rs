@@ -1,8 +1,6 @@
 //! What is written about the project, built into it and printed by it.
 
-#[macro_use]
-#[path = "../support/mod.rs"]
-mod support;
+use ballast_test_support as support;
 
 mod advise_file;
 mod architecture;
@@ -11,7 +9,6 @@ mod demo;
 mod dependencies;
 mod docs;
 mod guide;
-mod loadtest;
 mod monitoring;
 mod openapi;
 mod paper_map;

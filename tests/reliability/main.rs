@@ -25,13 +25,13 @@ mod replicas;
 mod scene;
 mod server;
 mod storm;
-#[path = "../support/mod.rs"]
-mod support;
 mod syncs;
 mod tenants;
 mod tracer;
 mod unread;
 mod work;
+
+use ballast_test_support as support;
 
 use std::process::ExitCode;
 use std::time::Instant;

@@ -1,6 +1,7 @@
 //! What a period reports beside its return, and what is put right afterwards: a session is what its reports as they stand make
 //! of it, whatever was reported first.
 
+use crate::support::values::number;
 use crate::support::{App, specification};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -50,10 +51,6 @@ async fn standing(app: &App) -> Value {
 fn without_bet(mut standing: Value) -> Value {
     standing["session"]["drift"] = json!(null);
     standing
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,12 +1,13 @@
 //! What an operator does to a store: check it, back it up while it is written to, restore it.
 
 use std::path::Path;
-use std::process::{Child, Command, Output};
+use std::process::Child;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use crate::support::patience::patience;
 use crate::support::place::Place;
+use crate::support::process::ballast;
 use crate::support::{App, execute, specification, trained};
 use ballast::store::Store;
 use futures_util::future::join_all;
@@ -16,11 +17,6 @@ const CLIENTS: usize = 6;
 const HORIZON: usize = 5;
 /// Periods that a client lives: one less than there are, so that every session still has an advice.
 const LIVED: usize = HORIZON - 1;
-
-fn ballast(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    command.args(arguments).env_remove("BALLAST_DATA").env_remove("BALLAST_STORE").output().unwrap()
-}
 
 /// What it printed, where it succeeded.
 fn succeeds(arguments: &[&str]) -> String {

@@ -1,15 +1,13 @@
 //! One damaged row costs one row: lists go on without it, it is named, and it is put back from a backup.
 
 use std::path::Path;
-use std::process::Command;
 
-use crate::support::{App, specification};
+use crate::support::{App, process, specification};
 use serde_json::Value;
 
 /// Runs `ballast`; whether it succeeded, and what it printed and said.
 fn ballast(arguments: &[&str]) -> (bool, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    let output = command.args(arguments).env_remove("BALLAST_DATA").env_remove("BALLAST_STORE").output().unwrap();
+    let output = process::ballast(arguments);
     let printed = [output.stdout, output.stderr].concat();
     (output.status.success(), String::from_utf8(printed).unwrap())
 }

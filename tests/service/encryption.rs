@@ -90,17 +90,6 @@ async fn callers_are_answered_over_tls_1_2_and_1_3_and_in_the_clear_not_at_all()
     assert_eq!(health(&["--listen", &address, "--tls-cert", &file]), (true, String::new()));
     assert_eq!(health(&["--url", &format!("https://{address}")]), (true, String::new()));
     assert!(!health(&["--listen", &address]).0, "asked in the clear");
-    let authorities = folder.path().join("ca.pem");
-    std::fs::write(&authorities, &authority.pem).unwrap();
-    let sizes = ["--clients", "2", "--sessions", "4", "--rounds", "1", "--horizon", "2", "--count", "12"];
-    let load = Command::new(env!("CARGO_BIN_EXE_ballast"))
-        .args(["loadtest", "observe", "--url", &format!("https://{address}"), "--seconds", "0.2", "--json"])
-        .args(sizes)
-        .arg("--ca")
-        .arg(&authorities)
-        .output()
-        .unwrap();
-    assert!(load.status.success(), "{}", String::from_utf8_lossy(&load.stderr));
 }
 
 /// The answer and the certificate it came under.

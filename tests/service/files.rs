@@ -1,7 +1,7 @@
 //! The files of a folder that is served: what becomes of the service once they are others.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until};
@@ -134,8 +134,7 @@ async fn two_services_never_have_one_folder() {
 }
 
 fn ballast(arguments: &[&str], data: &Path) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    let output = command.args(arguments).arg("--data").arg(data).env_remove("BALLAST_STORE").output().unwrap();
+    let output = process::ballast(&[arguments, &["--data", data.to_str().unwrap()]].concat());
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 

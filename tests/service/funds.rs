@@ -1,5 +1,6 @@
 //! Several assets in a session: composition first, then the policy of their fund.
 
+use crate::support::values::number;
 use crate::support::{App, ROWS, several_assets as request};
 use ballast::control::assets::fund::Fund;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
@@ -36,10 +37,6 @@ fn trained(request: &Value) -> Advisor {
 
 fn rows() -> Vec<Vec<f64>> {
     ROWS.iter().map(|row| row.to_vec()).collect()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 /// In the order of the assets.

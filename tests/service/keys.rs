@@ -298,8 +298,7 @@ async fn tenants_may_have_the_same_names_and_policies_over_a_database() {
 
 /// Runs `ballast` with these arguments; its exit code, standard output and standard error.
 fn ballast(arguments: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    let output = command.args(arguments).env_remove("BALLAST_STORE").output().unwrap();
+    let output = process::ballast(arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }

@@ -1,8 +1,7 @@
 //! The service over HTTP and its store, in this process and with the real binary.
 
 #[macro_use]
-#[path = "../support/mod.rs"]
-mod support;
+extern crate ballast_test_support as support;
 
 mod account;
 mod advise;

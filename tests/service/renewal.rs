@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use crate::support::patience::until;
+use crate::support::values::number;
 use crate::support::{App, specification};
 use ballast::control::evaluation::account::keep;
 use ballast::control::evaluation::rolling::{ActualPeriod, Strategy, WalkForward};
@@ -43,10 +44,6 @@ async fn observe(app: &App, periods: std::ops::RangeInclusive<usize>) {
 
 async fn session(app: &App) -> Value {
     app.get(&format!("/sessions/{}", app.session)).await.1
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 /// The returns seen after so many periods, the last `window` of them.

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::support::values::number;
 use crate::support::{App, specification};
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
@@ -9,10 +10,6 @@ use ballast::control::problem::state::PeriodOutcome;
 use serde_json::{Value, json};
 
 const HORIZON: usize = 4;
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
-}
 
 async fn advisor(app: &App) -> Advisor {
     Advisor::new(Policy::from_json(&app.export().await).unwrap())

@@ -133,7 +133,7 @@ fn whole_horizons_agree_with_nested_grids() {
         let advice = solved.advise(0, &state, AdviceMode::Surrogate);
         let expected = case["log_certainty_equivalent_over_bank"].as_f64().unwrap();
         let error = (advice.certainty_equivalent / advice.floor).ln() - expected;
-        // Over two and three periods 0.02 basis points, as `bench horizons` finds with 1,000 points, and as much again for 500
+        // Over two and three periods 0.02 basis points, as `ballast-lab bench horizons` finds with 1,000 points, and as much again for 500
         // (20 points leave 0.3). Over ten, half a basis point: that is what the references claim for themselves, and what
         // is left there, 0.25, is the same with 200 points and with 1,000.
         let allowed = if case["horizon"].as_u64().unwrap() < 10 { 4e-6 } else { 5e-5 };

@@ -1,19 +1,17 @@
 //! The mathematics: every solver, law and surrogate against something independent of it.
 
-#[macro_use]
-#[path = "../support/mod.rs"]
-mod support;
+use ballast_test_support as support;
 
 mod accuracy;
 mod assets;
 mod bellman;
+mod calibration;
 mod caution;
 mod centre;
 mod contributions;
 mod control;
 mod controlled;
 mod costs;
-mod coverage;
 mod design;
 mod evaluate;
 mod exchangeability;

@@ -2,6 +2,7 @@
 
 use crate::support::App;
 use crate::support::policies::{advisor, specification, train};
+use crate::support::values::number;
 use ballast::control::bellman::BellmanStep;
 use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
@@ -14,10 +15,6 @@ use ballast::control::request::learning::Learning;
 use serde_json::{Value, json};
 
 const FRAMEWORKS: [&str; 2] = ["parametric_static", "parametric_adaptive"];
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
-}
 
 /// The cases of the reference with this horizon and framework, each with its history in place.
 fn cases(list: &str, count: usize) -> Vec<Value> {

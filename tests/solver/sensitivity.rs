@@ -1,5 +1,6 @@
 //! How near an advice is to changing, against asking again: with the record changed by hand, and by closed forms.
 
+use crate::support::values::number;
 use crate::support::{App, policies, specification};
 use ballast::control::kept::Cache;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
@@ -30,10 +31,6 @@ fn problems() -> Vec<Value> {
             "radius": { "rule": "chi_square", "alpha": 0.8 } }),
         json!({ "history": HISTORY, "utility": power(6.0), "framework": "plug_in", "rate_per_step": 0.01 }),
     ]
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 async fn advise(app: &App, question: &Value) -> Value {

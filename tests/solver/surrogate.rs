@@ -1,5 +1,5 @@
 //! The surrogates at states that they were not trained on: how far off they are, whether they know it, and whether they say
-//! where they were never trained. `bench accuracy` asks the same of designs of the size that is served.
+//! where they were never trained. `ballast-lab bench accuracy` asks the same of designs of the size that is served.
 
 use std::sync::LazyLock;
 

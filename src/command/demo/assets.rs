@@ -11,8 +11,8 @@ use super::DemoError;
 use super::calls::{DemoAssetsAdvice, DemoWorstMean, advice, observe, open_session, train};
 use super::past::{HISTORY, INITIAL_WEALTH};
 use super::story::{FIRST_MONTH, HORIZON, YEAR, tell_worst_case};
-use crate::command::api_client::ApiClient;
 use crate::command::returns::{AnyReturns, ReturnsError};
+use ballast::http::api_client::ApiClient;
 
 const CSV: &str = include_str!("../../../data/us_industries_monthly.csv");
 const INDUSTRIES: [&str; 4] = ["energy", "finance", "health", "utilities"];

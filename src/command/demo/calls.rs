@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::DemoError;
 use super::past::{ALPHA, INITIAL_WEALTH, RISK_AVERSION};
 use super::progress::{DemoJob, ProgressView};
-use crate::command::api_client::ApiClient;
+use ballast::http::api_client::ApiClient;
 
 /// Pause before an event stream that ended early is opened again.
 const BEFORE_REOPENING: Duration = Duration::from_millis(250);

@@ -6,8 +6,8 @@ use serde_json::json;
 use super::DemoError;
 use super::calls::{DemoAdvice, DemoMove, DemoWorstCase, advice, observe, open_session, train};
 use super::past::{ALPHA, HISTORY, INITIAL_WEALTH, Past, RISK_AVERSION};
-use crate::command::api_client::ApiClient;
 use crate::command::returns::{Returns, Row};
+use ballast::http::api_client::ApiClient;
 
 pub const YEAR: &str = "2008";
 pub const FIRST_MONTH: &str = "2008-01";

@@ -5,7 +5,6 @@ pub mod analysis;
 pub mod assets;
 pub mod backtest;
 pub mod backtest_report;
-pub mod coverage;
 pub mod deciding_paths;
 pub mod frontier;
 pub mod names;

@@ -103,7 +103,7 @@ fn normal_nodes() -> [f64; SPREAD] {
 /// first and has at least two different values. Streams: (seed, "calibration", 0, index). Cost O(1000 (n paths + n ln
 /// n)).
 ///
-/// Checked by: `balls_of_fresh_records_hold_the_smoothed_law_as_often_as_they_say`, and by `ballast coverage` on laws
+/// Checked by: `balls_of_fresh_records_hold_the_smoothed_law_as_often_as_they_say`, and by `ballast-lab coverage` on laws
 /// that are not those of a record.
 pub fn calibration_factor(bridges: &AbsoluteBridges, record: &[f64], retention: f64, alpha: f64, seed: u64) -> f64 {
     let mut needed = needed(bridges, record, retention, alpha, |index| stream(seed, "calibration", 0, index));

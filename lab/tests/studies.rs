@@ -1,0 +1,45 @@
+//! `ballast-lab coverage` and `ballast-lab reproduce`, as a reader of the documents runs them.
+
+use std::process::Command;
+
+#[test]
+fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_option_it_refuses() {
+    let run = |arguments: &[&str]| {
+        let command = Command::new(env!("CARGO_BIN_EXE_ballast-lab")).arg("coverage").args(arguments).output().unwrap();
+        (String::from_utf8(command.stdout).unwrap(), String::from_utf8(command.stderr).unwrap())
+    };
+    let (output, _) = run(&["--records", "20", "--sizes", "5,8"]);
+    let lines: Vec<&str> = output.lines().collect();
+    assert_eq!(lines.len(), 1 + 4 * 2 * 4 * 4, "{output}");
+    for name in ["normal", "the paper's mixture", "Student, 4 degrees", "market, in blocks"] {
+        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 32, "{output}");
+    }
+    for centre in [" empirical ", " smoothed ", " volatility_scaled ", " mixed "] {
+        assert_eq!(lines.iter().filter(|line| line.contains(centre)).count(), 32, "{output}");
+    }
+    for (arguments, option) in [
+        (["--alpha", "0"], "--alpha"),
+        (["--sizes", "1"], "--sizes"),
+        (["--risk-aversion", "0.5"], "--risk-aversion"),
+        (["--records", "1"], "--records"),
+    ] {
+        let (_, refused) = run(&arguments);
+        assert!(refused.contains(&format!("{option} ")), "{refused}");
+    }
+}
+
+/// A run of ten histories can tell nothing about the paper, and says so of every statement; no figure is a zero with a sign.
+#[test]
+fn a_quick_reproduction_gives_no_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_ballast-lab"))
+        .args(["reproduce", "--quick", "--out"])
+        .arg(folder.path())
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let printed = String::from_utf8(done.stdout).unwrap();
+    let findings: Vec<&str> = printed.lines().take_while(|line| !line.is_empty()).collect();
+    assert!(findings.len() > 6 && findings.iter().all(|line| line.starts_with("Not enough to tell: ")), "{printed}");
+    assert!(!printed.contains("-0.00 ") && !printed.contains("-0.00,"), "{printed}");
+}
