@@ -5,6 +5,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use ballast::control::assets::advising::FundsBall;
+use ballast::control::cache::Cache;
 use ballast::control::error::TrainError;
 use ballast::control::estimate;
 use ballast::control::evaluation::assets::AssetsBacktest;
@@ -15,8 +16,7 @@ use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
-use ballast::control::evaluation::rolling::{ActualPeriod, Decision, SharedWork};
-use ballast::control::kept::Cache;
+use ballast::control::evaluation::walk_forward::{ActualPeriod, Decision, SharedWork};
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::pool::{self, TrainingPool};

@@ -4,10 +4,10 @@
 use std::error::Error;
 use std::fmt::Write;
 
+use ballast::control::cache::Cache;
 use ballast::control::error::FieldError;
 use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, ResampledFrontier};
-use ballast::control::kept::Cache;
 use ballast::control::progress::Watch;
 use ballast::control::request::frontier::{FrontierProblem, FrontierRequest, default_scales};
 use ballast::control::request::radius_rule::RadiusRule;

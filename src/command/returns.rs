@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::assets::AssetsRecord;
-use ballast::control::evaluation::rolling::ActualPeriod;
+use ballast::control::evaluation::walk_forward::ActualPeriod;
 use ballast::control::request::annualised::compounded;
 pub use ballast::control::request::frequency::Frequency;
 use ballast::returns::{Choices, Holds, Kind, Question, Reading, Record, Series, Unit, decoded, read};

@@ -18,10 +18,10 @@ use crate::control::request::specification::{InitialLaws, Specification, Surroga
 use crate::control::request::support::Support;
 use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::{FeatureSelection, Features};
-use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, Counts, DesignFitting};
 use crate::control::surrogate::stored::Solution;
+use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::control::uncertainty::laws::Laws;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::empirical::EmpiricalDistribution;

@@ -9,7 +9,7 @@ use super::bellman::problem::Problem;
 use super::evaluation::assets::AssetsBacktest;
 use super::evaluation::backtest::Backtest;
 use super::policy::Policy;
-use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
+use super::policy::prepared_step::{bytes_ready, factor_bytes, prepared_bytes};
 use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
 use super::request::completion::DEFAULT_COUNT;
 use super::request::evaluation::EvaluationRequest;

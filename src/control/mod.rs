@@ -29,7 +29,7 @@
 //! | y^i_t, N | `Design` | 3.1 | `control/surrogate/design.rs` | `tests/solver/control.rs::the_same_seed_gives_the_same_bytes_on_any_number_of_threads_and_through_json` |
 //! | y-check | `FeatureSelection` | 3.1 | `control/surrogate/features.rs` | `tests/project/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
 //! | k | `weighted_sum` | 3.1 | `numerics/gp/matern.rs` | `src/numerics/gp/matern.rs::the_fast_sum_equals_the_plain_formula` |
-//! | V-check | `Surrogate` | 3.1 | `control/surrogate/fitted.rs` | `tests/project/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
+//! | V-check | `Surrogate` | 3.1 | `control/surrogate/value_surrogate.rs` | `tests/project/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
 //! | phi-check | `policy_target` | 3.1 | `control/surrogate/policy_target.rs` | `src/control/surrogate/policy_target.rs::a_parabola_is_continued_to_its_optimum` |
 //! | hyperparameters | `fit` | 3.1 | `numerics/gp/fit.rs` | `tests/solver/gp.rs::a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes` |
 //! | steps 1 to 6 | `Training` | 3.1 | `control/training.rs` | `tests/solver/control.rs::whole_horizons_agree_with_nested_grids` |
@@ -54,12 +54,12 @@
 
 pub mod assets;
 pub mod bellman;
+pub mod cache;
 pub mod caution;
 pub mod controlled_training;
 pub mod error;
 pub mod estimate;
 pub mod evaluation;
-pub mod kept;
 pub mod policy;
 pub mod pool;
 pub mod problem;

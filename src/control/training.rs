@@ -11,8 +11,8 @@ use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
 use crate::control::bellman::{BellmanStep, DesignSolution};
+use crate::control::cache::Cache;
 use crate::control::error::TrainError;
-use crate::control::kept::Cache;
 use crate::control::policy::Policy;
 use crate::control::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW, Holdings};
 use crate::control::problem::state::State;
@@ -26,7 +26,7 @@ use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, DesignFitting, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::laws::LawSummary;
-use crate::control::uncertainty::measured::SharedSummaries;
+use crate::control::uncertainty::shared_summaries::SharedSummaries;
 
 /// Summaries of the laws of a design.
 pub type LawSummaryCache = SharedSummaries<LawSummary>;

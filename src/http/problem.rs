@@ -13,7 +13,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
-use crate::service::entries::gate::{Doubt, Doubts};
+use crate::service::entries::doubts::{Doubt, Doubts};
 use crate::service::metrics::PROBLEMS;
 
 /// The kind of a failure; kinds differ by what the client should do next.

@@ -19,9 +19,9 @@ use utoipa_axum::routes;
 use super::problem::{ProblemDocument, ProblemKind};
 use crate::http::description::bounds;
 use crate::http::description::defaults;
-use crate::http::description::described;
 use crate::http::description::documentation;
 use crate::http::description::documentation::Published;
+use crate::http::description::problem_responses;
 use crate::http::gate::access;
 use crate::http::gate::access::{CallerOf, Gate, ReadCalls};
 use crate::http::gate::bodies::{self, Bodies};
@@ -121,7 +121,7 @@ fn pages() -> OpenApiRouter<Arc<Service>> {
 /// Returns the OpenAPI description.
 pub fn description() -> utoipa::openapi::OpenApi {
     let mut description = routes().into_openapi();
-    described::with_every_problem(&mut description);
+    problem_responses::with_every_problem(&mut description);
     bounds::tell(&mut description);
     defaults::tell(&mut description);
     description

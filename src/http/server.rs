@@ -12,9 +12,9 @@ use thiserror::Error;
 use tokio::task::JoinHandle;
 use tokio_rustls::TlsAcceptor;
 
-use crate::http::connection::connections::{ConnectionLimits, Connections};
+use crate::http::connection::connection_table::{ConnectionLimits, Connections};
 use crate::http::connection::listener::{Door, Manners};
-use crate::http::connection::patient::Patience;
+use crate::http::connection::timed_stream::Patience;
 use crate::http::connection::tls::{Certificate, TlsError};
 use crate::http::gate::telemetry;
 use crate::http::router;

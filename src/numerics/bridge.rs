@@ -14,18 +14,18 @@
 
 pub mod calibration;
 pub mod funds;
-pub mod gap_places;
 pub mod grown;
 pub mod limit;
 pub mod paths;
 pub mod scale_mixture;
+pub mod sized_gaps;
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use crate::numerics::bridge::gap_places::{SizedGaps, Statistic};
 use crate::numerics::bridge::paths::{AbsoluteBridges, PATHS, Share, Times};
 use crate::numerics::bridge::scale_mixture::LastQuantile;
+use crate::numerics::bridge::sized_gaps::{SizedGaps, Statistic};
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::machine::dispatch::dispatched;
 

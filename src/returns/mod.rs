@@ -13,7 +13,7 @@ mod dates;
 mod doubt;
 mod excess;
 mod heading;
-mod kept;
+mod kept_rows;
 mod kind;
 mod moments;
 mod month_names;

@@ -7,7 +7,7 @@ use super::bank::Bank;
 use super::cells::{Cell, mark};
 use super::choices::{Choices, Kind, Unit};
 use super::excess;
-use super::kept::KeptRows;
+use super::kept_rows::KeptRows;
 use super::kind::{Numbers, RecordContext, Returns, called};
 use super::number::{Mark, number};
 use super::order::{is_newest_first, ordered};

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::control::error::FieldError;
 use crate::service::callers::allowance::Refused;
-use crate::service::entries::gate::Doubts;
+use crate::service::entries::doubts::Doubts;
 use crate::store::StoreError;
 
 #[derive(Debug, Error)]

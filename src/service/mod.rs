@@ -16,7 +16,7 @@ pub mod sessions;
 use std::sync::Arc;
 
 use callers::audit::Audit;
-use callers::bounded::{FairQueue, QueueSize};
+use callers::fair_queue::{FairQueue, QueueSize};
 use callers::keys::{Caller, KeysInForce};
 use catalogue::labels::Names;
 use catalogue::policies::Policies;
@@ -85,7 +85,7 @@ impl Service {
                 "the store holds no key: every caller is answered, as the tenant default, and may do everything"
             );
         }
-        tokio::spawn(callers::fresh_keys::keep_fresh(keys.clone(), shutdown.clone()));
+        tokio::spawn(callers::key_refresh::keep_fresh(keys.clone(), shutdown.clone()));
         tokio::spawn(process::upkeep::keep_tidy(store.clone(), time.clone(), config.retain_jobs, shutdown.clone()));
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");

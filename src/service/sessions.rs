@@ -14,13 +14,13 @@
 pub mod assets;
 pub(super) mod content;
 pub mod fund_advice;
-pub mod known;
+pub mod initial_history;
 pub mod live;
 pub(super) mod peers;
 pub mod plan;
 pub(super) mod rows;
+pub(super) mod session_state;
 pub(super) mod slots;
-pub(super) mod standing;
 pub(super) mod sync;
 
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ use crate::control::problem::state::State;
 use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
 use crate::service::callers::allowance::HeavyPermit;
-use crate::service::callers::bounded::{FairQueue, QueueSize};
+use crate::service::callers::fair_queue::{FairQueue, QueueSize};
 use crate::service::callers::identity;
 use crate::service::callers::keys::Caller;
 use crate::service::callers::turns::CallTurns;
@@ -49,11 +49,11 @@ use crate::service::process::config::Config;
 use crate::service::process::memory::Memory;
 use crate::service::process::spans;
 use crate::service::sessions::assets::Assets;
-use crate::service::sessions::known::InitialHistory;
+use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::live::{AdviceContext, LiveSession, SESSION_BYTES};
 use crate::service::sessions::plan::{Renewing, SessionPlan};
+use crate::service::sessions::session_state::SessionState;
 use crate::service::sessions::slots::{Generation, SlotGuard, Slots};
-use crate::service::sessions::standing::SessionState;
 use crate::store::{CreateSession, Relabel, RequestKey, SessionRow, Store, Tenant};
 
 /// Lists of sessions read concurrently. These are fewer than the store's connections for lists, so that the lists of

@@ -53,7 +53,7 @@ pub use maintenance::check::Inspection;
 pub use maintenance::relocation::relocate;
 pub use maintenance::repair::{Repair, repair};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary, Stored};
-pub use sessions::care::{Attention, CareCounts, FirstDay, Today};
+pub use sessions::attention::{Attention, CareCounts, FirstDay, Today};
 pub use sessions::entries::{Append, EntryKind, EntryRow};
 pub use sessions::head::Head;
 pub use sessions::idempotency::RequestKey;
@@ -61,7 +61,7 @@ pub use sessions::overview::{
     Counted, SessionFilter, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
 };
 pub use sessions::renewals::RenewalTarget;
-pub use sessions::seen::RowVersion;
+pub use sessions::row_version::RowVersion;
 pub use sessions::words::Labelled;
 pub use sessions::{CreateSession, SessionFacts, SessionRow};
 pub use tenants::audit::{Actor, AuditAction, AuditFilter, AuditRow};

@@ -2,14 +2,14 @@
 //!
 //! Beside it: the entries of sessions, how a change is noticed, and the lists in which sessions are found.
 
-pub(super) mod care;
+pub(super) mod attention;
 pub(super) mod entries;
 pub(super) mod head;
 pub(super) mod idempotency;
 pub(super) mod overview;
 pub(super) mod renewals;
+pub(super) mod row_version;
 pub(super) mod search;
-pub(super) mod seen;
 pub(super) mod words;
 
 use futures_util::FutureExt;
@@ -22,7 +22,7 @@ use crate::store::jobs::training_names::withdraw_all;
 use crate::store::sessions::entries::EntryRow;
 use crate::store::sessions::head::Head;
 use crate::store::sessions::idempotency::{RequestKey, Used};
-use crate::store::sessions::seen::RowVersion;
+use crate::store::sessions::row_version::RowVersion;
 use crate::store::sessions::words::{Labelled, Worded};
 use crate::store::tenants::audit::{Actor, AuditAction, AuditRow};
 use crate::store::tenants::audit_chain;

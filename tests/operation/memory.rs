@@ -6,7 +6,7 @@ use std::process::{Child, Command};
 use std::time::Duration;
 
 use crate::support::App;
-use ballast::control::kept::Cache;
+use ballast::control::cache::Cache;
 use ballast::service::process::memory::MemoryLimit;
 use reqwest::StatusCode;
 use serde_json::{Value, json};

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 
 use crate::support::policies::advisor;
-use ballast::control::kept::Cache;
+use ballast::control::cache::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{PeriodOutcome, State};

@@ -1,9 +1,9 @@
 //! What more or less caution would cost on records like the one at hand: `POST /frontier` and the library behind it.
 
 use crate::support::App;
+use ballast::control::cache::Cache;
 use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::FrontierReport;
-use ballast::control::kept::Cache;
 use ballast::control::progress::Watch;
 use ballast::control::request::frontier::FrontierRequest;
 use ballast::control::request::specification::ProblemSpecification;

@@ -14,7 +14,7 @@ use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::numerics::bridge::funds::fund_returns;
-use ballast::numerics::transport::levelling::inverse_volatility;
+use ballast::numerics::transport::water_filling::inverse_volatility;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 

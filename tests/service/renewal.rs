@@ -7,7 +7,7 @@ use crate::support::patience::until;
 use crate::support::values::number;
 use crate::support::{App, specification};
 use ballast::control::evaluation::account::keep;
-use ballast::control::evaluation::rolling::{ActualPeriod, Strategy, WalkForward};
+use ballast::control::evaluation::walk_forward::{ActualPeriod, Strategy, WalkForward};
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;

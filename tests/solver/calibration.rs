@@ -1,7 +1,7 @@
 //! A calibrated radius, in a session and in the simulator.
 
 use crate::support::{App, specification};
-use ballast::control::kept::Cache;
+use ballast::control::cache::Cache;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::request::specification::Specification;

@@ -1,7 +1,7 @@
 //! Levels of caution against plain simulation with the robust step itself.
 
+use ballast::control::cache::Cache;
 use ballast::control::caution::{AllocationCurve, OnePeriodInvestor};
-use ballast::control::kept::Cache;
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::radius_rule::RadiusRule;

@@ -4,8 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use crate::support::policies::{advisor, specification, train};
 use ballast::control::bellman::problem::Problem;
+use ballast::control::cache::Cache;
 use ballast::control::error::TrainError;
-use ballast::control::kept::Cache;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{PeriodOutcome, State};

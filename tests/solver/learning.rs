@@ -4,7 +4,7 @@ use crate::support::App;
 use crate::support::policies::{advisor, specification};
 use ballast::control::bellman::BellmanStep;
 use ballast::control::bellman::next_value::NextValue;
-use ballast::control::kept::Cache;
+use ballast::control::cache::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{PeriodOutcome, State};

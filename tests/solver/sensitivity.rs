@@ -2,7 +2,7 @@
 
 use crate::support::values::number;
 use crate::support::{App, policies, specification};
-use ballast::control::kept::Cache;
+use ballast::control::cache::Cache;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::problem::state::State;

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use ballast::control::cache::Cache;
 use ballast::control::error::TrainError;
 use ballast::control::evaluation::account::keep;
-use ballast::control::evaluation::rolling::{ActualPeriod, Decision, Strategy, WalkForward};
-use ballast::control::kept::Cache;
+use ballast::control::evaluation::walk_forward::{ActualPeriod, Decision, Strategy, WalkForward};
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::pool::TrainingPool;

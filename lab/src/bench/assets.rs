@@ -9,7 +9,7 @@ use ballast::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::specification::UtilitySpecification;
-use ballast::numerics::transport::levelling::{GroundMetric, inverse_volatility};
+use ballast::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
 use clap::Args;
 use serde::Serialize;
 

@@ -11,8 +11,8 @@
 
 use std::ops::RangeInclusive;
 
+use ballast::control::cache::Cache;
 use ballast::control::error::FieldError;
-use ballast::control::kept::Cache;
 use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::pool;
 use ballast::control::problem::utility::RelativeUtility;

@@ -2,9 +2,9 @@
 
 use std::error::Error;
 
+use ballast::control::cache::Cache;
 use ballast::control::evaluation::paths::{Evaluation, Follower};
 use ballast::control::evaluation::report::EvaluationReport;
-use ballast::control::kept::Cache;
 use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::problem::utility::utility;

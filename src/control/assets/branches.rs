@@ -10,7 +10,7 @@
 use super::PortfolioStep;
 use crate::control::problem::utility::RelativeUtility;
 use crate::numerics::machine::interruption;
-use crate::numerics::transport::levelling::{FillingPhase, Levelling};
+use crate::numerics::transport::water_filling::{FillingPhase, Levelling};
 
 /// Largest number of Newton steps for a local minimum; they approach it from one side, and double the digits from about
 /// the third on.

@@ -2,7 +2,7 @@
 
 use super::AssetsSolution;
 use crate::control::request::fund::CompositionRule;
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 /// A total below this carries no information about its parts.
 const LEAST_TOTAL: f64 = 1e-4;

@@ -266,7 +266,7 @@ mod tests {
     use crate::control::problem::actions::ActionInterval;
     use crate::control::problem::utility::RelativeUtility;
     use crate::numerics::machine::streams::stream;
-    use crate::numerics::transport::levelling::{GroundMetric, inverse_volatility};
+    use crate::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
 
     /// Compares with branches found anew at each point, and with differences of the move's own payoffs.
     #[test]

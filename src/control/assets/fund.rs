@@ -27,7 +27,7 @@ use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification,
 };
 use crate::numerics::bridge::funds::fund_returns;
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 /// The assets of a session's fund, with its composition and holdings.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@
 //!
 //! a_i >= 0 are the shares of wealth, with a sum in an interval. The ground cost of W1 is the largest |dz_i|
 //! (`GroundMetric::Sup`) or `sum k_i |dz_i|` (`GroundMetric::Weighted`). No move up helps the adversary, so an atom that is moved
-//! by D moves along its water-filling path (`numerics/transport/levelling.rs`). With the price gamma of distance
+//! by D moves along its water-filling path (`numerics/transport/water_filling.rs`). With the price gamma of distance
 //!
 //!   the step  =  max_(a, gamma >= 0)  sum_j p_j min_D [ U(w_j(D; a)) + gamma D ]  -  gamma radius,
 //!
@@ -36,7 +36,7 @@ use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::MOST_ASSETS;
-use crate::numerics::transport::levelling::GroundMetric;
+use crate::numerics::transport::water_filling::GroundMetric;
 
 /// Gap between the bounds at which a search ends, in relative utility.
 const TOLERANCE: f64 = 1e-8;

@@ -12,7 +12,7 @@ use super::{BestResponse, best_response};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::surrogate::features::{FeatureSelection, Features};
-use crate::control::surrogate::fitted::ValueSurrogate;
+use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::control::uncertainty::laws::Laws;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::search::chebyshev::local_cubic;

@@ -6,8 +6,8 @@ use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::request::specification::Specification;
 use crate::control::surrogate::features::FeatureSelection;
-use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::stored::Solution;
+use crate::control::surrogate::value_surrogate::ValueSurrogate;
 
 /// The floor gains of a state, at even holdings.
 pub type ExactGains = dyn Fn(&State) -> Vec<f64> + Send + Sync;

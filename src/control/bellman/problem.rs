@@ -1,8 +1,8 @@
 //! The investor's problem with everything that does not change from step to step: its laws, its dynamics and its
 //! features.
 
+use crate::control::cache::Cache;
 use crate::control::error::FieldError;
-use crate::control::kept::Cache;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::holdings::Holdings;

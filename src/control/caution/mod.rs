@@ -20,7 +20,7 @@ mod curve;
 use sha2::{Digest, Sha256};
 
 pub use self::curve::{AllocationCurve, OnePeriodInvestor};
-use crate::control::kept::{Cache, Key};
+use crate::control::cache::{Cache, Key};
 use crate::control::pool;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::annualised::premium;

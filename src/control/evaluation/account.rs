@@ -1,6 +1,6 @@
 //! Wealth accounts of strategies, and the figures computed from them.
 
-use crate::control::evaluation::rolling::ActualPeriod;
+use crate::control::evaluation::walk_forward::ActualPeriod;
 use crate::control::problem::actions::Band;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::annualised::compounded;

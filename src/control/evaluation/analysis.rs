@@ -4,7 +4,7 @@ use crate::control::evaluation::account::{Account, keep, uncounted_periods};
 use crate::control::evaluation::backtest_report::BacktestFigures;
 use crate::control::evaluation::names::{StrategyKind, own_mix_name};
 use crate::control::evaluation::resampling::{ResampledFigures, StrategySeries};
-use crate::control::evaluation::rolling::{ActualPeriod, Decision};
+use crate::control::evaluation::walk_forward::{ActualPeriod, Decision};
 use crate::control::evaluation::yearly_worth::{
     INITIAL_WEALTH, MixBooks, Scale, YearlyWorth, at_once, present_at_once,
 };

@@ -5,7 +5,7 @@ use jiff::civil::Date;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::analysis::{Analysis, StrategyLine};
 use crate::control::evaluation::names::{StrategyKind, at_level, mix_name};
-use crate::control::evaluation::rolling::{ActualPeriod, Decision, Strategy, WalkForward};
+use crate::control::evaluation::walk_forward::{ActualPeriod, Decision, Strategy, WalkForward};
 use crate::control::evaluation::yearly_worth::Scale;
 use crate::control::progress::Watch;
 use crate::control::request::backtest::BacktestRequest;

@@ -11,7 +11,7 @@ pub mod names;
 pub mod paths;
 pub mod report;
 pub mod resampling;
-pub mod rolling;
 pub mod statistics;
 pub mod verdict;
+pub mod walk_forward;
 pub mod yearly_worth;

@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use crate::control::cache::Cache;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{PathOutcome, mix_ended};
-use crate::control::kept::Cache;
 use crate::control::policy::advice::AdviceSource;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::problem::dynamics::Dynamics;

@@ -7,7 +7,7 @@ use crate::control::evaluation::backtest_report::{
 };
 use crate::control::evaluation::names::{StrategyKind, quoted};
 use crate::control::evaluation::resampling::intervals;
-use crate::control::evaluation::rolling::Decision;
+use crate::control::evaluation::walk_forward::Decision;
 use crate::control::evaluation::yearly_worth::CONFIDENCE;
 use crate::control::policy::advice::AdviceSource;
 use crate::numerics::machine::digits::{fixed, signed};

@@ -122,7 +122,7 @@ mod tests {
 
     use super::*;
     use crate::control::evaluation::account::keep;
-    use crate::control::evaluation::rolling::ActualPeriod;
+    use crate::control::evaluation::walk_forward::ActualPeriod;
     use crate::control::problem::actions::Band;
     use crate::numerics::machine::streams::stream;
 

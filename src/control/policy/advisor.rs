@@ -5,13 +5,13 @@ use std::sync::OnceLock;
 
 use super::advice::{Advice, AdviceSource, Uncertainty};
 use super::document::Policy;
-use super::prepared::{PreparedStep, prepared_bytes};
+use super::prepared_step::{PreparedStep, prepared_bytes};
 use crate::control::bellman::BellmanStep;
 use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
+use crate::control::cache::Cache;
 use crate::control::error::FieldError;
-use crate::control::kept::Cache;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
 use crate::control::problem::state::{PeriodOutcome, State};

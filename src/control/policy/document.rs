@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::control::bellman::problem::{Problem, largest_gain};
+use crate::control::cache::Cache;
 use crate::control::error::{FieldError, PolicyError};
-use crate::control::kept::Cache;
 use crate::control::problem::actions::Band;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::caution::CautionLevel;

@@ -6,7 +6,7 @@ pub mod caution;
 mod document;
 pub mod levels;
 pub mod one_period;
-pub mod prepared;
+pub mod prepared_step;
 pub mod sensitivity;
 pub mod walk;
 pub mod what_if;

@@ -18,7 +18,7 @@ use super::support::Support;
 use super::text::check_text;
 use crate::control::error::FieldError;
 use crate::numerics::bridge::funds::fund_returns;
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 /// Largest number of assets.
 pub const MOST_ASSETS: usize = 30;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::numerics::transport::levelling::{GroundMetric, inverse_volatility};
+use crate::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
 
 /// The data of a policy for several assets, beside the problem of their fund. The shares of that fund are proportional
 /// to inverse volatilities.

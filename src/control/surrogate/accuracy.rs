@@ -10,8 +10,8 @@
 
 use rand::RngExt;
 
-use super::fitted::ValueSurrogate;
 use super::fitting::DesignPoint;
+use super::value_surrogate::ValueSurrogate;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::specification::{DesignSpecification, Specification};
 use crate::control::solved_step::{ExpectedError, StepDiagnostics};

@@ -10,10 +10,10 @@ use rayon::prelude::*;
 
 use super::accuracy::{Aim, Checks};
 use super::features::Features;
-use super::fitted::ValueSurrogate;
 use super::fitting::{DesignPoint, Fitting, SurrogateFit};
 use super::scaling::Scaling;
 use super::stored::{Solution, StepSurrogates};
+use super::value_surrogate::ValueSurrogate;
 use crate::control::error::TrainError;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;

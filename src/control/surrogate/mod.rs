@@ -3,10 +3,10 @@
 pub mod accuracy;
 pub mod design;
 pub mod features;
-pub mod fitted;
 pub mod fitting;
 pub mod learning;
 pub mod policy_target;
 pub mod scaling;
 pub mod stored;
 pub mod target;
+pub mod value_surrogate;

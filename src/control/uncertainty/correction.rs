@@ -4,7 +4,7 @@
 use super::radius::RadiusEstimator;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::RADIUS_CORRECTION;
-use crate::numerics::bridge::gap_places::Statistic;
+use crate::numerics::bridge::sized_gaps::Statistic;
 
 impl RadiusEstimator {
     /// Returns the factor on simulated quantiles that makes the one of the history exact. `None` under a calibration,
@@ -47,7 +47,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::control::kept::Cache;
+    use crate::control::cache::Cache;
     use crate::control::request::specification::Specification;
     use crate::numerics::bridge::paths::AbsoluteBridges;
     use crate::numerics::law::empirical::EmpiricalDistribution;

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use super::UncertaintySet;
 use super::centre::{Centre, Centring};
 use super::radius::{Measure, Radii, RadiusEstimator};
-use crate::control::kept::Cache;
+use crate::control::cache::Cache;
 use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{FeatureMap, Specification};

@@ -7,8 +7,8 @@
 pub mod centre;
 mod correction;
 pub mod laws;
-pub mod measured;
 pub mod radius;
+pub mod shared_summaries;
 
 use self::centre::Centre;
 use crate::control::request::support::{Interval, Support};

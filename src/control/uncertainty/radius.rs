@@ -3,16 +3,16 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::control::kept::{Cache, Key};
+use crate::control::cache::{Cache, Key};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::control::uncertainty::centre::record;
 use crate::numerics::bridge::calibration::calibration_factor;
-use crate::numerics::bridge::gap_places::Statistic;
 use crate::numerics::bridge::limit::BridgeLaw;
 use crate::numerics::bridge::paths::{AbsoluteBridges, GRADED_FROM};
+use crate::numerics::bridge::sized_gaps::Statistic;
 use crate::numerics::law::confidence_region;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::search::chebyshev::local_cubic;

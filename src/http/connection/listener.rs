@@ -12,9 +12,9 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
-use crate::http::connection::connections::{ConnectionGuard, Connections};
-use crate::http::connection::conversation::{self, Stopping};
-use crate::http::connection::patient::Patience;
+use crate::http::connection::connection_table::{ConnectionGuard, Connections};
+use crate::http::connection::exchanges::{self, Stopping};
+use crate::http::connection::timed_stream::Patience;
 use crate::service::metrics::CONNECTIONS_REFUSED;
 use crate::service::process::shutdown::Shutdown;
 
@@ -81,14 +81,14 @@ async fn let_in(stream: TcpStream, held: ConnectionGuard, manners: Manners, stop
     let Manners { application, patience, encryption, .. } = manners;
     let Ok(local) = stream.local_addr() else { return };
     let Some(acceptor) = encryption else {
-        return conversation::hold(stream, &held, local, patience, application, stopping).await;
+        return exchanges::hold(stream, &held, local, patience, application, stopping).await;
     };
     let shaken = tokio::select! {
         shaken = tokio::time::timeout(patience.for_head, acceptor.accept(stream)) => shaken,
         () = held.connection.gave_way() => return,
     };
     match shaken {
-        Ok(Ok(stream)) => conversation::hold(stream, &held, local, patience, application, stopping).await,
+        Ok(Ok(stream)) => exchanges::hold(stream, &held, local, patience, application, stopping).await,
         Ok(Err(error)) => tracing::debug!(%error, "a TLS handshake failed"),
         Err(_) => tracing::debug!("a TLS handshake timed out"),
     }

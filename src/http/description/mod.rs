@@ -2,6 +2,6 @@
 
 pub(super) mod bounds;
 pub(super) mod defaults;
-pub(super) mod described;
 pub(super) mod documentation;
+pub(super) mod problem_responses;
 pub(super) mod schema;

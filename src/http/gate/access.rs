@@ -23,7 +23,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use serde::de::DeserializeOwned;
 
-use crate::http::connection::conversation::LocalAddress;
+use crate::http::connection::exchanges::LocalAddress;
 use crate::http::gate::bodies::Bodies;
 use crate::http::gate::extract::{AfterBody, BodyLimit, LargeBody, Parameters};
 use crate::http::gate::hosts::{self, Hosts};

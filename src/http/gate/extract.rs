@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use crate::http::gate::decode;
 use crate::http::problem::{ProblemDocument, ProblemKind};
 use crate::service::callers::allowance::HeavyPermit;
-use crate::service::callers::bounded::FairQueue;
+use crate::service::callers::fair_queue::FairQueue;
 use crate::service::error::ServiceError;
 use crate::store::Tenant;
 
@@ -166,7 +166,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::service::callers::bounded::QueueSize;
+    use crate::service::callers::fair_queue::QueueSize;
 
     /// Decodes a large or a small body while no decoding permit is free.
     async fn decoded(is_large: bool) -> Result<Value, ProblemDocument> {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::http::gate::telemetry;
 use crate::http::problem::{ProblemDocument, ProblemKind};
 use crate::service::callers::allowance::{Refused, TooMany};
-use crate::service::entries::gate::Doubts;
+use crate::service::entries::doubts::Doubts;
 use crate::service::error::ServiceError;
 use crate::service::metrics as names;
 use crate::store::{OverQuota, Quota, StoreError};

@@ -12,7 +12,7 @@ use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use tracing::Span;
 
-use crate::http::connection::connections::Connections;
+use crate::http::connection::connection_table::Connections;
 use crate::http::gate::access::Asker;
 use crate::http::problem::{self, shortened};
 use crate::service::callers::keys::KeyFigures;

@@ -20,7 +20,7 @@ use crate::service::entries::drift::Drift;
 use crate::service::jobs::renewer::RenewalDue;
 use crate::service::jobs::{Accepted, TrackedJob as ServiceJob};
 use crate::service::sessions::assets::Composition;
-use crate::service::sessions::known::InitialHistory;
+use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::live::LiveSession;
 use crate::service::sessions::plan::Renewing;
 use crate::store::{JobKind, JobState, Labels, PolicySummary};

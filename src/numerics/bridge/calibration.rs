@@ -13,8 +13,8 @@
 
 use rand::{Rng, RngExt};
 
-use crate::numerics::bridge::gap_places::Statistic;
 use crate::numerics::bridge::paths::AbsoluteBridges;
+use crate::numerics::bridge::sized_gaps::Statistic;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::empirical::{EmpiricalDistribution, weights};
 use crate::numerics::law::law_distance::distance_of_masses;

@@ -25,7 +25,7 @@ use rand_distr::StandardNormal;
 use crate::numerics::bridge::Quantile;
 use crate::numerics::bridge::scale_mixture::ScaleMixture;
 use crate::numerics::machine::streams::stream;
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 /// The number of funds drawn uniformly over all shares; the draws are fixed, so every call uses the same funds.
 const DRAWN_FUNDS: usize = 20;

@@ -7,8 +7,8 @@
 //! table of sums along the base. There is one such table for each s. A law costs two reads for each added value,
 //! however many values the base has.
 
-use crate::numerics::bridge::gap_places::Statistic;
 use crate::numerics::bridge::paths::{self, AbsoluteBridges, Times};
+use crate::numerics::bridge::sized_gaps::Statistic;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::machine::dispatch::dispatched;
 

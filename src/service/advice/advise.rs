@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::cache::Cache;
 use crate::control::error::FieldError;
-use crate::control::kept::Cache;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::levels::{LevelsAdvised, WhyNothing};

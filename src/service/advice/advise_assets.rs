@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::assets::advice::AssetsAdvice;
+use crate::control::cache::Cache;
 use crate::control::error::FieldError;
-use crate::control::kept::Cache;
 use crate::control::policy::levels::WhyNothing;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::request::annualised::Annualised;

@@ -16,7 +16,7 @@ use crate::service::entries::report::Report;
 use crate::service::sessions::assets::shares;
 use crate::service::sessions::fund_advice::FundAdvice;
 use crate::service::sessions::live::LiveSession;
-use crate::service::sessions::standing::SessionState;
+use crate::service::sessions::session_state::SessionState;
 
 /// The advice on several assets under one hypothesis.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

@@ -2,9 +2,9 @@
 
 pub mod allowance;
 pub mod audit;
-pub mod bounded;
-pub(super) mod fresh_keys;
+pub mod fair_queue;
 pub(super) mod identity;
+pub(super) mod key_refresh;
 pub mod keys;
 pub(super) mod secret;
 pub(super) mod turns;

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use tokio::sync::Semaphore;
 
+use crate::control::cache::{Cache, Key};
 use crate::control::error::FieldError;
 use crate::control::estimate::{self, Footprint};
-use crate::control::kept::{Cache, Key};
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::{Policy, content_hash};
 use crate::control::request::specification::Specification;
-use crate::service::callers::bounded::FairQueue;
+use crate::service::callers::fair_queue::FairQueue;
 use crate::service::callers::keys::Caller;
 use crate::service::error::ServiceError;
 use crate::service::process::memory::{Large, Memory};

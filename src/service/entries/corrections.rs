@@ -5,12 +5,12 @@ use jiff::civil::Date;
 use crate::control::error::FieldError;
 use crate::control::request::text::check_text;
 use crate::service::entries::change::Change;
-use crate::service::entries::gate::{self, Doubt, Doubts};
+use crate::service::entries::doubts::{self, Doubt, Doubts};
 use crate::service::entries::periods::{Periods, ReplayedPeriod};
 use crate::service::entries::report::{Correct, LONGEST_REASON, MOST_CORRECTIONS, Report};
 use crate::service::error::ServiceError;
 use crate::service::sessions::plan::PolicyTenure;
-use crate::service::sessions::standing::SessionState;
+use crate::service::sessions::session_state::SessionState;
 
 /// The effect of a correction on a session.
 pub(super) struct AppliedCorrection {
@@ -85,7 +85,7 @@ impl Periods {
             if period == correction.period && correction.change != Change::Remove {
                 log_return = now;
                 if day_before != Some(passage.standing.days.last) {
-                    doubts.extend(gate::of_day(&before.days, report.date, periods_per_year, today));
+                    doubts.extend(doubts::of_day(&before.days, report.date, periods_per_year, today));
                 }
             }
             // A corrected price also changes the return after it.

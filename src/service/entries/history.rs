@@ -19,9 +19,9 @@ use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
 use crate::service::sessions::assets::{Composition, ObservedAssets};
 use crate::service::sessions::content::{answer, content};
-use crate::service::sessions::known::InitialHistory;
+use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::plan::{Renew, Renewed, SessionPlan};
-use crate::service::sessions::standing::SessionState;
+use crate::service::sessions::session_state::SessionState;
 use crate::store::{EntryKind, SessionFacts, SessionRow, Tenant};
 
 /// The start of a session, and everything recorded since.

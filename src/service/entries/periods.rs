@@ -18,7 +18,7 @@ use crate::service::error::ServiceError;
 use crate::service::sessions::assets::{Assets, Composition, PlannedAssets};
 use crate::service::sessions::content::{answer, content};
 use crate::service::sessions::plan::{PolicyTenure, Renew, Renewed, SessionPlan};
-use crate::service::sessions::standing::{SessionState, Transition};
+use crate::service::sessions::session_state::{SessionState, Transition};
 use crate::store::{EntryKind, SessionFacts};
 
 /// A period according to its entries.

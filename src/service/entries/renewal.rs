@@ -20,7 +20,7 @@ use crate::service::sessions::Sessions;
 use crate::service::sessions::content::Packed;
 use crate::service::sessions::live::{LiveSession, with_uncertainty};
 use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewed, SessionPlan, check_window};
-use crate::service::sessions::standing::SessionState;
+use crate::service::sessions::session_state::SessionState;
 use crate::store::{Actor, EntryKind, EntryRow, RenewalTarget, SessionFacts, Tenant};
 
 impl Sessions {

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use crate::control::error::FieldError;
 use crate::control::request::rules;
 use crate::service::entries::change::Change;
-use crate::service::entries::gate::Doubt;
+use crate::service::entries::doubts::Doubt;
 
 /// The range of prices: any currency, any quantity.
 pub const PRICE: (f64, f64) = (1e-12, 1e15);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::service::callers::allowance::Limits;
-use crate::service::callers::bounded::LONG_WAITING;
+use crate::service::callers::fair_queue::LONG_WAITING;
 use crate::service::process::memory::MemoryLimit;
 use crate::store::{PostgresUrl, Quotas};
 

@@ -14,9 +14,9 @@ use std::time::Duration;
 use metrics::gauge;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+use crate::control::cache::{Cache, CachePart};
 use crate::control::error::FieldError;
 use crate::control::estimate::Footprint;
-use crate::control::kept::{Cache, CachePart};
 use crate::service::error::ServiceError;
 use crate::service::metrics as names;
 

@@ -9,15 +9,15 @@ use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
 use crate::service::callers::allowance::HeavyPermit;
-use crate::service::callers::bounded::FairQueue;
+use crate::service::callers::fair_queue::FairQueue;
 use crate::service::entries::answer::Observed;
-use crate::service::entries::gate::{self, Doubt, Doubts};
+use crate::service::entries::doubts::{self, Doubt, Doubts};
 use crate::service::entries::periods::Periods;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::error::ServiceError;
 use crate::service::sessions::assets::{Assets, ObservedAssets};
 use crate::service::sessions::plan::{PolicyTenure, Renewing, SessionPlan};
-use crate::service::sessions::standing::{SessionState, Transition};
+use crate::service::sessions::session_state::{SessionState, Transition};
 use crate::store::{RowVersion, SessionFacts, SessionRow, Tenant};
 
 /// The resources that a call needs: its policy, the queues for its work, and the permits it must acquire before it
@@ -157,7 +157,7 @@ impl LiveSession {
         if observe.confirm {
             return Ok(());
         }
-        let of_day = gate::of_day(&self.standing.days, report.date, self.current.terms.periods_per_year, today);
+        let of_day = doubts::of_day(&self.standing.days, report.date, self.current.terms.periods_per_year, today);
         let of_return = self.standing.return_doubts(report, &seen);
         let doubts: Vec<Doubt> =
             of_day.into_iter().chain(of_return).chain(observe.peer_doubts.iter().cloned()).collect();

@@ -9,7 +9,7 @@ use futures_util::{StreamExt, stream};
 use jiff::civil::Date;
 
 use crate::service::callers::keys::Caller;
-use crate::service::entries::gate::{Doubt, DoubtReason, ROUNDING};
+use crate::service::entries::doubts::{Doubt, DoubtReason, ROUNDING};
 use crate::service::entries::record::PeriodReturns;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::sessions::Sessions;

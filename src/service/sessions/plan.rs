@@ -40,7 +40,7 @@ pub struct SessionPlan {
     pub(in crate::service) terms: Terms,
     pub(in crate::service) renew: Option<Renewing>,
     /// True if every period is advised by the first step of the policy.
-    pub(in crate::service) rolling: bool,
+    pub(super) rolling: bool,
     /// Several assets, in the order of the record, with their figures at the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(in crate::service) assets: Option<PlannedAssets>,

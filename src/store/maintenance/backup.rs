@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use sqlx::Connection;
 
 use crate::store::engine::error::{Failure, StoreError, unusable};
-use crate::store::engine::sqlite::held::unstamp;
+use crate::store::engine::sqlite::held_file::unstamp;
 use crate::store::engine::sqlite::opening::{DATABASE, connect, inspect, lock, migrate, opening, version};
 use crate::store::maintenance::check::Inspection;
 

@@ -13,7 +13,7 @@ use crate::store::engine::query::{Query, StoreRow};
 use crate::store::engine::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES, WEALTH};
 use crate::store::labels::Labels;
 use crate::store::sessions::SessionRow;
-use crate::store::sessions::care::{Attention, CareCounts, Today, needs, needs_any};
+use crate::store::sessions::attention::{Attention, CareCounts, Today, needs, needs_any};
 use crate::store::sessions::entries::EntryRow;
 use crate::store::sessions::search::{self, Among, OpeningSpan, Rarest};
 use crate::store::tenants::tenant::Tenant;

@@ -9,7 +9,7 @@ use crate::control::request::backtest_assets::{AssetsBacktestRequest, MOST_HELD,
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::warnings::Warning;
 use crate::numerics::bridge::funds::fund_returns;
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 impl AssetsBacktest {
     /// Checks and completes a request, and bounds its size.

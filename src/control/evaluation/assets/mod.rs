@@ -12,10 +12,10 @@
 use self::report::AssetsChoices;
 use self::rules::{AssetsStrategy, NONE, Rule, equal, strategies};
 use crate::control::assets::advising::FundsBall;
+use crate::control::cache::Cache;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
 use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
-use crate::control::kept::Cache;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
@@ -302,7 +302,7 @@ mod tests {
     use crate::control::evaluation::analysis::{Analysis, StrategyLine};
     use crate::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
     use crate::control::evaluation::names::StrategyKind;
-    use crate::control::evaluation::rolling::{ActualPeriod, Decision};
+    use crate::control::evaluation::walk_forward::{ActualPeriod, Decision};
     use crate::control::evaluation::yearly_worth::Scale;
     use crate::control::problem::actions::Band;
     use crate::numerics::bridge::funds::FundBridges;

@@ -11,7 +11,7 @@ use crate::control::progress::Watch;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::fund::GroundNorm;
 use crate::numerics::transport::least_variance::least_variance;
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 /// A rule that chooses shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]

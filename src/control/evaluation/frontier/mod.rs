@@ -26,8 +26,8 @@ use rayon::prelude::*;
 use self::laws::RecordLaw;
 use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, ResampledFrontier};
 use crate::control::assets::{PortfolioStep, advising};
+use crate::control::cache::Cache;
 use crate::control::error::TrainError;
-use crate::control::kept::Cache;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::annualised::premium;
@@ -36,7 +36,7 @@ use crate::control::uncertainty::radius::RadiusEstimator;
 use crate::numerics::bridge::funds::fund_returns;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::statistics::summary::{Clustered, Estimate};
-use crate::numerics::transport::levelling::inverse_volatility;
+use crate::numerics::transport::water_filling::inverse_volatility;
 
 /// Confidence level of all intervals.
 const LEVEL: f64 = 0.9;

@@ -5,10 +5,10 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::{JobEnd, Worker, failed, reported, requested, unwritten};
+use crate::control::cache::Cache;
 use crate::control::estimate;
 use crate::control::evaluation::paths::{Evaluation, Follower};
 use crate::control::evaluation::report::{Costs, EvaluationReport};
-use crate::control::kept::Cache;
 use crate::control::policy::Policy;
 use crate::control::policy::advisor::Advisor;
 use crate::control::progress::Watch;

@@ -3,9 +3,9 @@
 use std::sync::atomic::AtomicBool;
 
 use super::{JobEnd, Worker, failed, reported, requested};
+use crate::control::cache::Cache;
 use crate::control::estimate;
 use crate::control::evaluation::frontier::Frontier;
-use crate::control::kept::Cache;
 use crate::control::progress::Watch;
 use crate::control::request::frontier::FrontierRequest;
 use crate::store::{ClaimedJob, JobOutcome};

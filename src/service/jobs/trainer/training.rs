@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::{JobEnd, Worker, failed};
+use crate::control::cache::Cache;
 use crate::control::estimate;
-use crate::control::kept::Cache;
 use crate::control::policy::{Policy, content_hash};
 use crate::control::progress::Watch;
 use crate::control::request::specification::Specification;

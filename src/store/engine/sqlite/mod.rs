@@ -2,10 +2,10 @@
 
 mod batch;
 mod changes;
-pub(in crate::store) mod held;
+pub(in crate::store) mod held_file;
 pub(in crate::store) mod opening;
 mod operation;
-mod room;
+mod space;
 mod sync;
 mod write_ahead_log;
 mod writer;

@@ -8,7 +8,7 @@ use sqlx::sqlite::{
 };
 use sqlx::{ConnectOptions, Connection, SqliteConnection};
 
-use super::held::HeldFile;
+use super::held_file::HeldFile;
 use super::write_ahead_log;
 use crate::store::engine::error::{Failure, StoreError, unusable};
 use crate::store::engine::migrations;

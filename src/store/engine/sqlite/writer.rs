@@ -13,7 +13,7 @@ use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::batch::{self, Appending, NextGroup};
-use super::held::HeldFile;
+use super::held_file::HeldFile;
 use super::operation::{Operation, Respond, Undo};
 use crate::store::engine::error::{Failure, StoreError};
 use crate::store::sessions::entries::ROWS_AT_ONCE;

@@ -22,8 +22,8 @@ use thiserror::Error;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tower::Service;
 
-use crate::http::connection::connections::{AllowedRequests, ConnectionGuard, ConnectionPhase, TrackedConnection};
-use crate::http::connection::patient::{Patience, Patient};
+use crate::http::connection::connection_table::{AllowedRequests, ConnectionGuard, ConnectionPhase, TrackedConnection};
+use crate::http::connection::timed_stream::{Patience, Patient};
 use crate::http::problem::{ProblemDocument, ProblemKind};
 use crate::service::process::shutdown::Shutdown;
 
@@ -240,7 +240,7 @@ mod tests {
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
     use super::*;
-    use crate::http::connection::connections::{ConnectionLimits, Connections};
+    use crate::http::connection::connection_table::{ConnectionLimits, Connections};
 
     const LONG: Duration = Duration::from_secs(60);
 

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::document::Policy;
-use crate::control::kept::{Cache, Key};
+use crate::control::cache::{Cache, Key};
 use crate::control::request::specification::Specification;
-use crate::control::surrogate::fitted::{Surrogate, ValueSurrogate};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
+use crate::control::surrogate::value_surrogate::{Surrogate, ValueSurrogate};
 use crate::numerics::gp::GaussianProcess;
 
 /// Bytes of a prepared policy without its numbers, and of each of its steps: names, diagnostics, scales.

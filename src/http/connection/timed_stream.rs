@@ -15,7 +15,7 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep};
 
-use crate::http::connection::connections::{ConnectionPhase, TrackedConnection};
+use crate::http::connection::connection_table::{ConnectionPhase, TrackedConnection};
 
 /// The time limits for a client.
 #[derive(Debug, Clone, Copy)]
@@ -176,7 +176,7 @@ mod tests {
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
     use super::*;
-    use crate::http::connection::connections::{ConnectionGuard, ConnectionLimits, Connections};
+    use crate::http::connection::connection_table::{ConnectionGuard, ConnectionLimits, Connections};
 
     const LIMIT: Duration = Duration::from_millis(200);
 

@@ -13,8 +13,8 @@ use crate::control::request::rules;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
+use crate::service::entries::doubts::{self, Doubt};
 use crate::service::entries::drift::DriftTest;
-use crate::service::entries::gate::{self, Doubt};
 use crate::service::entries::record::{PeriodReturns, SessionRecord};
 use crate::service::entries::report::{Report, by_name};
 use crate::service::sessions::assets::{Assets, Composition, mean};
@@ -250,13 +250,13 @@ impl SessionState {
                 let (field, value) = report.given();
                 let record = CentralMoments::of(&self.state.law);
                 let moments = (record.mean(), record.variance().sqrt());
-                gate::of_return(field, value, moments, *log_return).into_iter().collect()
+                doubts::of_return(field, value, moments, *log_return).into_iter().collect()
             }
             (PeriodReturns::Several(Some(row)), Some(assets)) => {
                 let of_asset = |(asset, (name, log_return)): (usize, (&String, &f64))| {
                     let (field, value) = report.given_of(name);
                     let moments = assets.moments(asset);
-                    gate::of_return(&field, value.unwrap_or(*log_return), moments, *log_return)
+                    doubts::of_return(&field, value.unwrap_or(*log_return), moments, *log_return)
                 };
                 assets.names.iter().zip(row).enumerate().filter_map(of_asset).collect()
             }

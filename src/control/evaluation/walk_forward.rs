@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::control::cache::Cache;
 use crate::control::error::TrainError;
-use crate::control::kept::Cache;
 use crate::control::policy::advice::{Advice, AdviceSource};
 use crate::control::policy::advisor::Advisor;
 use crate::control::pool;
