@@ -4,7 +4,7 @@
 use super::bank::Bank;
 use super::choices::{Choices, Kind};
 use super::heading::ColumnHeading;
-use super::kind::Returns;
+use super::kind::ColumnReturns;
 use super::outcome::Stop;
 
 /// Returns the whole returns of the column `name`. If its heading names returns in excess of the bank's, the caller is
@@ -12,7 +12,12 @@ use super::outcome::Stop;
 ///
 /// # Errors
 /// A question, no column of the bank to add, or a cell of that column that breaks a rule.
-pub fn whole(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -> Result<Returns, Stop> {
+pub fn whole(
+    name: &str,
+    returns: ColumnReturns,
+    bank: Option<&Bank>,
+    choices: &Choices,
+) -> Result<ColumnReturns, Stop> {
     let is_return = returns.kind == Kind::Simple || returns.kind == Kind::Log;
     match choices.excess {
         None if is_return && ColumnHeading::of(name).is_excess => Err(ask(name, bank)),
@@ -39,7 +44,7 @@ fn ask(name: &str, bank: Option<&Bank>) -> Stop {
     Stop::question("excess", question, options)
 }
 
-fn added(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -> Result<Returns, Stop> {
+fn added(name: &str, returns: ColumnReturns, bank: Option<&Bank>, choices: &Choices) -> Result<ColumnReturns, Stop> {
     let Some(bank) = bank else {
         return Err(Stop::refused(format!(
             "Column {name} holds returns in excess of the bank rate, but no column such as rf holds that rate. Add one."
@@ -53,5 +58,5 @@ fn added(name: &str, returns: Returns, bank: Option<&Bank>, choices: &Choices) -
         return Err(Stop::refused(format!("{cell}: adding it would give {name} a loss of 100 % or more.")));
     }
     let logarithmic = simple.iter().map(|simple| simple.ln_1p()).collect();
-    Ok(Returns { simple, logarithmic, ..returns })
+    Ok(ColumnReturns { simple, logarithmic, ..returns })
 }

@@ -57,7 +57,7 @@ impl RecordContext {
 }
 
 /// Returns by period, as fractions.
-pub struct Returns {
+pub struct ColumnReturns {
     pub kind: Kind,
     /// Unit of the numbers; `None` for prices and for the value that 1 grows to.
     pub unit: Option<Unit>,
@@ -68,7 +68,7 @@ pub struct Returns {
 impl Numbers<'_> {
     /// # Errors
     /// A question or a refusal.
-    pub fn returns(&self, choices: &Choices, beside: &RecordContext) -> Result<Returns, Stop> {
+    pub fn returns(&self, choices: &Choices, beside: &RecordContext) -> Result<ColumnReturns, Stop> {
         let signs = self.percent_signs()?;
         let is_money = self.marks_of_money()?;
         let kind = choices.kind.map_or_else(|| self.kind(signs, is_money), Ok)?;
@@ -204,7 +204,7 @@ impl Numbers<'_> {
     }
 
     /// Converts the numbers to returns, and refuses the first cell that cannot be of this kind.
-    fn read_as(&self, kind: Kind, unit: Option<Unit>) -> Result<Returns, Stop> {
+    fn read_as(&self, kind: Kind, unit: Option<Unit>) -> Result<ColumnReturns, Stop> {
         let hundred = if unit == Some(Unit::Percent) { 100.0 } else { 1.0 };
         let simple: Vec<f64> = match kind {
             Kind::Price => {
@@ -239,7 +239,7 @@ impl Numbers<'_> {
         };
         let rule = format!("must give a log-return between -{LARGEST_LOG_RETURN} and {LARGEST_LOG_RETURN}");
         self.refuse(&logarithmic, |value| value.abs() > LARGEST_LOG_RETURN, &rule)?;
-        Ok(Returns { kind, unit, simple, logarithmic })
+        Ok(ColumnReturns { kind, unit, simple, logarithmic })
     }
 
     /// Refuses the first cell whose value `fails`. There may be fewer returns than cells; they then belong to the last
@@ -251,8 +251,8 @@ impl Numbers<'_> {
     }
 
     /// Asks whether numbers that are unusual for an asset are right.
-    fn doubted(&self, returns: Returns, beside: &RecordContext) -> Result<Returns, Stop> {
-        let Returns { kind, unit, ref simple, ref logarithmic } = returns;
+    fn doubted(&self, returns: ColumnReturns, beside: &RecordContext) -> Result<ColumnReturns, Stop> {
+        let ColumnReturns { kind, unit, ref simple, ref logarithmic } = returns;
         let from = self.cells.len() - logarithmic.len();
         // Log-returns are not checked for jumps: files that hold logarithms record crashes as they were.
         let jump = jump(logarithmic).filter(|_| kind != Kind::Log).map(|index| {

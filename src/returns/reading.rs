@@ -8,7 +8,7 @@ use super::cells::{Cell, mark};
 use super::choices::{Choices, Kind, Unit};
 use super::excess;
 use super::kept_rows::KeptRows;
-use super::kind::{Numbers, RecordContext, Returns, called};
+use super::kind::{ColumnReturns, Numbers, RecordContext, called};
 use super::number::{Mark, number};
 use super::order::{is_newest_first, ordered};
 use super::outcome::{Answer, Question, Stop, TextPosition, both};
@@ -122,7 +122,7 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
             .and_then(|returns| excess::whole(numbers.name, returns, bank.as_ref(), choices));
         read.map_err(|stop| if is_one { stop } else { stop.about(numbers.name) })
     };
-    let returns = numbers.iter().map(of).collect::<Result<Vec<Returns>, Stop>>();
+    let returns = numbers.iter().map(of).collect::<Result<Vec<ColumnReturns>, Stop>>();
     let (mut order, returns) = both(order, returns)?;
     if !kept.holes.is_empty() {
         let are_prices = returns.iter().all(|returns| returns.kind == Kind::Price);
@@ -155,9 +155,9 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
 }
 
 /// Requires columns that are read together to be of one kind and in one unit.
-fn alike(chosen: &[&Column], returns: &[Returns], choices: &Choices) -> Result<(), Stop> {
+fn alike(chosen: &[&Column], returns: &[ColumnReturns], choices: &Choices) -> Result<(), Stop> {
     let first = &returns[0];
-    let other = |differs: &dyn Fn(&Returns) -> bool| returns.iter().position(differs);
+    let other = |differs: &dyn Fn(&ColumnReturns) -> bool| returns.iter().position(differs);
     if let Some(index) = other(&|other| other.simple.len() != first.simple.len()) {
         let what = |index: usize| called(returns[index].kind, returns[index].unit);
         return Err(Stop::refused(format!(

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 use super::choices::{Kind, Unit};
 use super::dates::in_words;
-use super::kind::{Returns, called};
+use super::kind::{ColumnReturns, called};
 use super::moments::moments;
 use super::sheet::ColumnFound;
 use super::words::{percent, percent_a_year};
@@ -107,7 +107,7 @@ pub struct ColumnContents {
     pub names: Vec<String>,
     pub order: Order,
     /// Returns by column, all of one length.
-    pub returns: Vec<Returns>,
+    pub returns: Vec<ColumnReturns>,
     pub rate: Option<BankRate>,
     /// The number of latest returns to use.
     pub used: usize,
@@ -149,9 +149,9 @@ impl Series {
         called(self.kind, self.unit)
     }
 
-    fn of(column: String, returns: Returns, used: usize, periods_per_year: Option<usize>) -> Self {
+    fn of(column: String, returns: ColumnReturns, used: usize, periods_per_year: Option<usize>) -> Self {
         let last = |values: Vec<f64>| values[values.len() - used..].to_vec();
-        let Returns { kind, unit, simple, logarithmic } = returns;
+        let ColumnReturns { kind, unit, simple, logarithmic } = returns;
         let (simple_returns, log_returns) = (last(simple), last(logarithmic));
         let (mean, deviation) = moments(&simple_returns);
         let mean_per_year = periods_per_year.map(|periods| compounded(mean, periods as f64));

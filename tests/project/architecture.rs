@@ -2,7 +2,7 @@
 //!
 //! Six floors, arrows only point down, and a leaf beside them; rayon in `control` only; no clock, log or sleep
 //! below `service`; files and functions of a size that fits a head; nothing that panics on purpose outside tests; no
-//! circle of files that name each other.
+//! circle of files that name each other; words that are no names, and one type for each name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -75,11 +75,18 @@ const EFFECTS: [&str; 9] = [
 ];
 const PANICS: [&str; 4] = [".unwrap()", "panic!", "todo!", "unimplemented!"];
 
+/// No identifier is one of these: a name says what the value is, not how it came about.
+const BANNED_NAMES: [&str; 6] = ["told", "said", "asked", "taken", "stood", "given_back"];
+/// No doc comment begins with one of these: its first sentence would have no subject.
+const BANNED_OPENINGS: [&str; 5] = ["Of", "The same", "What", "Whether", "Where"];
+
 /// A file of `src`, with comments, literals and tests blanked out, line for line.
 struct Source {
     /// Relative to `src`, with `/` between folders.
     path: String,
     code: String,
+    /// The first line of every doc comment, also in tests, with its number.
+    openings: Vec<(usize, String)>,
     /// Modules it declares for tests only.
     test_modules: Vec<String>,
 }
@@ -88,7 +95,7 @@ impl Source {
     fn new(path: &str, text: &str) -> Self {
         let mut code = blank_comments_and_literals(text);
         let test_modules = blank_tests(&mut code);
-        Source { path: path.into(), code, test_modules }
+        Source { path: path.into(), code, openings: openings(text), test_modules }
     }
 
     /// The first part of its path: a floor, the leaf, or part of the binary.
@@ -122,6 +129,17 @@ impl Source {
         words(&self.code, "fn").filter_map(|at| self.function(at)).collect()
     }
 
+    /// Every type as name and line; associated types are the trait's, and are not among them.
+    fn types(&self) -> Vec<(String, usize)> {
+        let at = |keyword: &'static str| words(&self.code, keyword).map(move |at| (keyword, at));
+        let declared = |(keyword, at): (&str, usize)| {
+            let name = first_word(&self.code[at + keyword.len()..]);
+            let is_item = keyword != "type" || is_at_the_top(&self.code[..at]);
+            (is_item && name.starts_with(char::is_uppercase)).then(|| (name, self.line_of(at)))
+        };
+        ["struct", "enum", "trait", "type"].into_iter().flat_map(at).filter_map(declared).collect()
+    }
+
     fn function(&self, at: usize) -> Option<(String, Range<usize>)> {
         let rest = &self.code[at + 2..];
         let name: String = rest.trim_start().chars().take_while(|&letter| is_word(letter)).collect();
@@ -131,6 +149,28 @@ impl Source {
         let end = at + 2 + item_end(rest);
         self.code[..end].ends_with('}').then(|| (name, self.line_of(at)..self.line_of(end) + 1))
     }
+}
+
+/// Returns true if every brace opened before is closed.
+fn is_at_the_top(before: &str) -> bool {
+    before.matches('{').count() == before.matches('}').count()
+}
+
+/// The first line of every doc comment of a text, without its slashes.
+fn openings(text: &str) -> Vec<(usize, String)> {
+    let comment = |line: &str| {
+        let line = line.trim_start();
+        ["///", "//!"].iter().find_map(|mark| line.strip_prefix(mark)).map(|rest| rest.trim().to_owned())
+    };
+    let comments: Vec<Option<String>> = text.lines().map(comment).collect();
+    let begins = |&line: &usize| line == 0 || comments[line - 1].is_none();
+    (0..comments.len()).filter(begins).filter_map(|line| Some((line + 1, comments[line].clone()?))).collect()
+}
+
+/// The banned opening of a doc comment, as a whole word.
+fn banned_opening(comment: &str) -> Option<&'static str> {
+    let goes_on = |rest: &str| rest.starts_with(|letter: char| is_word(letter) || letter == '-');
+    BANNED_OPENINGS.into_iter().find(|opening| comment.strip_prefix(opening).is_some_and(|rest| !goes_on(rest)))
 }
 
 fn join(folder: &str, name: &str) -> String {
@@ -433,6 +473,9 @@ fn faults(source: &Source) -> Vec<String> {
     for call in PANICS {
         source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} outside tests")));
     }
+    for name in BANNED_NAMES {
+        words(&source.code, name).for_each(|at| fault(at, format!("{name} is no name")));
+    }
     if source.lines() > FILE_LINES && !is_listed(&LONG_FILES, &source.path) {
         fault(0, format!("{} lines without tests, above {FILE_LINES}", source.lines()));
     }
@@ -442,7 +485,24 @@ fn faults(source: &Source) -> Vec<String> {
             faults.push(format!("{}:{}: {name} has {} lines", source.path, lines.start, lines.len()));
         }
     }
+    for (line, comment) in &source.openings {
+        if let Some(opening) = banned_opening(comment) {
+            faults.push(format!("{}:{line}: a doc comment begins with {opening:?}", source.path));
+        }
+    }
     faults
+}
+
+/// Names that stand for more than one type, with their places.
+fn names_of_several_types<'a>(sources: impl Iterator<Item = &'a Source>) -> Vec<String> {
+    let mut places: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for source in sources {
+        for (name, line) in source.types() {
+            places.entry(name).or_default().push(format!("{}:{line}", source.path));
+        }
+    }
+    let several = places.into_iter().filter(|(_, places)| places.len() > 1);
+    several.map(|(name, places)| format!("{name}: {}", places.join(", "))).collect()
 }
 
 fn is_listed(exceptions: &[(&str, &str)], name: &str) -> bool {
@@ -485,7 +545,7 @@ fn declared_files(sources: &[Source]) -> BTreeSet<String> {
             words(&source.code, "mod").filter(|&at| source.code[at..at + item_end(&source.code[at..])].ends_with(';'));
         let test_modules =
             names.map(|at| first_word(&source.code[at + 3..])).chain(source.test_modules.clone()).collect();
-        let declares = Source { path: source.path.clone(), code: String::new(), test_modules };
+        let declares = Source { path: source.path.clone(), code: String::new(), openings: Vec::new(), test_modules };
         files.extend(declares.test_files().into_iter().filter(exists));
     }
     files
@@ -506,6 +566,31 @@ fn the_source_keeps_the_rules_of_the_house() {
     let kept = sources.iter().filter(|source| !tests.contains(&source.path)).chain(&lab);
     let faults: Vec<String> = kept.flat_map(faults).collect();
     assert!(faults.is_empty(), "{} broken rules:\n{}", faults.len(), faults.join("\n"));
+}
+
+#[test]
+fn a_type_name_stands_for_one_type() {
+    let sources = sources();
+    assert!(sources.iter().map(|source| source.types().len()).sum::<usize>() > 400, "the types were not read");
+    let tests: BTreeSet<String> = sources.iter().flat_map(Source::test_files).collect();
+    let several = names_of_several_types(sources.iter().filter(|source| !tests.contains(&source.path)));
+    assert!(several.is_empty(), "names of several types:\n{}", several.join("\n"));
+}
+
+#[test]
+fn a_name_of_two_types_is_found_and_an_associated_type_is_none() {
+    let several = |files: &[(&str, &str)]| {
+        let sources: Vec<Source> = files.iter().map(|(path, text)| Source::new(path, text)).collect();
+        names_of_several_types(sources.iter())
+    };
+    let (a, b) = ("control/a.rs", "store/b.rs");
+    let state = "pub struct State;\n";
+    assert_eq!(several(&[(a, state), (b, "\nenum State { On }")]), ["State: control/a.rs:1, store/b.rs:2"]);
+    assert_eq!(several(&[(a, state), (b, "type State = u8;")]).len(), 1);
+    assert_eq!(several(&[(a, state), (b, "fn f() { struct State; }")]).len(), 1);
+    assert_eq!(several(&[(a, state), (b, "impl T for A { type State = super::State; }")]), [""; 0]);
+    assert_eq!(several(&[(a, state), (b, "#[cfg(test)]\nmod tests { struct State; }")]), [""; 0]);
+    assert_eq!(several(&[(a, state), (b, "trait T { type State; }\n/// A struct State.\nstruct B;")]), [""; 0]);
 }
 
 #[test]
@@ -577,6 +662,28 @@ fn a_broken_rule_is_found() {
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(70))).len(), 1);
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(69))).len(), 0);
     assert_eq!(faults_of("http/a.rs", &"const A: u8 = 1;\n".repeat(351)).len(), 1);
+}
+
+#[test]
+fn a_banned_name_and_a_banned_opening_are_found() {
+    assert_eq!(
+        faults_of("http/a.rs", "fn f(told: u8) -> u8 {\n    told\n}"),
+        ["http/a.rs:1: told is no name", "http/a.rs:2: told is no name"]
+    );
+    for name in BANNED_NAMES {
+        assert_eq!(faults_of("http/a.rs", &format!("struct A {{ {name}: u8 }}")).len(), 1, "{name}");
+        assert_eq!(faults_of("http/a.rs", &format!("// {name}\nconst A: &str = \"{name}\";")), [""; 0]);
+        assert_eq!(faults_of("http/a.rs", &format!("fn {name}_by() {{ un{name}() }}")), [""; 0]);
+    }
+    for opening in BANNED_OPENINGS {
+        let found = format!("http/a.rs:2: a doc comment begins with {opening:?}");
+        assert_eq!(faults_of("http/a.rs", &format!("\n/// {opening} a law.\nstruct A;")), [found.clone()]);
+        assert_eq!(faults_of("http/a.rs", &format!("\n//! {opening}: a law.")), [found]);
+        assert_eq!(faults_of("http/a.rs", &format!("// {opening} a law.\n/// A law.\n/// {opening} it.")), [""; 0]);
+    }
+    let found = faults_of("http/a.rs", "#[cfg(test)]\nmod tests {\n    /// Where it is.\n    const A: u8 = 1;\n}");
+    assert_eq!(found, ["http/a.rs:3: a doc comment begins with \"Where\""]);
+    assert_eq!(faults_of("http/a.rs", "/// Often.\nstruct A;\n/// What-if questions.\nstruct B;"), [""; 0]);
 }
 
 #[test]

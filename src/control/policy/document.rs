@@ -25,10 +25,10 @@ pub fn periods_per_year(json: &[u8]) -> Option<f64> {
     }
     #[derive(Deserialize)]
     struct Specified {
-        problem: Frequency,
+        problem: PeriodsPerYear,
     }
     #[derive(Deserialize)]
-    struct Frequency {
+    struct PeriodsPerYear {
         periods_per_year: Option<f64>,
     }
     serde_json::from_slice::<PolicyDocument>(json)
