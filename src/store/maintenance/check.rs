@@ -111,7 +111,7 @@ impl Inspection {
         sqlite::opening::inspect(dir).await.map(|connection| CheckReader::Sqlite(connection).into())
     }
 
-    /// Opens a [`backup`](crate::store::maintenance::backup), to which nothing writes.
+    /// Opens a [`backup`](mod@crate::store::maintenance::backup), to which nothing writes.
     ///
     /// # Errors
     /// As [`Inspection::of_folder`].

@@ -1,7 +1,7 @@
 //! The sessions that match a search, and the rows that a list examines to find them.
 //!
 //! A search consists of words. Each must be the beginning of a word of the session's name or tags, or of its policy's
-//! name or tags; or it is eight or more digits that begin the identifier of either. [`matches`] is this condition, and
+//! name or tags; or it is eight or more digits that begin the identifier of either. [`matches()`] is this condition, and
 //! alone decides about a row. The index of [`crate::store::sessions::words`] selects the rows to test:
 //!
 //! - among the words of the search, the list uses the one that the fewest sessions have, counted in the index up to a

@@ -1,8 +1,8 @@
 //! The quotas of a tenant: jobs queued, sessions, bytes.
 //!
-//! The usage of a tenant is a row of totals. Each change of the totals is the last statement of the transaction that
-//! changes the counted rows, so another writer waits for a commit only. Queued jobs are counted in their own table, up
-//! to the quota; jobs made for sessions have a bound of their own (`crate::store::jobs::session_trainings`).
+//! The usage of a tenant is a row of totals. A transaction changes the totals after the counted rows, near its end, so
+//! another writer waits for little more than its commit. Queued jobs are counted in their own table, up to the quota;
+//! jobs made for sessions have a bound of their own (`crate::store::jobs::session_trainings`).
 //!
 //! The bytes counted are those of requests, reports, policies, histories, plans and labels, and [`ROW_BYTES`] for each
 //! job, policy and session. Opening a session reserves the bytes of all its observations, each at the longest size. So

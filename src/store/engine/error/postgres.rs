@@ -17,7 +17,7 @@ pub(super) fn cause(error: &sqlx::Error) -> Cause {
     }
 }
 
-/// Classifies a code by its class, https://www.postgresql.org/docs/current/errcodes-appendix.html.
+/// Classifies a code by its class, <https://www.postgresql.org/docs/current/errcodes-appendix.html>.
 fn of_code(code: &str) -> Cause {
     match code {
         // disk_full

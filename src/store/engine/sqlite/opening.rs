@@ -67,7 +67,7 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     Ok(Opened { held: vec![lock, database], writer, readers: Readers::of(&file) })
 }
 
-/// Opens a folder like [`open`], without holding it and without disturbing the process that holds it. The lock is
+/// Opens a folder like [`open()`], without holding it and without disturbing the process that holds it. The lock is
 /// needed only to bring the schema up to date and to check a log that no process writes, and is released afterwards.
 pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     let file = dir.join(DATABASE);
