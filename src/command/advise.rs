@@ -8,7 +8,7 @@ use std::fmt;
 use ballast::control::error::FieldError;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::learning::Learning;
-use ballast::control::request::rules::BRIDGE_NUMBERS;
+use ballast::control::request::radius_rules::BRIDGE_NUMBERS;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advice::advise::Advise;
 use ballast::service::advice::advise_assets::AdviseAssets;

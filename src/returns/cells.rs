@@ -9,7 +9,7 @@ use super::number::{Mark, is_number, looks_numeric, number};
 use super::outcome::{Stop, TextPosition};
 
 /// The most bytes of a text: a century of days for dozens of assets.
-const MOST_BYTES: usize = 8_000_000;
+pub const MOST_BYTES: usize = 8_000_000;
 pub const MOST_LINES: usize = 200_000;
 const MOST_CELLS: usize = 1_000_000;
 /// Marks that always separate cells; a comma or a blank does so only if nothing else can be meant.

@@ -30,6 +30,7 @@ mod unit;
 mod windows_1252;
 mod words;
 
+pub use cells::MOST_BYTES;
 pub use choices::{Choices, Kind, RateUnit, Unit};
 pub use outcome::{Answer, Question, TextPosition};
 pub use reading::{Reading, read};

@@ -8,6 +8,7 @@ pub mod callers;
 pub mod catalogue;
 pub mod entries;
 pub mod error;
+pub mod field_bounds;
 pub mod jobs;
 pub mod metrics;
 pub mod process;

@@ -11,6 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::text::check_text;
 use crate::store::engine::error::Failure;
 use crate::store::engine::query::{StoreConnection, StoreRow, query};
@@ -57,6 +58,14 @@ pub struct Relabel {
 /// Deserializes a field that is present, even if it is null.
 pub fn given<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserializer: D) -> Result<Option<T>, D::Error> {
     Option::<T>::deserialize(deserializer).map(|value| Some(value.unwrap_or_default()))
+}
+
+impl Bounded for Relabel {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("name", ValueBounds::Text(0, LONGEST_NAME)),
+        ("notes", ValueBounds::Text(0, LONGEST_NOTES)),
+        ("tags", ValueBounds::Set(0, MOST_TAGS, &ValueBounds::Text(1, LONGEST_TAG))),
+    ];
 }
 
 impl Relabel {

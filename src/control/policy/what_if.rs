@@ -5,7 +5,7 @@ use super::advisor::{AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::state::{PeriodOutcome, State};
-use crate::control::request::rules;
+use crate::control::request::{radius_rules, rules};
 
 /// The hypothetical changes; everything else stays as it is. They apply in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -65,10 +65,10 @@ impl Hypothesis {
         }
         match self.radius {
             Some(HypotheticalRadius::Scaled(scale)) => {
-                rules::within("radius_scale", scale, rules::RADIUS_SCALE.0, rules::RADIUS_SCALE.1)
+                rules::within("radius_scale", scale, radius_rules::RADIUS_SCALE.0, radius_rules::RADIUS_SCALE.1)
             }
             Some(HypotheticalRadius::Fixed(radius)) => {
-                rules::within("radius", radius, rules::FIXED_RADIUS.0, rules::FIXED_RADIUS.1)
+                rules::within("radius", radius, radius_rules::FIXED_RADIUS.0, radius_rules::FIXED_RADIUS.1)
             }
             None => Ok(()),
         }

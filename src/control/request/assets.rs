@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::caution::CautionLevel;
 use super::caution_rules::{check_support, check_within};
 use super::contributions::Contributions;
@@ -139,6 +140,29 @@ impl AssetsProblem {
     }
 }
 
+/// The bounds of the names of several assets.
+pub const NAMES: ValueBounds = ValueBounds::set(&ASSETS, &ValueBounds::text(&NAME_LENGTH));
+const LOG_RETURN_ROWS: ValueBounds = ValueBounds::list(&DATES, &ValueBounds::list(&ASSETS, &rules::LOG_RETURNS));
+
+impl Bounded for AssetsProblem {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("assets", NAMES),
+        ("history", LOG_RETURN_ROWS),
+        ("horizon", ValueBounds::count(&rules::HORIZON)),
+        ("rate_per_step", ValueBounds::number(rules::RATE)),
+        ("periods_per_year", ValueBounds::number(rules::PERIODS_PER_YEAR)),
+        ("initial_wealth", ValueBounds::number(rules::WEALTH)),
+        ("action_interval", ValueBounds::List(2, 2, &rules::SHARES)),
+        ("trading_cost", ValueBounds::number(rules::TRADING_COST)),
+        ("risk_aversion", ValueBounds::number(rules::RELATIVE_RISK_AVERSION)),
+    ];
+}
+
+impl Bounded for FundSpecification {
+    const BOUNDS: &'static [FieldBounds] =
+        &[("assets", NAMES), ("history", LOG_RETURN_ROWS), ("radius_factor", ValueBounds::number(FACTOR))];
+}
+
 /// Checks the names of assets in the field `named`.
 ///
 /// # Errors
@@ -216,8 +240,8 @@ fn check_composition(named: &str, rule: &CompositionRule, assets: usize) -> Resu
     }
     Ok(())
 }
-/// Largest factor on the radius of one fund.
-pub const LARGEST_FACTOR: f64 = 100.0;
+/// Allowed factors on the radius of one fund.
+const FACTOR: (f64, f64) = (1.0, 100.0);
 /// Tolerance between a log-return of the fund and the one computed from its assets, possibly on another machine.
 const ROUNDING: f64 = 1e-9;
 
@@ -249,7 +273,7 @@ pub(super) fn check_fund(
     check_names("fund.assets", &fund.assets)?;
     check_rows("fund.history", &fund.history, &fund.assets, problem.support)?;
     check_composition("fund.composition", &fund.composition, fund.assets.len())?;
-    rules::within("fund.radius_factor", fund.radius_factor, 1.0, LARGEST_FACTOR)?;
+    rules::within("fund.radius_factor", fund.radius_factor, FACTOR.0, FACTOR.1)?;
     let returns = fund_returns(&fund.history, &inverse_volatility(&fund.history));
     let differs = |(index, (given, of_fund)): (usize, (&f64, f64))| {
         ((given - of_fund).abs() > ROUNDING).then_some((index, *given, of_fund))

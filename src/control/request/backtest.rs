@@ -5,12 +5,15 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
+use crate::control::request::radius_rules::{ALPHA, RADIUS_SCALE};
 use crate::control::request::rules::{
-    self, COUNT, HISTORY_LENGTH, HORIZON, RATE, RELATIVE_RISK_AVERSION, TRADING_COST, whole, within,
+    COUNT, HISTORY_LENGTH, HORIZON, LOG_RETURNS, RATE, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST,
+    return_bounds, whole, within,
 };
 use crate::control::request::specification::default_seed;
 use crate::control::request::support::Support;
@@ -21,8 +24,6 @@ pub const PERIODS: std::ops::RangeInclusive<usize> = 3..=20_000;
 pub const YEAR: std::ops::RangeInclusive<usize> = 1..=366;
 /// Allowed number of miscoverage levels; one chart could not show more of them distinctly.
 pub const LEVELS: std::ops::RangeInclusive<usize> = 1..=3;
-/// Allowed range of a miscoverage.
-pub const ALPHA: (f64, f64) = (1e-3, 0.999);
 /// Largest number of policies trained.
 pub const MOST_TRAININGS: usize = 5_000;
 /// Largest number of steps of all policies together.
@@ -179,12 +180,6 @@ pub fn too_long(window: usize, found: usize, year: usize) -> FieldError {
     FieldError::new("window", window, rule)
 }
 
-/// Returns the bounds of simple returns or of log-returns.
-pub fn bounds(are_simple: bool) -> (f64, f64) {
-    let bound = rules::LOG_RETURN;
-    if are_simple { ((-bound).exp_m1(), bound.exp_m1()) } else { (-bound, bound) }
-}
-
 /// Returns the frequency of the periods, from their dates.
 ///
 /// # Errors
@@ -201,6 +196,23 @@ pub fn frequency(dates: &[String]) -> Result<Frequency, FieldError> {
 /// Returns the dates, leaving out texts that are none.
 pub fn days(dates: &[String]) -> Vec<Date> {
     dates.iter().filter_map(|text| date(text)).collect()
+}
+
+impl Bounded for BacktestRequest {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("log_returns", ValueBounds::list(&PERIODS, &LOG_RETURNS)),
+        ("simple_returns", ValueBounds::list(&PERIODS, &SIMPLE_RETURNS)),
+        ("dates", ValueBounds::list(&PERIODS, &ValueBounds::Any)),
+        ("periods_per_year", ValueBounds::count(&YEAR)),
+        ("window", ValueBounds::count(&HISTORY_LENGTH)),
+        ("every", ValueBounds::count(&HORIZON)),
+        ("horizon", ValueBounds::count(&HORIZON)),
+        ("alpha", ValueBounds::list(&LEVELS, &ValueBounds::number(ALPHA))),
+        ("scale", ValueBounds::number(RADIUS_SCALE)),
+        ("risk_aversion", ValueBounds::number(RELATIVE_RISK_AVERSION)),
+        ("trading_cost", ValueBounds::number(TRADING_COST)),
+        ("count", ValueBounds::count(&COUNT)),
+    ];
 }
 
 impl BacktestRequest {
@@ -282,7 +294,7 @@ impl BacktestRequest {
             let rule = format!("must hold {} to {} returns", PERIODS.start(), PERIODS.end());
             return Err(FieldError::new(field, format!("{} periods", returns.len()), rule));
         }
-        let (low, high) = bounds(self.simple_returns.is_some());
+        let (low, high) = return_bounds(self.simple_returns.is_some());
         for (index, &value) in returns.iter().enumerate() {
             within(&format!("{field}[{index}]"), value, low, high)?;
         }

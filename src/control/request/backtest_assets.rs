@@ -5,10 +5,12 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use super::assets::check_names;
-use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, bounds, days, defaults, frequency, same_length};
+use super::assets::{ASSETS, DATES, NAMES, check_names};
+use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, frequency, same_length};
+use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::frequency::Frequency;
-use super::rules::{whole, within};
+use super::radius_rules::ALPHA;
+use super::rules::{LOG_RETURNS, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST, return_bounds, whole, within};
 use super::specification::default_seed;
 use super::support::Support;
 use crate::control::error::FieldError;
@@ -17,6 +19,8 @@ use crate::control::error::FieldError;
 pub const MOST_READ: usize = 1_000_000_000;
 /// Limit on the shares that all strategies together hold: a report of some forty megabytes.
 pub const MOST_HELD: usize = 2_000_000;
+/// Limit on the number of windows: a chart of more would have too many lines.
+pub const MOST_WINDOWS: usize = 5;
 
 /// A walk-forward through a record of several assets. It compares the one-step problem with rules that people use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -86,6 +90,21 @@ impl<'de> Deserialize<'de> for BacktestQuestion {
     }
 }
 
+impl Bounded for AssetsBacktestRequest {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("assets", NAMES),
+        ("log_returns", ValueBounds::list(&PERIODS, &ValueBounds::list(&ASSETS, &LOG_RETURNS))),
+        ("simple_returns", ValueBounds::list(&PERIODS, &ValueBounds::list(&ASSETS, &SIMPLE_RETURNS))),
+        ("dates", ValueBounds::list(&PERIODS, &ValueBounds::Any)),
+        ("periods_per_year", ValueBounds::count(&YEAR)),
+        ("windows", ValueBounds::List(1, MOST_WINDOWS, &ValueBounds::Any)),
+        ("every", ValueBounds::Count(1, *DATES.end())),
+        ("alpha", ValueBounds::number(ALPHA)),
+        ("risk_aversion", ValueBounds::number(RELATIVE_RISK_AVERSION)),
+        ("trading_cost", ValueBounds::number(TRADING_COST)),
+    ];
+}
+
 impl AssetsBacktestRequest {
     /// Returns the name of the field that holds the returns, and its values. The values are empty if both fields or
     /// neither are given.
@@ -121,7 +140,7 @@ impl AssetsBacktestRequest {
             let rule = format!("must hold {} to {} periods", PERIODS.start(), PERIODS.end());
             return Err(FieldError::new(field, format!("{} periods", rows.len()), rule));
         }
-        let (low, high) = bounds(self.simple_returns.is_some());
+        let (low, high) = return_bounds(self.simple_returns.is_some());
         for (period, row) in rows.iter().enumerate() {
             if row.len() != self.assets.len() {
                 let rule = format!("must have one return for each of the {} assets", self.assets.len());

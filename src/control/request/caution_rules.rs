@@ -1,11 +1,24 @@
 //! The caution level and the support of a problem, and the rules of both.
 
+use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::caution::{CautionLevel, LARGEST_SCALE};
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::ProblemSpecification;
 use super::support::{FACTOR, Interval, LIMIT, Support};
 use crate::control::error::FieldError;
+
+impl Bounded for CautionLevel {
+    const BOUNDS: &'static [FieldBounds] = &[("scale", ValueBounds::Number(0.0, LARGEST_SCALE))];
+}
+
+impl Bounded for Support {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("worst_seen.factor", ValueBounds::number(FACTOR)),
+        ("between.min", ValueBounds::Number(-LIMIT, LIMIT)),
+        ("between.max", ValueBounds::Number(-LIMIT, LIMIT)),
+    ];
+}
 
 impl ProblemSpecification {
     /// Returns the level given, or the default: `paper` if a radius is given, else `balanced`. Returns `None` if the

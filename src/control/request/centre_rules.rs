@@ -1,10 +1,11 @@
 //! The rules of a centre.
 
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::HALF_LIFE;
-use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, sampling_law, within};
+use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, LOG_RETURNS, within};
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, ProblemSpecification};
 use crate::control::request::support::Interval;
@@ -13,6 +14,15 @@ use crate::control::request::support::Interval;
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
 /// Allowed number of returns that an assumed law counts as. With more, a record would have no effect.
 pub const ASSUMED_WEIGHT: (f64, f64) = (0.0, 1e6);
+
+impl Bounded for CentreSpecification {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("smoothed.bandwidth", ValueBounds::number(BANDWIDTH)),
+        ("volatility_scaled.half_life", ValueBounds::number(HALF_LIFE)),
+        ("mixed.history", ValueBounds::list(&HISTORY_LENGTH, &LOG_RETURNS)),
+        ("mixed.weight", ValueBounds::number(ASSUMED_WEIGHT)),
+    ];
+}
 
 /// Checks the centre of a problem whose other fields satisfy their rules.
 ///
@@ -67,7 +77,7 @@ fn assumed_law(law: &SamplingLaw) -> Result<(), FieldError> {
         let rule = "must be another law: the returns seen are already counted";
         return Err(FieldError::new("problem.centre.law.kind", "bootstrap", rule));
     }
-    sampling_law("problem.centre.law", law)
+    law.check("problem.centre.law")
 }
 
 fn assumed_history(history: &[f64], support: Option<Interval>) -> Result<(), FieldError> {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::completion::DEFAULT_COUNT_WEALTH_ALONE;
 use crate::control::request::framework::Framework;
@@ -92,6 +93,18 @@ mod defaults {
     pub fn level() -> f64 {
         0.95
     }
+}
+
+impl Bounded for EvaluationRequest {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("constant_mixes", ValueBounds::List(0, MOST_MIXES, &rules::SHARES)),
+        ("paths", ValueBounds::count(&PATHS)),
+        ("level", ValueBounds::number(LEVEL)),
+    ];
+}
+
+impl Bounded for InitialHistories {
+    const BOUNDS: &'static [FieldBounds] = &[("count", ValueBounds::count(&HISTORIES))];
 }
 
 impl EvaluationRequest {

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use super::assets::AssetsProblem;
+use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::caution::CautionLevel;
 use super::contributions::Contributions;
 use super::framework::Framework;
@@ -114,6 +115,14 @@ pub struct FrontierQuestion {
     pub block: usize,
     /// Bounds on all log-returns, if the request gives them.
     pub support: Option<Interval>,
+}
+
+impl Bounded for FrontierRequest {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("scales", ValueBounds::list(&SCALES, &ValueBounds::Number(0.0, LARGEST_SCALE))),
+        ("resamples", ValueBounds::count(&RESAMPLES)),
+        ("block", ValueBounds::CountFrom(1)),
+    ];
 }
 
 impl FrontierRequest {

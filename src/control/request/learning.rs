@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::numerics::law::empirical::{EmpiricalDistribution, weights};
 
 /// Allowed half-lives: the number of periods in which a return's weight halves. Below 1 the newest return would
@@ -25,6 +26,10 @@ pub enum Learning {
         /// Half-life, in periods, 1 to 1e15.
         half_life: f64,
     },
+}
+
+impl Bounded for Learning {
+    const BOUNDS: &'static [FieldBounds] = &[("half_life", ValueBounds::number(HALF_LIFE))];
 }
 
 impl Default for Learning {

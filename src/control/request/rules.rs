@@ -1,13 +1,15 @@
 //! Every rule a specification must satisfy, checked before any work.
 
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
+pub use crate::control::request::bounds::{interval, whole, within};
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::Learning;
-use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::radius_rules::check_radius;
 use crate::control::request::specification::{
-    InitialLaws, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
+    DesignSpecification, HyperparameterBounds, InitialLaws, ProblemSpecification, Specification,
+    SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::request::support::Interval;
 use crate::control::request::withdrawals;
@@ -22,12 +24,8 @@ pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
 /// Largest log-return in absolute value: a factor of 148 in one step.
 pub const LOG_RETURN: f64 = 5.0;
-/// Allowed number of simulated bridge paths.
-pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
-/// Largest bridge matrix, 30 million numbers: 240 MB.
-pub const BRIDGE_NUMBERS: usize = 30_000_000;
-/// Largest bridge matrix for a calibration, which reads it for each of a thousand records: about a second.
-const CALIBRATED_NUMBERS: usize = 3_000_000;
+/// Allowed simple returns: those whose log-returns are allowed.
+pub const SIMPLE_RETURN: (f64, f64) = (-0.993_262_053_000_914_5, 147.413_159_102_576_6);
 /// Largest number of simulated returns in the design: 800 MB.
 const DESIGN_NUMBERS: usize = 100_000_000;
 /// Above this product of risk aversion and wealth, exponential utility is flat in double precision over the design.
@@ -54,12 +52,51 @@ pub const RATE: (f64, f64) = (-0.5, 0.5);
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 /// Allowed number of moments of the law among the features.
 pub const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
-/// Allowed factors on a bridge radius.
-pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
-/// Allowed corrections of a simulated quantile: a hundred paths are off by less.
-pub const RADIUS_CORRECTION: (f64, f64) = (0.5, 2.0);
-/// Allowed fixed radii, in log-return.
-pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
+/// Ends of the search for a hyperparameter.
+const HYPERPARAMETER: (f64, f64) = (1e-12, 1e12);
+
+/// The bounds of a log-return.
+pub const LOG_RETURNS: ValueBounds = ValueBounds::Number(-LOG_RETURN, LOG_RETURN);
+/// The bounds of a simple return.
+pub const SIMPLE_RETURNS: ValueBounds = ValueBounds::number(SIMPLE_RETURN);
+/// The bounds of a share of wealth.
+pub const SHARES: ValueBounds = ValueBounds::Number(0.0, 1.0);
+const PAIR: ValueBounds = ValueBounds::List(2, 2, &ValueBounds::number(HYPERPARAMETER));
+
+impl Bounded for ProblemSpecification {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("horizon", ValueBounds::count(&HORIZON)),
+        ("rate_per_step", ValueBounds::number(RATE)),
+        ("periods_per_year", ValueBounds::number(PERIODS_PER_YEAR)),
+        ("initial_wealth", ValueBounds::number(WEALTH)),
+        ("action_interval", ValueBounds::List(2, 2, &SHARES)),
+        ("trading_cost", ValueBounds::number(TRADING_COST)),
+        ("risk_aversion", ValueBounds::number(RELATIVE_RISK_AVERSION)),
+        ("history", ValueBounds::list(&HISTORY_LENGTH, &LOG_RETURNS)),
+    ];
+}
+
+impl Bounded for UtilitySpecification {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("exponential.risk_aversion", ValueBounds::number(RISK_AVERSION)),
+        ("exponential.risk_aversion_relative", ValueBounds::number(RISK_AVERSION_RELATIVE)),
+        ("power.risk_aversion", ValueBounds::Above(RELATIVE_RISK_AVERSION.0, RELATIVE_RISK_AVERSION.1)),
+    ];
+}
+
+impl Bounded for DesignSpecification {
+    const BOUNDS: &'static [FieldBounds] =
+        &[("accuracy", ValueBounds::number(ACCURACY)), ("count", ValueBounds::count(&COUNT))];
+}
+
+impl Bounded for SurrogateSpecification {
+    const BOUNDS: &'static [FieldBounds] = &[("moment_count", ValueBounds::count(&MOMENTS))];
+}
+
+impl Bounded for HyperparameterBounds {
+    const BOUNDS: &'static [FieldBounds] =
+        &[("lengthscale", PAIR), ("signal_variance", PAIR), ("noise_variance", PAIR)];
+}
 
 /// Checks every rule.
 ///
@@ -94,7 +131,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     contributions(problem)?;
     utility(problem)?;
     problem.learning.check()?;
-    radius(&problem.radius_rule(), problem)?;
+    check_radius(&problem.radius_rule(), problem)?;
     match (&problem.law, problem.framework) {
         (None, Framework::KnownLaw) => {
             return Err(FieldError::new("problem.law", "null", "must be given in the known_law framework"));
@@ -103,7 +140,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
             let rule = "must be absent unless the framework is known_law";
             return Err(FieldError::new("problem.law", "an object", rule));
         }
-        (Some(law), _) => sampling_law("problem.law", law)?,
+        (Some(law), _) => law.check("problem.law")?,
         (None, _) => {}
     }
     history("problem.history", &problem.history, problem.learning)?;
@@ -129,6 +166,7 @@ fn contributions(problem: &ProblemSpecification) -> Result<(), FieldError> {
 fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     const FIELD: &str = "problem.utility.risk_aversion";
     const RELATIVE: &str = "problem.utility.risk_aversion_relative";
+    let (least, most) = RELATIVE_RISK_AVERSION;
     let (field, given, (low, high)) = match problem.utility {
         UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: Some(relative) } => {
             if !risk_aversion.is_nan() {
@@ -140,8 +178,9 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
             return Err(FieldError::new(FIELD, "null", "must be given, or risk_aversion_relative instead"));
         }
         UtilitySpecification::Exponential { risk_aversion, .. } => (FIELD, risk_aversion, RISK_AVERSION),
-        UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
-            return Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"));
+        UtilitySpecification::Power { risk_aversion } if !(risk_aversion > least && risk_aversion <= most) => {
+            let rule = format!("must lie in ({least}, {most}]; at 1 use the log utility");
+            return Err(FieldError::new(FIELD, risk_aversion, rule));
         }
         UtilitySpecification::Power { .. } | UtilitySpecification::Log {} => return Ok(()),
     };
@@ -168,49 +207,6 @@ fn not_flat(problem: &ProblemSpecification, wealth: f64, refused: (&str, f64), o
     Ok(())
 }
 
-fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), FieldError> {
-    let name = rule.name();
-    match (problem.framework.is_parametric(), name == "chi_square") {
-        (true, false) => {
-            return Err(FieldError::new(
-                "problem.radius.rule",
-                name,
-                "must be chi_square in the parametric frameworks",
-            ));
-        }
-        (false, true) => {
-            let rule = "must be another rule unless the framework is parametric_static or parametric_adaptive";
-            return Err(FieldError::new("problem.radius.rule", name, rule));
-        }
-        _ => {}
-    }
-    match *rule {
-        RadiusRule::Bridge { alpha, paths, scale, .. } | RadiusRule::Calibrated { alpha, paths, scale } => {
-            let calibrated = matches!(rule, RadiusRule::Calibrated { .. });
-            let (least_alpha, numbers) = if calibrated { (1e-2, CALIBRATED_NUMBERS) } else { (1e-3, BRIDGE_NUMBERS) };
-            within("problem.radius.alpha", alpha, least_alpha, 0.999)?;
-            whole("problem.radius.paths", paths, &PATHS)?;
-            within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;
-            if let RadiusRule::Bridge { correction: Some(correction), .. } = *rule {
-                within("problem.radius.correction", correction, RADIUS_CORRECTION.0, RADIUS_CORRECTION.1)?;
-            }
-            if paths.saturating_mul(problem.history.len() + problem.horizon) > numbers {
-                let rule = format!("must be smaller: multiplied by the final sample size it may be at most {numbers}");
-                return Err(FieldError::new("problem.radius.paths", paths, rule));
-            }
-            Ok(())
-        }
-        RadiusRule::Concentration { alpha, numerator, rate } => {
-            within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
-            within("problem.radius.C", numerator, alpha, 1e9)?;
-            within("problem.radius.c", rate, 1e-9, 1e12)
-        }
-        RadiusRule::RootN { kappa } => within("problem.radius.kappa", kappa, 0.0, 100.0),
-        RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1),
-        RadiusRule::ChiSquare { alpha } => within("problem.radius.alpha", alpha, 1e-3, 1.0),
-    }
-}
-
 /// Checks a history of log-returns, oldest first, for this kind of learning; `field` names it in messages.
 pub fn history(field: &str, values: &[f64], learning: Learning) -> Result<(), FieldError> {
     if !HISTORY_LENGTH.contains(&values.len()) {
@@ -233,6 +229,11 @@ pub fn share(field: &str, value: f64) -> Result<(), FieldError> {
     within(field, value, 0.0, 1.0)
 }
 
+/// Returns the lowest and the highest simple return or log-return.
+pub fn return_bounds(are_simple: bool) -> (f64, f64) {
+    if are_simple { SIMPLE_RETURN } else { (-LOG_RETURN, LOG_RETURN) }
+}
+
 /// Checks one log-return, named `field` in messages.
 pub fn log_return(field: &str, value: f64) -> Result<(), FieldError> {
     within(field, value, -LOG_RETURN, LOG_RETURN)
@@ -252,7 +253,7 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
         }
     }
     if let Some(law) = &design.sampling_law {
-        sampling_law("design.sampling_law", law)?;
+        law.check("design.sampling_law")?;
     }
     if let Some(Interval { min, max }) = design.wealth {
         wealth("design.wealth.min", min)?;
@@ -266,38 +267,6 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
     Ok(())
 }
 
-/// Checks a law, named `field` in messages.
-pub fn sampling_law(field: &str, law: &SamplingLaw) -> Result<(), FieldError> {
-    match law {
-        SamplingLaw::Bootstrap {} => Ok(()),
-        SamplingLaw::StudentT { location, scale, degrees_of_freedom } => {
-            within(&format!("{field}.location"), *location, -1.0, 1.0)?;
-            within(&format!("{field}.scale"), *scale, 1e-6, 1.0)?;
-            within(&format!("{field}.degrees_of_freedom"), *degrees_of_freedom, 2.1, 1e6)
-        }
-        SamplingLaw::GaussianMixture { components } => {
-            if components.is_empty() || components.len() > 32 {
-                let value = format!("{} components", components.len());
-                return Err(FieldError::new(format!("{field}.components"), value, "must hold 1 to 32 components"));
-            }
-            for (index, component) in components.iter().enumerate() {
-                open_above_zero(&format!("{field}.components[{index}].weight"), component.weight, 1.0)?;
-                within(&format!("{field}.components[{index}].mean"), component.mean, -1.0, 1.0)?;
-                within(&format!("{field}.components[{index}].variance"), component.variance, 1e-12, 1.0)?;
-            }
-            let total: f64 = components.iter().map(|component| component.weight).sum();
-            if (total - 1.0).abs() > 1e-9 {
-                return Err(FieldError::new(
-                    format!("{field}.components"),
-                    format!("weights summing to {total}"),
-                    "must sum to 1",
-                ));
-            }
-            Ok(())
-        }
-    }
-}
-
 fn surrogate(surrogate: &SurrogateSpecification) -> Result<(), FieldError> {
     whole("surrogate.moment_count", surrogate.moment_count, &MOMENTS)?;
     let bounds = &surrogate.bounds;
@@ -306,41 +275,20 @@ fn surrogate(surrogate: &SurrogateSpecification) -> Result<(), FieldError> {
         ("signal_variance", bounds.signal_variance),
         ("noise_variance", bounds.noise_variance),
     ] {
-        within(&format!("surrogate.bounds.{name}[0]"), low, 1e-12, 1e12)?;
-        within(&format!("surrogate.bounds.{name}[1]"), high, low, 1e12)?;
+        within(&format!("surrogate.bounds.{name}[0]"), low, HYPERPARAMETER.0, HYPERPARAMETER.1)?;
+        within(&format!("surrogate.bounds.{name}[1]"), high, low, HYPERPARAMETER.1)?;
     }
     Ok(())
 }
 
-/// Checks that a count is allowed.
-pub fn whole(field: &str, value: usize, allowed: &std::ops::RangeInclusive<usize>) -> Result<(), FieldError> {
-    if allowed.contains(&value) {
-        return Ok(());
-    }
-    Err(FieldError::new(field, value, format!("must lie in [{}, {}]", allowed.start(), allowed.end())))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Checks that `value` is finite and lies in `[low, high]`.
-pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<(), FieldError> {
-    if value >= low && value <= high {
-        return Ok(());
+    #[test]
+    fn simple_returns_have_the_bounds_of_log_returns() {
+        for (simple, log) in [(SIMPLE_RETURN.0, -LOG_RETURN), (SIMPLE_RETURN.1, LOG_RETURN)] {
+            assert!((simple - log.exp_m1()).abs() <= 1e-15 * log.exp() && simple.ln_1p().abs() <= LOG_RETURN + 1e-12);
+        }
     }
-    Err(FieldError::new(field, value, format!("must be a number in [{low}, {high}]")))
-}
-
-fn open_above_zero(field: &str, value: f64, high: f64) -> Result<(), FieldError> {
-    if value > 0.0 && value <= high {
-        return Ok(());
-    }
-    Err(FieldError::new(field, value, format!("must be a number in (0, {high}]")))
-}
-
-/// Checks that an interval lies in `[low, high]` and has a length.
-pub fn interval(field: &str, interval: Interval, low: f64, high: f64) -> Result<(), FieldError> {
-    within(&format!("{field}.min"), interval.min, low, high)?;
-    within(&format!("{field}.max"), interval.max, low, high)?;
-    if interval.max > interval.min {
-        return Ok(());
-    }
-    Err(FieldError::new(format!("{field}.max"), interval.max, format!("must exceed {field}.min, {}", interval.min)))
 }

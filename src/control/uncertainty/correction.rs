@@ -3,7 +3,7 @@
 
 use super::radius::RadiusEstimator;
 use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::rules::RADIUS_CORRECTION;
+use crate::control::request::radius_rules::RADIUS_CORRECTION;
 use crate::numerics::bridge::sized_gaps::Statistic;
 
 impl RadiusEstimator {

@@ -1,40 +1,50 @@
-//! Adds the rules of single fields to the description, as far as JSON Schema can express them: lengths, ranges, exactly
-//! one of several.
+//! Adds the bounds of single fields to the description, as JSON Schema expresses them: lengths, ranges, exactly one of
+//! several.
 //!
-//! The rules are defined in `control::request::rules` and beside their requests. This module repeats their numbers for
-//! readers of the description, and a test checks the rules themselves at both ends. Rules between fields are left to
-//! the service.
+//! The types of requests list the bounds of their fields, next to their checkers. Rules between fields are left to the
+//! service.
+
+use std::borrow::Cow;
 
 use serde_json::{Map, Value, json};
+use utoipa::ToSchema;
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
-use crate::control::evaluation::assets::MOST_WINDOWS;
-use crate::control::request::assets::{ASSETS, DATES, LARGEST_FACTOR, NAME_LENGTH};
-use crate::control::request::backtest;
-use crate::control::request::caution;
-use crate::control::request::centre_rules::{ASSUMED_WEIGHT, BANDWIDTH};
-use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
-use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
-use crate::control::request::learning::HALF_LIFE;
-use crate::control::request::rules::{
-    ACCURACY, COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR,
-    RADIUS_CORRECTION, RADIUS_SCALE, RATE, RELATIVE_RISK_AVERSION, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST,
-    WEALTH,
+use crate::control::request::assets::AssetsProblem;
+use crate::control::request::backtest::BacktestRequest;
+use crate::control::request::backtest_assets::AssetsBacktestRequest;
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
+use crate::control::request::caution::CautionLevel;
+use crate::control::request::centre::CentreSpecification;
+use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
+use crate::control::request::frontier::FrontierRequest;
+use crate::control::request::fund::FundSpecification;
+use crate::control::request::learning::Learning;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::sampling_law::{MixtureComponent, SamplingLaw};
+use crate::control::request::specification::{
+    DesignSpecification, HyperparameterBounds, ProblemSpecification, SurrogateSpecification, UtilitySpecification,
 };
-use crate::control::request::support::{FACTOR, LIMIT};
-use crate::service::advice::what_if::POINTS;
-use crate::service::entries::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
-use crate::service::entries::reports::REPORTS;
-use crate::service::sessions::plan::MOST_RENEWALS;
-use crate::store::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, MOST_TAGS};
+use crate::control::request::support::Support;
+use crate::service::advice::advise::Advise;
+use crate::service::advice::advise_assets::AdviseAssets;
+use crate::service::advice::returns::ReadReturns;
+use crate::service::advice::what_if::{SweepRange, WhatIf};
+use crate::service::entries::report::{Correct, Observe, Report};
+use crate::service::field_bounds::LISTED_REPORTS;
+use crate::service::sessions::SessionStart;
+use crate::service::sessions::plan::{Renew, Renewing};
+use crate::store::Relabel;
 
 /// Adds to every schema the bounds of its fields.
 pub fn tell(description: &mut OpenApi) {
     let Some(components) = &mut description.components else { return };
-    for (name, field, rule) in rules() {
-        let (name, variant) = name.split_once(' ').map_or((name, None), |(name, variant)| (name, Some(variant)));
-        if let Some(schema) = components.schemas.get_mut(name) {
-            with_field(schema, field, variant, &mut |property| merged(property, &rule));
+    for (name, fields) in schemas() {
+        let Some(schema) = components.schemas.get_mut(&*name) else { continue };
+        for (field, bounds) in fields {
+            let (variant, field) =
+                field.split_once('.').map_or((None, *field), |(variant, field)| (Some(variant), field));
+            with_field(schema, field, variant, &mut |property| merged(property, &as_schema(*bounds)));
         }
     }
     if let Some(sweep) = components.schemas.get_mut("Sweep") {
@@ -42,248 +52,84 @@ pub fn tell(description: &mut OpenApi) {
     }
     if let Some(RefOr::T(Schema::OneOf(reports))) = components.schemas.get_mut("Reports") {
         let lists = reports.items.iter_mut().filter(|item| matches!(item, RefOr::T(Schema::Array(_))));
-        let length = json!({ "minItems": REPORTS.start(), "maxItems": REPORTS.end() });
-        lists.for_each(|list| merged(list, &length));
+        lists.for_each(|list| merged(list, &as_schema(LISTED_REPORTS)));
     }
 }
 
-/// Returns all rules, each as schema (or schema and variant), field and rule.
-fn rules() -> Vec<(&'static str, &'static str, Value)> {
-    let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
-    let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
-    let wealth = within(WEALTH);
-    let probability = within((1e-3, 0.999));
-    let rules = [
-        ("ProblemSpecification", "horizon", whole(&HORIZON)),
-        ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
-        ("ProblemSpecification", "risk_aversion", within(RELATIVE_RISK_AVERSION)),
-        ("ProblemSpecification", "history", history.clone()),
-        ("CentreSpecification smoothed", "bandwidth", within(BANDWIDTH)),
-        ("CentreSpecification volatility_scaled", "half_life", within(HALF_LIFE)),
-        ("CentreSpecification mixed", "history", history),
-        ("CentreSpecification mixed", "weight", within(ASSUMED_WEIGHT)),
-        ("Learning", "half_life", within(HALF_LIFE)),
-        ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
-        ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
-        ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
-        ("Support worst_seen", "factor", within(FACTOR)),
-        ("Support between", "min", within((-LIMIT, LIMIT))),
-        ("Support between", "max", within((-LIMIT, LIMIT))),
-        ("CautionLevel", "scale", within((0.0, caution::LARGEST_SCALE))),
-        ("RadiusRule bridge", "alpha", probability.clone()),
-        ("RadiusRule calibrated", "alpha", within((1e-2, 0.999))),
-        ("RadiusRule concentration", "alpha", probability),
-        ("RadiusRule concentration", "C", json!({ "exclusiveMinimum": 0, "maximum": 1e9 })),
-        ("RadiusRule chi_square", "alpha", within((1e-3, 1.0))),
-        ("RadiusRule", "paths", whole(&PATHS)),
-        ("RadiusRule", "scale", within(RADIUS_SCALE)),
-        ("RadiusRule", "correction", within(RADIUS_CORRECTION)),
-        ("RadiusRule", "kappa", within((0.0, 100.0))),
-        ("RadiusRule", "radius", within(FIXED_RADIUS)),
-        ("RadiusRule", "c", within((1e-9, 1e12))),
-        ("SamplingLaw", "components", json!({ "minItems": 1, "maxItems": 32 })),
-        ("SamplingLaw", "location", within((-1.0, 1.0))),
-        ("SamplingLaw", "scale", within((1e-6, 1.0))),
-        ("SamplingLaw", "degrees_of_freedom", within((2.1, 1e6))),
-        ("MixtureComponent", "weight", json!({ "exclusiveMinimum": 0, "maximum": 1 })),
-        ("MixtureComponent", "mean", within((-1.0, 1.0))),
-        ("MixtureComponent", "variance", within((1e-12, 1.0))),
-        ("SurrogateSpecification", "moment_count", whole(&MOMENTS)),
-        ("HyperparameterBounds", "lengthscale", pair.clone()),
-        ("HyperparameterBounds", "signal_variance", pair.clone()),
-        ("HyperparameterBounds", "noise_variance", pair),
-        ("Advise", "wealth", wealth.clone()),
-        ("Advise", "holding", within((0.0, 1.0))),
-        ("AdviseAssets", "wealth", wealth),
-        ("ReadReturns", "text", json!({ "maxLength": 8_000_000 })),
-        ("FrontierRequest", "scales", listed(&SCALES, within((0.0, LARGEST_SCALE)))),
-        ("FrontierRequest", "resamples", whole(&RESAMPLES)),
-        ("FrontierRequest", "block", json!({ "minimum": 1 })),
-        ("SweepRange", "points", whole(&POINTS)),
-        ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within((0.0, 1.0)) })),
-        ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
-        ("EvaluationRequest", "level", within(LEVEL)),
-        ("InitialHistories", "count", whole(&HISTORIES)),
-    ];
-    let investors = ["ProblemSpecification", "AssetsProblem"].into_iter().flat_map(of_investor);
-    rules
-        .into_iter()
-        .chain(investors)
-        .chain(of_designs())
-        .chain(of_assets())
-        .chain(of_sessions())
-        .chain(supposed())
-        .chain(of_labels())
-        .chain(walked())
-        .chain(reported())
-        .collect()
+/// Returns the names of schemas, each with bounds of its fields.
+fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
+    vec![
+        of::<ProblemSpecification>(),
+        of::<UtilitySpecification>(),
+        of::<Learning>(),
+        of::<CentreSpecification>(),
+        of::<RadiusRule>(),
+        of::<CautionLevel>(),
+        of::<Support>(),
+        of::<SamplingLaw>(),
+        of::<MixtureComponent>(),
+        of::<DesignSpecification>(),
+        of::<SurrogateSpecification>(),
+        of::<HyperparameterBounds>(),
+        of::<AssetsProblem>(),
+        of::<FundSpecification>(),
+        of::<EvaluationRequest>(),
+        of::<InitialHistories>(),
+        of::<BacktestRequest>(),
+        of::<AssetsBacktestRequest>(),
+        of::<FrontierRequest>(),
+        of::<Advise>(),
+        of::<AdviseAssets>(),
+        of::<WhatIf>(),
+        of::<SweepRange>(),
+        of::<Report>(),
+        of::<Observe>(),
+        ("Observe".into(), Report::BOUNDS),
+        of::<Correct>(),
+        ("Correct".into(), Report::BOUNDS),
+        of::<Renew>(),
+        of::<Renewing>(),
+        of::<ReadReturns>(),
+        ("OpenSession".into(), SessionStart::BOUNDS),
+        of::<Relabel>(),
+        ("OpenSession".into(), Relabel::BOUNDS),
+        ("Train".into(), Relabel::BOUNDS),
+        ("TrainAssets".into(), Relabel::BOUNDS),
+    ]
 }
 
-/// Returns the rules for the design of training states.
-fn of_designs() -> [(&'static str, &'static str, Value); 2] {
-    [("accuracy", within(ACCURACY)), ("count", whole(&COUNT))].map(|(field, rule)| ("DesignSpecification", field, rule))
+fn of<T: Bounded + ToSchema>() -> (Cow<'static, str>, &'static [FieldBounds]) {
+    (T::name(), T::BOUNDS)
 }
 
-/// Returns the rules of the problems that have an investor and a bank.
-fn of_investor(problem: &'static str) -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
-    let rules = [
-        (problem, "rate_per_step", within(RATE)),
-        (problem, "periods_per_year", within(PERIODS_PER_YEAR)),
-        (problem, "initial_wealth", within(WEALTH)),
-        (problem, "action_interval", action),
-    ];
-    rules.into_iter()
+/// Returns the bounds as members of a schema.
+fn as_schema(bounds: ValueBounds) -> Value {
+    match bounds {
+        ValueBounds::Number(low, high) => json!({ "minimum": low, "maximum": high }),
+        ValueBounds::Above(low, high) => json!({ "exclusiveMinimum": low, "maximum": high }),
+        ValueBounds::Count(least, most) => json!({ "minimum": least, "maximum": most }),
+        ValueBounds::CountFrom(least) => json!({ "minimum": least }),
+        ValueBounds::Text(least, most) => Value::Object(lengths(["minLength", "maxLength"], [least, most])),
+        ValueBounds::List(least, most, element) | ValueBounds::Set(least, most, element) => {
+            let mut list = lengths(["minItems", "maxItems"], [least, most]);
+            if matches!(bounds, ValueBounds::Set(..)) {
+                list.insert("uniqueItems".into(), json!(true));
+            }
+            let element = as_schema(*element);
+            if element != json!({}) {
+                list.insert("items".into(), element);
+            }
+            Value::Object(list)
+        }
+        ValueBounds::ByAsset(value) => json!({ "additionalProperties": as_schema(*value) }),
+        ValueBounds::Any => json!({}),
+    }
 }
 
-/// Returns the rules of requests about several assets.
-fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let (log_return, names) = (within((-LOG_RETURN, LOG_RETURN)), asset_names());
-    let rules = [
-        ("AssetsProblem", "horizon", whole(&HORIZON)),
-        ("AssetsProblem", "trading_cost", within(TRADING_COST)),
-        ("AssetsProblem", "risk_aversion", within(RELATIVE_RISK_AVERSION)),
-        ("FundSpecification", "assets", names.clone()),
-        ("FundSpecification", "radius_factor", within((1.0, LARGEST_FACTOR))),
-        ("FundSpecification", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
-        ("AssetsProblem", "assets", names),
-        ("AssetsProblem", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
-    ];
-    rules.into_iter()
-}
-
-/// Returns the rules of sessions, and of what is recorded in them.
-fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let rules = [
-        ("OpenSession", "policy", json!({ "minLength": 1 })),
-        ("OpenSession", "holdings", each(within((0.0, 1.0)))),
-        ("OpenSession", "wealth", within(WEALTH)),
-        ("OpenSession", "holding", within((0.0, 1.0))),
-        ("Observe", "session", json!({ "minLength": 1 })),
-        ("Observe", "period", json!({ "minimum": 1 })),
-        ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
-        ("Correct", "period", json!({ "minimum": 1 })),
-        ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
-        ("Renew", "renewal", whole(&(1..=MOST_RENEWALS))),
-        ("Renew", "policy", json!({ "minLength": 1 })),
-        ("Renew", "window", whole(&HISTORY_LENGTH)),
-        ("Renewing", "every", json!({ "minimum": 1 })),
-        ("Renewing", "window", whole(&HISTORY_LENGTH)),
-    ];
-    rules.into_iter()
-}
-
-/// Returns the rules of what-if requests.
-fn supposed() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let rules = [
-        ("WhatIf", "session", json!({ "minLength": 1 })),
-        ("WhatIf", "wealth", within(WEALTH)),
-        ("WhatIf", "holding", within((0.0, 1.0))),
-        ("WhatIf", "radius_scale", within(RADIUS_SCALE)),
-        ("WhatIf", "radius", within(FIXED_RADIUS)),
-        ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
-        ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
-        ("WhatIf", "holdings", each(within((0.0, 1.0)))),
-        ("AdviseAssets", "holdings", each(within((0.0, 1.0)))),
-    ];
-    rules.into_iter()
-}
-
-/// Returns the rules of names, notes and tags.
-fn of_labels() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    ["Train", "OpenSession", "Relabel"].into_iter().flat_map(|schema| {
-        let tag = json!({ "minLength": 1, "maxLength": LONGEST_TAG });
-        let tags = json!({ "maxItems": MOST_TAGS, "uniqueItems": true, "items": tag });
-        let [name, notes] = [LONGEST_NAME, LONGEST_NOTES].map(|most| json!({ "maxLength": most }));
-        [(schema, "name", name), (schema, "notes", notes), (schema, "tags", tags)]
-    })
-}
-
-/// Returns the rules of a walk-forward backtest.
-fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let fields = [
-        ("periods_per_year", whole(&backtest::YEAR)),
-        ("window", whole(&HISTORY_LENGTH)),
-        ("every", whole(&HORIZON)),
-        ("horizon", whole(&HORIZON)),
-        ("alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
-        ("scale", within(RADIUS_SCALE)),
-        ("risk_aversion", within(RELATIVE_RISK_AVERSION)),
-        ("trading_cost", within(TRADING_COST)),
-        ("count", whole(&COUNT)),
-        ("log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
-        ("simple_returns", listed(&backtest::PERIODS, within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
-        ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
-    ];
-    fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule)).chain(walked_of_assets())
-}
-
-/// Returns the rules of a walk-forward backtest of several assets.
-fn walked_of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let rows = |bounds| listed(&backtest::PERIODS, listed(&ASSETS, within(bounds)));
-    let fields = [
-        ("assets", asset_names()),
-        ("log_returns", rows(backtest::bounds(false))),
-        ("simple_returns", rows(backtest::bounds(true))),
-        ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
-        ("periods_per_year", whole(&backtest::YEAR)),
-        ("windows", json!({ "minItems": 1, "maxItems": MOST_WINDOWS })),
-        ("every", whole(&(1..=*DATES.end()))),
-        ("alpha", within(backtest::ALPHA)),
-        ("risk_aversion", within(RELATIVE_RISK_AVERSION)),
-        ("trading_cost", within(TRADING_COST)),
-    ];
-    fields.into_iter().map(|(field, rule)| ("AssetsBacktestRequest", field, rule))
-}
-
-/// Returns the rule for the names of several assets.
-fn asset_names() -> Value {
-    let length = whole(&NAME_LENGTH);
-    let name = json!({ "minLength": length["minimum"], "maxLength": length["maximum"] });
-    let mut names = listed(&ASSETS, name);
-    names["uniqueItems"] = json!(true);
-    names
-}
-
-/// Returns the rules of a period's report, in every schema that has one.
-fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    ["Observe", "Correct", "Report", "WhatIf"].into_iter().flat_map(|schema| {
-        let of_assets = ["log_returns", "simple_returns", "prices", "previous_prices"];
-        let fields = [
-            ("log_return", within((-LOG_RETURN, LOG_RETURN))),
-            ("simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
-            ("price", within(PRICE)),
-            ("previous_price", within(PRICE)),
-            ("rate", within(RATE)),
-            ("flow", within((-WEALTH.1, WEALTH.1))),
-            ("log_returns", each(within((-LOG_RETURN, LOG_RETURN)))),
-            ("simple_returns", each(within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
-            ("prices", each(within(PRICE))),
-            ("previous_prices", each(within(PRICE))),
-            ("executed_allocation", within((0.0, 1.0))),
-            ("executed_allocations", each(within((0.0, 1.0)))),
-            ("wealth", within(WEALTH)),
-        ];
-        let described = fields.into_iter().filter(move |(field, _)| schema != "WhatIf" || of_assets.contains(field));
-        described.map(move |(field, rule)| (schema, field, rule))
-    })
-}
-
-fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
-    json!({ "minimum": range.start(), "maximum": range.end() })
-}
-
-fn listed(counts: &std::ops::RangeInclusive<usize>, items: Value) -> Value {
-    json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items })
-}
-
-/// Returns the rule for an object with a value for each asset, by its name.
-fn each(value: Value) -> Value {
-    json!({ "additionalProperties": value })
-}
-
-fn within((low, high): (f64, f64)) -> Value {
-    json!({ "minimum": low, "maximum": high })
+/// Returns the least and the most of a length, without an end that says nothing.
+fn lengths(names: [&str; 2], [least, most]: [usize; 2]) -> Map<String, Value> {
+    let ends = [(names[0], least, least > 0), (names[1], most, most < usize::MAX)];
+    ends.into_iter().filter(|(.., says)| *says).map(|(name, end, _)| (name.to_owned(), json!(end))).collect()
 }
 
 /// Changes the field, in `variant` or in every variant that has it.
@@ -397,16 +243,19 @@ mod tests {
     }
 
     #[test]
-    fn every_rule_is_of_a_field_there_is() {
+    fn every_bound_is_of_a_field_there_is() {
         let description = serde_json::to_value(router::description()).unwrap();
-        for (name, field, rule) in rules() {
-            let schema = &description["components"]["schemas"][name.split(' ').next().unwrap()];
+        for (name, fields) in schemas() {
+            let schema = &description["components"]["schemas"][&*name];
             let variants = schema["oneOf"].as_array().cloned().unwrap_or(vec![schema.clone()]);
-            let matching = variants.iter().filter(|variant| {
-                let property = &variant["properties"][field];
-                rule.as_object().unwrap().keys().all(|key| !property[key].is_null())
-            });
-            assert!(matching.count() > 0, "{name} does not describe {field}: {rule}");
+            for (field, bounds) in fields {
+                let (field, rule) = (field.split('.').next_back().unwrap(), as_schema(*bounds));
+                let matching = variants.iter().filter(|variant| {
+                    let property = &variant["properties"][field];
+                    rule.as_object().unwrap().keys().all(|key| !property[key].is_null())
+                });
+                assert!(matching.count() > 0, "{name} does not describe {field}: {rule}");
+            }
         }
         assert_eq!(description["components"]["schemas"]["Sweep"]["maxProperties"], 1);
         assert_eq!(description["components"]["schemas"]["Reports"]["oneOf"][1]["maxItems"], 1000);

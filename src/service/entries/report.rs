@@ -164,7 +164,7 @@ report_of!(Correct);
 
 /// Converts a simple return, named `field` in messages, to a log-return.
 pub(in crate::service) fn log_return_of(field: &str, simple_return: f64) -> Result<f64, FieldError> {
-    rules::within(field, simple_return, (-rules::LOG_RETURN).exp_m1(), rules::LOG_RETURN.exp_m1())?;
+    rules::within(field, simple_return, rules::SIMPLE_RETURN.0, rules::SIMPLE_RETURN.1)?;
     Ok(simple_return.ln_1p().clamp(-rules::LOG_RETURN, rules::LOG_RETURN))
 }
 

@@ -20,12 +20,14 @@ use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::assets::{AssetsProblem, DATES, check_names, check_rows};
-use crate::control::request::backtest::{ALPHA, defaults, too_long, usual_window};
+use crate::control::request::backtest::{defaults, too_long, usual_window};
+use crate::control::request::backtest_assets::MOST_WINDOWS;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::caution_rules::check_support;
 use crate::control::request::frequency::Frequency;
 use crate::control::request::frontier::asked_of;
 use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::radius_rules::ALPHA;
 use crate::control::request::rules::{RELATIVE_RISK_AVERSION, TRADING_COST, whole, within};
 use crate::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
 use crate::control::request::support::Support;
@@ -38,8 +40,6 @@ mod words;
 
 /// Lengths of the default windows in years, besides the window of all known returns.
 const WINDOW_YEARS: [usize; 2] = [10, 20];
-/// Most windows in a request.
-pub const MOST_WINDOWS: usize = 5;
 
 /// Returns of several assets and of the bank, period by period.
 #[derive(Debug, Clone, PartialEq)]
