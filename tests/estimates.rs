@@ -32,7 +32,7 @@ use serde_json::{Value, json};
 /// An estimate may be this many times what is taken. More would refuse what fits; less leaves no room for what the
 /// sizes in a request do not tell, as how long a search goes on.
 const GENEROSITY: f64 = 4.0;
-/// What every job is granted whatever it asks, in bytes: small jobs may be as generous as they like.
+/// Bytes that every job is granted whatever it asks: small jobs may be as generous as they like.
 const GRANTED: usize = 16 << 20;
 const THREADS: usize = 2;
 
@@ -141,7 +141,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
     frontiers();
 }
 
-/// What frontiers take: a long record of many assets, and many bridges. Every drawn record takes much the same, so that one is
+/// The memory of frontiers: a long record of many assets, and many bridges. Every drawn record takes much the same, so that one is
 /// enough.
 fn frontiers() {
     let assets: Vec<String> = (0..30).map(|asset| format!("asset {asset}")).collect();
@@ -171,7 +171,7 @@ fn frontiers() {
     }
 }
 
-/// What walk-forwards of several assets take: the bridges and steps of a long window, and the books of a long record.
+/// The memory of walk-forwards of several assets: the bridges and steps of a long window, and the books of a long record.
 fn walks_of_assets(pool: &TrainingPool) {
     let request = |assets: usize, dates: usize, window: usize| {
         let row = |date: usize| -> Vec<f64> {
@@ -207,7 +207,7 @@ fn walks_of_assets(pool: &TrainingPool) {
     holds("a record of several assets", estimated, peak);
 }
 
-/// What walk-forwards take: the trainings of a stretch side by side, and the books of a long record.
+/// The memory of walk-forwards: the trainings of a stretch side by side, and the books of a long record.
 fn walk_forwards(pool: &TrainingPool) {
     let request = |length: usize, count: usize, every: usize| {
         let request = json!({ "log_returns": history(length), "rate": 0.001, "periods_per_year": 4, "window": 24,
@@ -245,7 +245,7 @@ fn evaluation(mut request: Value) -> EvaluationRequest {
     serde_json::from_value::<EvaluationRequest>(request).unwrap().completed().unwrap()
 }
 
-/// What a prepared policy is weighed as, and a factor.
+/// The memory of a prepared policy, and of a factor.
 fn prepared(what: &str, policy: Policy) {
     let [factor, bridges, numbers] = estimate::advising_by(&policy).map(|part| part.bytes());
     // Those of the sample size and of the next.

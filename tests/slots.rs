@@ -16,7 +16,7 @@ mod changes;
 #[path = "../src/service/sessions/slots.rs"]
 mod slots;
 
-/// What they are compiled over.
+/// The primitives that they are compiled over.
 mod sync {
     pub use shuttle::sync::atomic::{AtomicU64, Ordering};
     pub use shuttle::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -64,7 +64,7 @@ const SEED: u64 = 13;
 const ROOM: Generation = Generation { slots: 1, weight: usize::MAX };
 const OWNED: &str = "owned";
 
-/// Whether a state is held against the store before it is used.
+/// The comparison of a state with the store before it is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Comparing {
     Heads,
@@ -86,7 +86,7 @@ struct Facts {
     comparing: Comparing,
 }
 
-/// What is in memory of it.
+/// The states in memory.
 struct Law {
     observed: usize,
     change: u64,

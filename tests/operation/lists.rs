@@ -18,7 +18,7 @@ const LIST: Duration = Duration::from_millis(100);
 const ACTION: Duration = Duration::from_millis(50);
 /// The limit of `/action` while a database on the same machine uses the processor for eight times as many lists.
 const ACTION_BESIDE_A_DATABASE: Duration = Duration::from_millis(200);
-/// What the lists may add to the process, in bytes.
+/// Bytes that the lists may add to the process.
 const MEMORY: u64 = 50 << 20;
 
 /// Returns the largest resident size since the last call, in bytes.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&str; 6] = ["numerics", "control", "returns", "store", "service", "http"];
 /// The place of `service` among them.
 const SERVICE: usize = 4;
-/// What lies behind the face of `control`, named by that floor alone: how a robust step is solved.
+/// Parts of `control` behind its face, which only that floor names: how a robust step is solved.
 const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
@@ -224,7 +224,7 @@ fn blank_comments_and_literals(text: &str) -> String {
     out
 }
 
-/// Where the comment or literal that starts at `at` ends; `at` itself where none starts.
+/// Returns where the comment or literal that starts at `at` ends; `at` itself if none starts.
 fn literal_end(letters: &[char], at: usize) -> usize {
     let rest = &letters[at..];
     let inside_word = at > 0 && is_word(letters[at - 1]);
@@ -566,6 +566,20 @@ fn the_source_keeps_the_rules_of_the_house() {
     let kept = sources.iter().filter(|source| !tests.contains(&source.path)).chain(&lab);
     let faults: Vec<String> = kept.flat_map(faults).collect();
     assert!(faults.is_empty(), "{} broken rules:\n{}", faults.len(), faults.join("\n"));
+}
+
+#[test]
+fn no_doc_comment_of_a_test_begins_without_a_subject() {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let (mut paths, mut read) = (Vec::new(), 0);
+    rust_files(&tests, &mut paths);
+    for path in paths {
+        for (line, comment) in openings(&fs::read_to_string(&path).unwrap()) {
+            assert_eq!(banned_opening(&comment), None, "{}:{line}: {comment}", path.display());
+            read += 1;
+        }
+    }
+    assert!(read > 500, "{read} doc comments");
 }
 
 #[test]

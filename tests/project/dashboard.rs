@@ -116,7 +116,7 @@ async fn the_page_of_the_interface_is_served_and_loads_nothing_from_elsewhere() 
     assert_eq!((status.as_u16(), &problem["value"]), (404, &"index.js".into()), "{problem}");
 }
 
-/// What the page sends where a call is tried: a job is queued, or the thing that the example names is not there.
+/// The page sends calls that are tried: a job is queued, or the thing that the example names is not there.
 #[tokio::test(flavor = "multi_thread")]
 async fn every_example_is_a_request_that_breaks_no_rule() {
     let app = App::start().await;

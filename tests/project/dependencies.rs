@@ -1,4 +1,4 @@
-//! What is built in: its licences, where it comes from, and that it is there once, as `deny.toml` has it.
+//! The packages that are built in: their licences, their registry, and that each is there once, as `deny.toml` has it.
 //!
 //! `cargo deny check` reads the same file and knows more; this needs nothing but cargo, so that it runs wherever the tests
 //! do. No database of advisories is asked.
@@ -18,7 +18,7 @@ fn list(name: &str) -> BTreeSet<&'static str> {
     inside.split('"').skip(1).step_by(2).collect()
 }
 
-/// What cargo knows of the packages that are built for Linux, and the identifiers of those in the binary itself.
+/// Returns cargo's list of the packages that are built for Linux, and the identifiers of those in the binary itself.
 fn packages() -> (Vec<Value>, BTreeSet<String>) {
     let arguments = ["metadata", "--locked", "--format-version", "1", "--filter-platform", "x86_64-unknown-linux-gnu"];
     let output = Command::new(env!("CARGO")).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
@@ -39,7 +39,7 @@ fn packages() -> (Vec<Value>, BTreeSet<String>) {
     (metadata["packages"].as_array().unwrap().clone(), built)
 }
 
-/// Whether an SPDX expression, or the older `A/B`, can be met by the licences allowed.
+/// Returns true if the allowed licences meet an SPDX expression, or the older `A/B`.
 fn is_allowed(expression: &str, allowed: &BTreeSet<&str>) -> bool {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::App;
 use reqwest::StatusCode;
 
-/// What stands between `before` and the next quotation mark, wherever it does.
+/// Returns every text between `before` and the next quotation mark.
 fn quoted(page: &str, before: &str) -> Vec<String> {
     page.split(before).skip(1).filter_map(|rest| rest.split('"').next().map(str::to_owned)).collect()
 }

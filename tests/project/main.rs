@@ -1,4 +1,4 @@
-//! What is written about the project, built into it and printed by it.
+//! The documents of the project, those built into it, and the texts that it prints.
 
 use ballast_test_support as support;
 

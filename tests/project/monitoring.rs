@@ -46,7 +46,7 @@ async fn keyless(app: &App) -> u16 {
     reqwest::get(format!("{}/jobs", app.url)).await.unwrap().status().as_u16()
 }
 
-/// What `/metrics` says after a training, an observation, an allocation and refusals, where a key is about to expire.
+/// The text of `/metrics` after a training, an observation, an allocation and refusals, with a key that is about to expire.
 async fn exposition() -> String {
     let mut app = App::start().await;
     app.train(&specification(2)).await;

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 const HISTORY: [f64; 8] = [0.021, -0.034, 0.052, 0.043, -0.008, 0.017, 0.029, -0.011];
 
-/// What `tests/evaluate_policy.py` makes of `request`.
+/// Returns the answer of `tests/evaluate_policy.py` to `request`.
 fn python(arguments: &[&str], request: &Value) -> Value {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/evaluate_policy.py");
     let mut command = Command::new(std::env::var("PYTHON").unwrap_or("python3".into()));

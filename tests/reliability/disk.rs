@@ -72,7 +72,7 @@ fn fill(folder: &Path) -> std::path::PathBuf {
     path
 }
 
-/// What the write-ahead log still has room for is taken; then 507, while reads are answered.
+/// Reports are recorded until the write-ahead log is full; then they get 507, and reads are answered.
 async fn refuses(caller: &Caller, session: &str) -> Result<(), String> {
     let started = Instant::now();
     for period in 1.. {

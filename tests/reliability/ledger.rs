@@ -1,4 +1,4 @@
-//! What a server acknowledged, and what another, started over the same facts, still knows of it.
+//! A ledger of what a server acknowledged, and a check that another server over the same facts still has it.
 
 use std::ops::AddAssign;
 
@@ -119,7 +119,7 @@ impl Session {
         Audit { acknowledged, lost: lost.min(acknowledged), doubled: kept.saturating_sub(most) }
     }
 
-    /// Whether a period's return is the one it was put right to last, where no other correction of it is under way.
+    /// Returns true if a period's return is that of its last correction, and no other correction of it is under way.
     fn stands(&self, row: &Value) -> bool {
         let of_period = |entry: &&Value| entry["period"] == row["period"];
         if self.pending.iter().filter(of_period).any(is_correction) {
@@ -141,7 +141,7 @@ fn is_correction(entry: &Value) -> bool {
     entry["correction"].is_u64()
 }
 
-/// Whether a stored row is the fact that an answer acknowledged.
+/// Returns true if a stored row is the fact that an answer acknowledged.
 pub fn says_the_same(row: &Value, answer: &Value) -> bool {
     ["period", "log_return", "wealth"].iter().all(|at| row[at] == answer[at])
 }

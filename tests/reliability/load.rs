@@ -98,7 +98,7 @@ impl Client {
         self.ledger
     }
 
-    /// Whether the answer has the status expected; any but "not now" instead is a complaint.
+    /// Returns true if the answer has the expected status; any other but "not now" is a complaint.
     fn expects(&mut self, expected: u16, what: &str, answer: &Option<Answer>) -> bool {
         match answer {
             Some((status, body)) if *status != expected && !matches!(status, 503 | 507) => {

@@ -45,7 +45,7 @@ pub enum Attack {
 }
 
 impl Attack {
-    /// Whether the attack has it that calls fail which nobody refused.
+    /// Returns true if calls fail under the attack although nobody refused them.
     pub fn fails_reads(self) -> bool {
         matches!(self, Attack::Intrude)
     }

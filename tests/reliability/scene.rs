@@ -1,4 +1,4 @@
-//! What every fault befalls: a policy, sessions by it, trainings; and the count of what came of it.
+//! The scene of every fault: a policy, its sessions and trainings, and the count of what came of it.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -18,7 +18,7 @@ pub const HORIZON: usize = 50;
 /// A server with an intact folder is ready this soon.
 const READY: Duration = Duration::from_secs(2);
 
-/// What came of a row; nothing where this machine cannot make the fault.
+/// The result of a row; `None` if this machine cannot make the fault.
 pub type Outcome = Result<Option<Tally>, String>;
 
 /// A small training, with a radius at which the advice is not always to stay in the bank.
@@ -50,7 +50,7 @@ pub async fn import(caller: &Caller) -> String {
     imported["policy"].as_str().unwrap().to_owned()
 }
 
-/// What was done, and what came of it.
+/// The fault, and its result.
 #[derive(Default)]
 pub struct Tally {
     pub trials: usize,
@@ -63,7 +63,7 @@ pub struct Tally {
     /// The slowest start.
     pub ready: Duration,
     pub complaints: Vec<String>,
-    /// What a reader of the row should know.
+    /// A note for readers of the row.
     pub note: String,
 }
 

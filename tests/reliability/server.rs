@@ -16,7 +16,7 @@ use crate::support::process::try_serve;
 const PATIENCE: Duration = Duration::from_secs(30);
 const POLL: Duration = Duration::from_millis(2);
 
-/// Where a server keeps its facts, and what every server started here said on standard error.
+/// The place of a server's facts, and what every server started here wrote to standard error.
 pub struct Site {
     folder: TempDir,
     arguments: Vec<String>,
@@ -90,7 +90,7 @@ impl Site {
         self.log_text().lines().last().unwrap_or("said nothing").to_owned()
     }
 
-    /// What the servers started here said of panics.
+    /// Returns what the servers started here wrote about panics.
     pub fn panics(&self) -> Vec<String> {
         let text = self.log_text();
         let lines: Vec<&str> = text.lines().collect();
@@ -98,7 +98,7 @@ impl Site {
         panics.map(|at| lines[at..lines.len().min(at + 2)].join(" ")).collect()
     }
 
-    /// What SQLite says of the file: `ok`, or its complaints.
+    /// Returns what SQLite says of the file: `ok`, or its complaints.
     pub async fn integrity(&self) -> String {
         let options = SqliteConnectOptions::new().filename(self.data().join("ballast.sqlite")).read_only(true);
         let checking = async {
@@ -149,7 +149,7 @@ impl Server {
         })
     }
 
-    /// Whether it is the process that was started.
+    /// Returns true if the process that was started still runs.
     pub fn lives(&mut self) -> bool {
         self.child.try_wait().unwrap().is_none()
     }

@@ -111,7 +111,7 @@ fn one_answer_each(pests: &[Pest], rows: &[Value]) -> Audit {
     Audit { acknowledged: answers.len(), lost, doubled }
 }
 
-/// What the server has of a session.
+/// The rows that the server has of a session.
 async fn rows(caller: &Caller, name: &str) -> Result<Vec<Value>, String> {
     let rows = Session::opened(name.to_owned()).rows(caller).await;
     rows.map(|(rows, _)| rows).ok_or(format!("no rows of {name}"))

@@ -1,4 +1,4 @@
-//! What a period reports beside its return, and what is put right afterwards: a session is what its reports as they stand make
+//! Reports of more than a return, and corrections: a session is what its reports as they stand make
 //! of it, whatever was reported first.
 
 use crate::support::values::number;

@@ -268,7 +268,7 @@ async fn holdings_and_a_trading_cost_of_several_assets_are_known() {
     }
 }
 
-/// What is told to be held without a crash is the advice under a floor at the lowest return seen, asked for by itself; and the
+/// The share without a crash is the advice under a floor at the lowest return seen, asked for by itself; and the
 /// crash is most of what keeps power utility from a record that pays.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_crash_is_what_a_floor_at_the_lowest_return_takes_away() {

@@ -169,7 +169,7 @@ fn described_fields() -> BTreeSet<String> {
     fields
 }
 
-/// What a policy holds of levels, with this share of the radius.
+/// The levels of a policy, with this share of the radius.
 fn found_levels(scale: f64) -> Value {
     let level = json!({ "scale": scale, "standard_error": 0.0, "regrets": [0.0, 0.0, 0.0], "spared": 0.0 });
     json!({ "premiums": [0.0, 0.001, 0.002], "premium_seen": 0.001, "standard_error": 0.001,
@@ -211,8 +211,8 @@ async fn every_field_out_of_range_is_named() {
     }
 }
 
-/// What the rules refuse the description refuses, but for what is decided together: by two fields, by which end of a range it is, or
-/// by what takes such a range.
+/// The description refuses what the rules of single fields refuse. It leaves out rules of two fields, of an end of a range, and of
+/// what takes such a range.
 #[test]
 fn the_description_is_as_strict_as_the_rules_of_single_fields() {
     let description: Value = serde_json::from_str(include_str!("../../api/openapi.json")).unwrap();
@@ -248,7 +248,7 @@ const DECIDED_TOGETHER: [&str; 21] = [
     "surrogate.bounds.signal_variance[1]",
 ];
 
-/// Whether a value fits a schema, by the keywords that the description has.
+/// Returns true if a value fits a schema, by the keywords that the description has.
 fn fits(value: &Value, schema: &Value, schemas: &Value) -> bool {
     let fits = |value: &Value, schema: &Value| fits(value, schema, schemas);
     let is = |kind: &str| match kind {
@@ -334,7 +334,7 @@ async fn bodies_that_are_not_json_are_refused() {
     assert_eq!(large.1["rule"], "must hold at most 1048576 bytes");
 }
 
-/// What an observation can get wrong: the body without session and period, the status and the field.
+/// The faults of an observation: the body without session and period, the status and the field.
 fn faulty_reports() -> Vec<(&'static str, u16, &'static str)> {
     vec![
         (r#""period": 1, "log_return": NaN"#, 400, "log_return"),
@@ -374,7 +374,7 @@ fn faulty_reports() -> Vec<(&'static str, u16, &'static str)> {
     ]
 }
 
-/// What opening a session can get wrong, besides its policy.
+/// The faults of an opening, besides its policy.
 fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
     vec![
         (r#""wealth": 0"#, "wealth"),
@@ -404,7 +404,7 @@ fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
     ]
 }
 
-/// What a hypothesis can get wrong, and the field it is answered with.
+/// The faults of a hypothesis, and the field that the answer names.
 fn faulty_hypotheses() -> Vec<(&'static str, &'static str)> {
     vec![
         (r#""wealth": 0"#, "wealth"),

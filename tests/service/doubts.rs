@@ -1,4 +1,4 @@
-//! What is doubted in a report is named at once and recorded only with `confirm`; a skipped period is put in, and a wrong one
+//! A report names all its doubts at once and is recorded only with `confirm`; a skipped period is put in, and a wrong one
 //! taken out, by a correction. Over either store.
 
 use crate::support::{App, several_assets, specification};
@@ -25,7 +25,7 @@ async fn recorded(app: &App, period: usize, report: Value) -> Value {
     observed
 }
 
-/// What a report is asked about: the reasons, and the answer.
+/// The doubts about a report: the reasons, and the answer.
 async fn doubted(app: &App, period: usize, report: Value) -> (Vec<String>, Value) {
     let (status, problem) = app.report(period, report).await;
     assert_eq!((status, &problem["type"]), (StatusCode::CONFLICT, &json!("/problems/unconfirmed")), "{problem}");

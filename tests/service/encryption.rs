@@ -1,4 +1,4 @@
-//! What goes over a wire is encrypted, and with whom it is spoken is known.
+//! Connections are encrypted, and each side knows whom it speaks to.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! What more or less caution would cost on records like the one at hand: `POST /frontier` and the library behind it.
+//! The cost of more or less caution on records like the one at hand: `POST /frontier` and the library behind it.
 
 use crate::support::App;
 use ballast::control::cache::Cache;

@@ -219,7 +219,7 @@ async fn a_session_of_several_assets_is_renewed_by_itself(mut app: App) {
     assert_eq!(app.action().await.0, 200);
 }
 
-/// What the periods of an account make of it: `x' = x (1 - c sum_i |a_i - h_i|) ((1 - sum_i a_i)(1 + r) + sum_i a_i e^(z_i)) + C`.
+/// The periods of an account: `x' = x (1 - c sum_i |a_i - h_i|) ((1 - sum_i a_i)(1 + r) + sum_i a_i e^(z_i)) + C`.
 async fn money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_formula(mut app: App) {
     const COST: f64 = 0.002;
     let mut training = request(4);
@@ -390,7 +390,7 @@ async fn what_is_wrong_of_several_assets_is_named() {
     assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("log_returns")), "{problem}");
 }
 
-/// Of columns that are all one asset the fund is that asset: its factor is 1, and its policy the policy of one asset whose
+/// If all columns are one asset, the fund is that asset: its factor is 1, and its policy the policy of one asset whose
 /// laws start resampled.
 #[test]
 fn identical_columns_are_one_asset() {
@@ -446,7 +446,7 @@ fn what_is_traded_within_the_fund_is_paid_for() {
     assert!((start.next_state(dynamics, &realised).wealth - 99.8).abs() < 1e-12);
 }
 
-/// Where the adversary puts the coming log-return of the fund held, of which a date is drawn.
+/// Returns the coming log-return where the adversary puts it for the fund held; its date is drawn.
 fn adversarial(name: &str, returns: &[f64], drawn: usize, radius: f64) -> f64 {
     let lowest = (0..returns.len()).min_by(|&a, &b| returns[a].total_cmp(&returns[b])).unwrap();
     match name {

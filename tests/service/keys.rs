@@ -11,7 +11,7 @@ use reqwest::header::{AUTHORIZATION, WWW_AUTHENTICATE};
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 
-/// What a service with keys answers without one.
+/// The routes that a service with keys answers without one.
 const OPEN: [&str; 9] = [
     "/",
     "/dashboard/{file}",
@@ -342,7 +342,7 @@ async fn keys_are_made_and_revoked_while_the_service_runs() {
     assert!(code == Some(2) && stderr.contains("letters, digits"), "{stderr}");
 }
 
-/// What a key is told when it is shown: the status and the problem.
+/// The answer to a key: the status and the problem.
 async fn shown(app: &mut App, key: &str) -> (StatusCode, Value) {
     app.hold(key);
     app.get("/jobs").await

@@ -1,4 +1,4 @@
-//! What policies and sessions are called: said when they are made, changed later, and no part of what they are.
+//! Labels of policies and sessions: given when they are made, changed later, and no part of what they are.
 
 use crate::support::{App, postgres, specification};
 use ballast::service::process::config::StoreLocation;

@@ -29,7 +29,7 @@ const FAULTS: usize = 10;
 /// Between two faults, and how long one lasts.
 const SOUND: Duration = Duration::from_millis(25);
 const FAULTY: Duration = Duration::from_millis(4);
-/// Where faults come from.
+/// The place that a fault comes from.
 #[derive(Clone)]
 enum Outside {
     /// The database file of a folder.

@@ -290,7 +290,7 @@ async fn what_cannot_be_asked_is_named() {
 const SESSIONS: usize = 10_000;
 /// Every hundredth has reported a period, of long ago.
 const LATE: usize = 100;
-/// Of an overview of so many sessions.
+/// Limit on the time of an overview of so many sessions.
 const OVERVIEW: Duration = Duration::from_millis(300);
 
 /// Ten thousand sessions with a name and a tag each.

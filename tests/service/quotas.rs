@@ -1,4 +1,4 @@
-//! What a tenant keeps is bounded, and what nobody needs goes.
+//! The bytes of a tenant are bounded, and unused ones are freed.
 
 use std::time::Duration;
 

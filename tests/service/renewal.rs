@@ -52,7 +52,7 @@ fn record(observed: usize, window: usize) -> Vec<f64> {
     seen[seen.len().saturating_sub(window)..].to_vec()
 }
 
-/// What the library's policy of `request`, trained on `history` alone, advises in a state that has seen `lived` since.
+/// Returns the advice of the library's policy of `request`, trained on `history` alone, in a state that has seen `lived` since.
 fn advised(request: &Value, history: &[f64], lived: &[f64], wealth: f64) -> f64 {
     let mut request = request.clone();
     request["problem"]["history"] = json!(history);

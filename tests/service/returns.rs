@@ -30,7 +30,7 @@ fn close(found: &Value, percent: &Value, of: impl Fn(f64) -> f64) -> bool {
         && found.iter().zip(percent).all(|(found, percent)| (100.0 * of(*found) - percent).abs() < 1e-9)
 }
 
-/// What a row says of a record, an answer of the service.
+/// The part of the service's answer that a row compares.
 fn check_record(row: &Value, found: &Value) {
     let sentence = found["sentence"].as_str().unwrap();
     assert!(sentence.starts_with(row["says"].as_str().unwrap()), "{row}\n{sentence}");
@@ -191,7 +191,7 @@ fn months(of: impl Fn(f64) -> f64, count: usize) -> Vec<String> {
     cells.windows(count).step_by(count / 3).map(|window| window.join(" ")).collect()
 }
 
-/// What few numbers average tells little of what they are: of stocks as fractions few runs are asked about, of a calm fund in
+/// The average of few numbers says little about their unit. Few runs of stocks as fractions are asked about, and most of a calm fund in
 /// percent (0.05 % a month, give or take 0.04 %) most.
 #[test]
 fn short_runs_are_asked_about_where_they_may_be_percent_and_seldom_elsewhere() {

@@ -1,4 +1,4 @@
-//! What a search of sessions finds: beginnings of words.
+//! A search of sessions finds the beginnings of words.
 
 use crate::support::{App, specification};
 use reqwest::{Method, Url};

@@ -12,7 +12,7 @@ use serde_json::json;
 const EXPLAINS: usize = 32;
 const LONG: usize = 20_000;
 const SHORT: usize = 3_000;
-/// Of the time that another's call takes alone.
+/// Largest multiple of the time that another's call takes alone.
 const AT_MOST: u32 = 3;
 const ROUNDS: usize = 9;
 /// Other tests may take the processors through one of so many tries; a queue would not grow short for one.

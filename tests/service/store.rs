@@ -692,7 +692,7 @@ async fn a_file_that_is_no_database_is_fatal() {
     assert!(refused.is_fatal(), "{refused:?}");
 }
 
-/// Of a log with a damaged page SQLite drops every commit from there on, without a word.
+/// SQLite silently drops every commit of a log from a damaged page on.
 #[tokio::test]
 async fn a_damaged_log_is_refused_and_a_sound_one_is_not() {
     const LOG: &str = "ballast.sqlite-wal";

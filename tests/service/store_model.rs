@@ -18,7 +18,7 @@ const LENGTH: usize = 60;
 const LEASE_MS: i64 = 10_000;
 const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 0, audit_entries: 0 };
 const TENANTS: u8 = 3;
-/// What a row takes beside what it holds, and what an entry of a session takes.
+/// Bytes of a row beside its contents, and of an entry of a session.
 const ROW: i64 = 1024;
 const ENTRY: i64 = 1536;
 

@@ -13,7 +13,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 const CASES: u32 = 24;
 const TENANTS: usize = 5;
 
-/// What happens before and between claims.
+/// Events before and between claims.
 #[derive(Debug, Clone)]
 enum Event {
     /// A tenant queues so many jobs.
@@ -92,7 +92,7 @@ async fn waits(place: &Place, before: &[Event], after: &[Event]) -> usize {
 
 const TABLES: &str = "jobs, job_requests, turns, usage, idempotency_keys, checkpoints, job_reports";
 
-/// What happens before a job is queued, and after.
+/// Events before a job is queued, and after.
 fn events() -> impl Strategy<Value = (Vec<Event>, Vec<Event>)> {
     let events = || proptest::collection::vec(event(), 0..30);
     (events(), events())

@@ -11,7 +11,7 @@ use ballast::control::request::specification::Specification;
 use ballast::control::surrogate::design::Design;
 use serde_json::{Value, json};
 
-/// Of one period after another, whose last step is solved at any history of twenty returns.
+/// A request whose last step is solved at any history of twenty returns.
 fn request(horizon: usize, accuracy: f64, seed: u64) -> Value {
     let history: Vec<f64> = (0..20).map(|k| 0.01 + 0.05 * (1.7 * f64::from(k)).sin()).collect();
     json!({ "problem": { "horizon": horizon, "rate_per_step": 0.002, "history": history,

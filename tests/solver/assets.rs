@@ -531,7 +531,7 @@ fn the_joint_factor_of_independent_assets_errs_low() {
     assert!(among / together < 1.05, "{together} {among}");
 }
 
-/// Where trading costs, by all that a search for something better tries: what is held, everything sold, what is best without the
+/// If trading costs, a search tries everything that might be better: the holdings, everything sold, the optimum without the
 /// cost, ways between them, and many allocations near the one found and far from it. Over laws, norms, costs and holdings drawn.
 #[test]
 fn holdings_and_a_cost_are_best_by_direct_search() {

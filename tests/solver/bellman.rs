@@ -139,7 +139,7 @@ fn a_certified_value_is_that_over_all_returns_where_steps_follow() {
     }
 }
 
-/// What is held after a crash is worth next to nothing, and selling it costs a share of that.
+/// A holding after a crash is worth next to nothing, and selling it costs a share of that.
 #[test]
 fn a_certificate_goes_down_to_a_total_loss_where_trading_costs() {
     let request = |cost: f64, radius: f64| {

@@ -1,4 +1,4 @@
-//! What the ball is centred on: `problem.centre`.
+//! The centre of the ball: `problem.centre`.
 
 use crate::support::App;
 use crate::support::policies::{advisor, specification, train};
@@ -241,7 +241,7 @@ fn the_value_of_a_centre_is_that_of_steps_in_each_other() {
     }
 }
 
-/// What a session of the service answers along its periods, corrected on the way, exported and explained, is what the policy says in
+/// A session answers along its periods, corrected on the way, exported and explained, as the policy does in
 /// memory.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_of_any_centre_equals_the_simulator_through_a_correction_and_an_export() {

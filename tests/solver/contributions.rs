@@ -22,7 +22,7 @@ fn advice(solved: &Advisor, wealth: f64, holding: f64) -> Advice {
     solved.advise(0, &start(solved, wealth, holding), AdviceMode::Surrogate)
 }
 
-/// What is withdrawn can be put aside in the bank at the start, and nothing that is held beside it is worth less for that: the
+/// Withdrawals can be put aside in the bank at the start, and nothing that is held beside them is worth less for that: the
 /// problem is that of the wealth which is left, whatever the law, the utility and the framework.
 #[test]
 fn withdrawals_are_as_good_as_put_aside_at_the_start() {

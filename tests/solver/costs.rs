@@ -131,7 +131,7 @@ fn inside_the_band_nothing_is_traded_and_from_outside_no_more_than_to_its_nearer
     assert_eq!(between, 2, "log utility holds all there is; of the others the band lies between the bounds");
 }
 
-/// What holding an action is worth, tried one by one, is most where the band sends the holding.
+/// An action is worth most, tried one by one, at the end of the band to which the holding is brought.
 #[test]
 fn no_other_action_is_worth_more_than_the_one_advised() {
     use ballast::control::bellman::BellmanStep;
@@ -168,7 +168,7 @@ fn the_floor_is_selling_everything_and_never_undercut() {
     }
 }
 
-/// What is read off the policy is what is solved anew, of any holding, also of one beyond the highest action.
+/// The policy answers any holding as a step that is solved anew, also a holding above the highest action.
 #[test]
 fn what_is_read_off_the_policy_is_what_is_solved_anew() {
     // Keeping everything looks best in the window of returns that is wide enough for half of it.

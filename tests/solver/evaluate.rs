@@ -283,7 +283,7 @@ fn differences_are_paired() {
     assert!(pair.high - pair.low < 0.5 * (alone.high - alone.low), "{pair:?} {alone:?}");
 }
 
-/// Of 100 paths of four periods a known part holds nothing, and a known part is solved anew, another of each framework.
+/// A known part of 100 paths of four periods holds nothing, and a known part is solved anew, another for each framework.
 #[test]
 fn what_was_lived_is_told_period_by_period() {
     let (evaluation, followers, mut outcomes) = simulated(small(json!({ "frameworks": ["adaptive", "plug_in"] })));

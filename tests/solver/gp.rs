@@ -196,7 +196,7 @@ fn fit(
     fit::fit(inputs, &[targets.to_vec()], bounds, start, &AtomicBool::new(false))
 }
 
-/// Of one function of the inputs.
+/// Returns the likelihood of one function of the inputs.
 fn one_likelihood(inputs: &DMatrix<f64>, targets: &[f64], hyper: &Hyperparameters) -> Option<(f64, Vec<f64>)> {
     log_likelihood_and_gradient(inputs, &[targets.to_vec()], hyper)
 }

@@ -39,7 +39,7 @@ async fn advise(app: &App, question: &Value) -> Value {
     advised
 }
 
-/// What would be advised of other records, at the correction of the radius that is found of the problem's own.
+/// Returns the advice for other records, with the correction of the radius that belongs to the problem's own record.
 fn by_record(problem: &Value) -> impl Fn(&[f64]) -> f64 {
     let own: ProblemSpecification = serde_json::from_value(problem.clone()).unwrap();
     let own = ProblemSpecification { horizon: 1, ..own };

@@ -14,7 +14,7 @@ use ballast::control::surrogate::design::Design;
 use serde_json::{Value, json};
 
 const BASIS_POINTS: f64 = 1e4;
-/// Of the fresh states: another than the design's.
+/// Seed of the fresh states, another than that of the design.
 const FRESH_SEED: u64 = 1_000_003;
 /// Fresh states of the last step, and of the step before, whose truth takes hundreds of solves each.
 const LAST: usize = 400;
@@ -41,7 +41,7 @@ fn fresh_states(step: usize, count: usize) -> Vec<State> {
 
 static TRAINED: LazyLock<Advisor> = LazyLock::new(|| advisor(request(1, 150)));
 
-/// What an advice is off by at a fresh state, in basis points.
+/// The error of an advice at a fresh state, in basis points.
 struct Judged {
     error: f64,
     regret: f64,
