@@ -13,8 +13,8 @@ use tokio::task::JoinHandle;
 use tokio_rustls::TlsAcceptor;
 
 use crate::http::connection::connection_table::{ConnectionLimits, Connections};
-use crate::http::connection::listener::{Door, Manners};
-use crate::http::connection::timed_stream::Patience;
+use crate::http::connection::listener::{ConnectionSettings, Listener};
+use crate::http::connection::timed_stream::ClientLimits;
 use crate::http::connection::tls::{Certificate, TlsError};
 use crate::http::gate::telemetry;
 use crate::http::router;
@@ -116,27 +116,29 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<RunningServer, Serv
     }
     let certificate = config.tls.clone().map(Certificate::load).transpose()?;
     let encryption = certificate.as_ref().map(Certificate::acceptor).transpose()?;
-    let door_at = async |address| Door::at(address).await.map_err(|source| ServeError::Listen { address, source });
-    let door = door_at(config.listen).await?;
-    let back_door = match config.operations_listen {
-        Some(address) => Some(door_at(address).await?),
+    let listen_at =
+        async |address| Listener::at(address).await.map_err(|source| ServeError::Listen { address, source });
+    let listener = listen_at(config.listen).await?;
+    let operators = match config.operations_listen {
+        Some(address) => Some(listen_at(address).await?),
         None => None,
     };
-    let (address, operations) = (door.address, back_door.as_ref().map(|door| door.address));
-    let starting = manners(router::starting(), bounds(&config), &config, &encryption);
+    let (address, operations) = (listener.address, operators.as_ref().map(|listener| listener.address));
+    let starting = settings(router::starting(), bounds(&config), &config, &encryption);
     let service = tokio::select! {
         service = Service::start(&config, Clock::system(), shutdown.clone()) => service?,
         // Another process's migration may take minutes, and probes come in meanwhile.
-        _ = open((&door, starting.clone()), back_door.as_ref().map(|door| (door, starting)), &shutdown) => {
+        _ = open((&listener, starting.clone()), operators.as_ref().map(|listener| (listener, starting)), &shutdown) => {
             return Err(ServeError::Stopped);
         }
     };
     let scheme = if encryption.is_some() { "https" } else { "http" };
     tracing::info!(%address, scheme, store = %config.store, role = ?config.role, "listening");
-    let front = manners(router::application(service.clone(), &config), bounds(&config), &config, &encryption);
-    let back = manners(router::for_operators(service.clone(), &config), OPERATORS_BOUNDS, &config, &encryption);
-    let doors = Doors { front: (door, front), back: back_door.map(|door| (door, back)), certificate };
-    let task = tokio::spawn(doors.run(service.clone(), config.drain));
+    let front = settings(router::application(service.clone(), &config), bounds(&config), &config, &encryption);
+    let back = settings(router::for_operators(service.clone(), &config), OPERATORS_BOUNDS, &config, &encryption);
+    let listeners =
+        Listeners { front: (listener, front), back: operators.map(|listener| (listener, back)), certificate };
+    let task = tokio::spawn(listeners.run(service.clone(), config.drain));
     Ok(RunningServer { address, operations, scheme, service, task })
 }
 
@@ -153,13 +155,13 @@ fn bounds(config: &Config) -> ConnectionLimits {
     ConnectionLimits { all, of_address, for_probes: PROBES }
 }
 
-fn manners(
+fn settings(
     application: Router,
     bounds: ConnectionLimits,
     config: &Config,
     encryption: &Option<TlsAcceptor>,
-) -> Manners {
-    let patience = Patience {
+) -> ConnectionSettings {
+    let limits = ClientLimits {
         to_read: READER_TIMEOUT,
         for_head: HEADER_TIMEOUT,
         between: BETWEEN_REQUESTS,
@@ -169,15 +171,19 @@ fn manners(
         requests: LARGEST_REQUESTS,
         age: LARGEST_AGE,
     };
-    Manners { application, connections: Connections::new(bounds), patience, encryption: encryption.clone() }
+    ConnectionSettings { application, connections: Connections::new(bounds), limits, encryption: encryption.clone() }
 }
 
 /// Accepts connections on both listeners until the shutdown begins, and returns the handle that ends them.
-async fn open(front: (&Door, Manners), back: Option<(&Door, Manners)>, shutdown: &Shutdown) -> GracefulShutdown {
+async fn open(
+    front: (&Listener, ConnectionSettings),
+    back: Option<(&Listener, ConnectionSettings)>,
+    shutdown: &Shutdown,
+) -> GracefulShutdown {
     let stopping = GracefulShutdown::new();
     let behind = async {
-        if let Some((door, manners)) = back {
-            door.open(manners, shutdown, &stopping).await;
+        if let Some((listener, settings)) = back {
+            listener.open(settings, shutdown, &stopping).await;
         }
     };
     tokio::join!(front.0.open(front.1, shutdown, &stopping), behind);
@@ -185,20 +191,23 @@ async fn open(front: (&Door, Manners), back: Option<(&Door, Manners)>, shutdown:
 }
 
 /// The listeners and the certificate of the server.
-struct Doors {
-    front: (Door, Manners),
-    back: Option<(Door, Manners)>,
+struct Listeners {
+    front: (Listener, ConnectionSettings),
+    back: Option<(Listener, ConnectionSettings)>,
     certificate: Option<Arc<Certificate>>,
 }
 
-impl Doors {
+impl Listeners {
     async fn run(self, service: Arc<Service>, drain: Duration) {
         let upkeep = tokio::spawn(telemetry::keep_up(self.front.1.connections.clone()));
         let fresh = self.certificate.map(|certificate| tokio::spawn(certificate.keep_fresh()));
-        let ((front, manners), back) = (self.front, self.back);
-        let stopping =
-            open((&front, manners), back.as_ref().map(|(door, manners)| (door, manners.clone())), &service.shutdown)
-                .await;
+        let ((front, settings), back) = (self.front, self.back);
+        let stopping = open(
+            (&front, settings),
+            back.as_ref().map(|(listener, settings)| (listener, settings.clone())),
+            &service.shutdown,
+        )
+        .await;
         drop((front, back));
         tracing::info!("stopping: draining connections");
         if tokio::time::timeout(drain, stopping.shutdown()).await.is_err() {

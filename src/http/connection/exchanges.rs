@@ -23,7 +23,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tower::Service;
 
 use crate::http::connection::connection_table::{AllowedRequests, ConnectionGuard, ConnectionPhase, TrackedConnection};
-use crate::http::connection::timed_stream::{Patience, Patient};
+use crate::http::connection::timed_stream::{ClientLimits, TimedStream};
 use crate::http::problem::{ProblemDocument, ProblemKind};
 use crate::service::process::shutdown::Shutdown;
 
@@ -58,7 +58,7 @@ pub async fn hold<S>(
     stream: S,
     held: &ConnectionGuard,
     local: SocketAddr,
-    patience: Patience,
+    limits: ClientLimits,
     application: Router,
     stopping: Stopping,
 ) where
@@ -68,9 +68,9 @@ pub async fn hold<S>(
     let shutdown = stopping.shutdown.clone();
     let service = service_fn(move |request| {
         let leaving = shutdown.clone();
-        answer((connection.clone(), leaving), local, patience, application.clone(), request)
+        answer((connection.clone(), leaving), local, limits, application.clone(), request)
     });
-    let stream = TokioIo::new(Patient::new(stream, patience, held.connection.clone()));
+    let stream = TokioIo::new(TimedStream::new(stream, limits, held.connection.clone()));
     let serving = http1::Builder::new()
         .timer(TokioTimer::new())
         // The stream has timeouts of its own, which distinguish a head under way from an idle connection.
@@ -99,7 +99,7 @@ async fn unused_at_the_end(shutdown: &Shutdown, connection: &TrackedConnection) 
 async fn answer(
     (connection, shutdown): (Arc<TrackedConnection>, Shutdown),
     local: SocketAddr,
-    patience: Patience,
+    limits: ClientLimits,
     mut application: Router,
     request: hyper::Request<Incoming>,
 ) -> Result<Response, GaveWay> {
@@ -124,11 +124,11 @@ async fn answer(
     if !is_whole {
         connection.leave();
     }
-    let is_old = connection.requests() >= patience.requests || connection.age() >= patience.age;
+    let is_old = connection.requests() >= limits.requests || connection.age() >= limits.age;
     if !is_whole || is_old || shutdown.is_announced() || connection.place == AllowedRequests::Probes {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     } else {
-        let keep_alive = HeaderValue::from_str(&format!("timeout={}", patience.between.as_secs()));
+        let keep_alive = HeaderValue::from_str(&format!("timeout={}", limits.between.as_secs()));
         response.headers_mut().insert("keep-alive", keep_alive.unwrap_or(HeaderValue::from_static("timeout=1")));
     }
     if response.headers().get(header::CONTENT_TYPE).is_some_and(|media| media == "text/event-stream") {
@@ -247,14 +247,21 @@ mod tests {
     /// Returns the client's end of a connection that closes after so many requests, or at this age.
     fn connection(requests: u64, age: Duration) -> DuplexStream {
         let (here, there) = tokio::io::duplex(4096);
-        let patience =
-            Patience { to_read: LONG, for_head: LONG, between: LONG, to_finish: LONG, left_bytes: 64, requests, age };
+        let limits = ClientLimits {
+            to_read: LONG,
+            for_head: LONG,
+            between: LONG,
+            to_finish: LONG,
+            left_bytes: 64,
+            requests,
+            age,
+        };
         tokio::spawn(async move {
             let connections = Connections::new(ConnectionLimits { all: 1, of_address: 1, for_probes: 0 });
             let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
             let graceful = GracefulShutdown::new();
             let stopping = Stopping { shutdown: Shutdown::new(), watcher: graceful.watcher() };
-            hold(here, &held, (Ipv4Addr::LOCALHOST, 1).into(), patience, Router::new(), stopping).await;
+            hold(here, &held, (Ipv4Addr::LOCALHOST, 1).into(), limits, Router::new(), stopping).await;
         });
         there
     }

@@ -14,7 +14,7 @@ use tokio_rustls::TlsAcceptor;
 
 use crate::http::connection::connection_table::{ConnectionGuard, Connections};
 use crate::http::connection::exchanges::{self, Stopping};
-use crate::http::connection::timed_stream::Patience;
+use crate::http::connection::timed_stream::ClientLimits;
 use crate::service::metrics::CONNECTIONS_REFUSED;
 use crate::service::process::shutdown::Shutdown;
 
@@ -24,51 +24,51 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 const NO_PLACE: &[u8] =
     b"HTTP/1.1 503 Service Unavailable\r\nretry-after: 1\r\nconnection: close\r\ncontent-length: 0\r\n\r\n";
 
-pub struct Door {
+pub struct Listener {
     pub address: SocketAddr,
-    listener: TcpListener,
+    socket: TcpListener,
 }
 
 /// Settings for accepted connections.
 #[derive(Clone)]
-pub struct Manners {
+pub struct ConnectionSettings {
     pub application: Router,
     pub connections: Arc<Connections>,
-    pub patience: Patience,
+    pub limits: ClientLimits,
     /// `None` if connections are not encrypted.
     pub encryption: Option<TlsAcceptor>,
 }
 
-impl Door {
+impl Listener {
     /// Binds to the address.
     ///
     /// # Errors
     /// The address is in use, or is not one of this machine.
     pub async fn at(address: SocketAddr) -> io::Result<Self> {
-        let listener = TcpListener::bind(address).await?;
-        Ok(Door { address: listener.local_addr()?, listener })
+        let socket = TcpListener::bind(address).await?;
+        Ok(Listener { address: socket.local_addr()?, socket })
     }
 
     /// Accepts connections until the shutdown begins.
-    pub async fn open(&self, manners: Manners, shutdown: &Shutdown, stopping: &GracefulShutdown) {
+    pub async fn open(&self, settings: ConnectionSettings, shutdown: &Shutdown, stopping: &GracefulShutdown) {
         loop {
             let accepted = tokio::select! {
-                accepted = self.listener.accept() => accepted,
+                accepted = self.socket.accept() => accepted,
                 () = shutdown.begun() => return,
             };
             let Ok((stream, caller)) = accepted else {
                 tokio::time::sleep(ACCEPT_PAUSE).await;
                 continue;
             };
-            match manners.connections.place(caller.ip()) {
+            match settings.connections.place(caller.ip()) {
                 Some(held) => {
                     let stopping = Stopping { shutdown: shutdown.clone(), watcher: stopping.watcher() };
-                    tokio::spawn(let_in(stream, held, manners.clone(), stopping));
+                    tokio::spawn(serve_connection(stream, held, settings.clone(), stopping));
                 }
                 None => {
                     metrics::counter!(CONNECTIONS_REFUSED).increment(1);
                     // A TLS client could not read it. If the write fails, the client is gone.
-                    if manners.encryption.is_none() {
+                    if settings.encryption.is_none() {
                         let _ = stream.try_write(NO_PLACE);
                     }
                 }
@@ -77,18 +77,18 @@ impl Door {
     }
 }
 
-async fn let_in(stream: TcpStream, held: ConnectionGuard, manners: Manners, stopping: Stopping) {
-    let Manners { application, patience, encryption, .. } = manners;
+async fn serve_connection(stream: TcpStream, held: ConnectionGuard, settings: ConnectionSettings, stopping: Stopping) {
+    let ConnectionSettings { application, limits, encryption, .. } = settings;
     let Ok(local) = stream.local_addr() else { return };
     let Some(acceptor) = encryption else {
-        return exchanges::hold(stream, &held, local, patience, application, stopping).await;
+        return exchanges::hold(stream, &held, local, limits, application, stopping).await;
     };
-    let shaken = tokio::select! {
-        shaken = tokio::time::timeout(patience.for_head, acceptor.accept(stream)) => shaken,
+    let handshake = tokio::select! {
+        handshake = tokio::time::timeout(limits.for_head, acceptor.accept(stream)) => handshake,
         () = held.connection.gave_way() => return,
     };
-    match shaken {
-        Ok(Ok(stream)) => exchanges::hold(stream, &held, local, patience, application, stopping).await,
+    match handshake {
+        Ok(Ok(stream)) => exchanges::hold(stream, &held, local, limits, application, stopping).await,
         Ok(Err(error)) => tracing::debug!(%error, "a TLS handshake failed"),
         Err(_) => tracing::debug!("a TLS handshake timed out"),
     }

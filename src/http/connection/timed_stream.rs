@@ -19,7 +19,7 @@ use crate::http::connection::connection_table::{ConnectionPhase, TrackedConnecti
 
 /// The time limits for a client.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
+pub struct ClientLimits {
     /// Limit to read any part of its answer.
     pub to_read: Duration,
     /// Limit from the first byte of a head to its last.
@@ -37,9 +37,9 @@ pub struct Patience {
 }
 
 /// A `stream` whose reads and writes fail once a time limit of its client has passed.
-pub struct Patient<S> {
+pub struct TimedStream<S> {
     stream: S,
-    patience: Patience,
+    limits: ClientLimits,
     connection: Arc<TrackedConnection>,
     /// Timer that runs while a write waits.
     stalled: Option<Pin<Box<Sleep>>>,
@@ -51,9 +51,9 @@ pub struct Patient<S> {
     end: Option<(usize, Pin<Box<Sleep>>)>,
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
-    pub fn new(stream: S, patience: Patience, connection: Arc<TrackedConnection>) -> Self {
-        Patient { stream, patience, connection, stalled: None, head: None, silent: None, end: None }
+impl<S: AsyncRead + AsyncWrite + Unpin> TimedStream<S> {
+    pub fn new(stream: S, limits: ClientLimits, connection: Arc<TrackedConnection>) -> Self {
+        TimedStream { stream, limits, connection, stalled: None, head: None, silent: None, end: None }
     }
 
     fn bounded<T>(
@@ -67,7 +67,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
             self.connection.note_read();
             return written;
         }
-        let limit = self.patience.to_read;
+        let limit = self.limits.to_read;
         let stalled = self.stalled.get_or_insert_with(|| Box::pin(tokio::time::sleep(limit)));
         stalled.as_mut().poll(context).map(|()| Err(io::ErrorKind::TimedOut.into()))
     }
@@ -76,8 +76,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
     fn silence(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
         loop {
             let ends = match self.head {
-                Some((_, began)) => began + self.patience.for_head,
-                None => Instant::from_std(self.connection.since()) + self.patience.between,
+                Some((_, began)) => began + self.limits.for_head,
+                None => Instant::from_std(self.connection.since()) + self.limits.between,
             };
             if ends <= Instant::now() {
                 return Poll::Ready(io::ErrorKind::TimedOut.into());
@@ -94,10 +94,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
 
     /// Discards what the client still sends; ready once the client has ended or has sent too much.
     fn finish(&mut self, context: &mut Context<'_>) -> Poll<()> {
-        let patience = self.patience;
-        let (discarded, over) = self.end.get_or_insert_with(|| (0, Box::pin(tokio::time::sleep(patience.to_finish))));
+        let limits = self.limits;
+        let (discarded, over) = self.end.get_or_insert_with(|| (0, Box::pin(tokio::time::sleep(limits.to_finish))));
         let mut space = [0; 16 << 10];
-        while *discarded < patience.left_bytes && over.as_mut().poll(context).is_pending() {
+        while *discarded < limits.left_bytes && over.as_mut().poll(context).is_pending() {
             let mut buffer = ReadBuf::new(&mut space);
             match ready!(Pin::new(&mut self.stream).poll_read(context, &mut buffer)) {
                 Ok(()) if !buffer.filled().is_empty() => *discarded += buffer.filled().len(),
@@ -108,7 +108,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
     }
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for Patient<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for TimedStream<S> {
     fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
         self.bounded(context, |stream, context| stream.poll_write(context, bytes))
     }
@@ -140,7 +140,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for Patient<S> {
     }
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for Patient<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for TimedStream<S> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -158,7 +158,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for Patient<S> {
             Poll::Ready(_) if buffer.filled().len() > before => {
                 let (_, began) = *self.head.get_or_insert_with(|| (requests, Instant::now()));
                 // A client that sends a byte now and then never leaves a read pending.
-                if began.elapsed() < self.patience.for_head {
+                if began.elapsed() < self.limits.for_head {
                     read
                 } else {
                     Poll::Ready(Err(io::ErrorKind::TimedOut.into()))
@@ -180,21 +180,21 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(200);
 
-    fn patient(stream: DuplexStream) -> (ConnectionGuard, Patient<DuplexStream>) {
+    fn timed(stream: DuplexStream) -> (ConnectionGuard, TimedStream<DuplexStream>) {
         let connections = Connections::new(ConnectionLimits { all: 1, of_address: 1, for_probes: 0 });
         let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
         let between = 3 * LIMIT;
         let (requests, age) = (u64::MAX, Duration::MAX);
-        let patience =
-            Patience { to_read: LIMIT, for_head: LIMIT, between, to_finish: LIMIT, left_bytes: 64, requests, age };
-        let patient = Patient::new(stream, patience, held.connection.clone());
-        (held, patient)
+        let limits =
+            ClientLimits { to_read: LIMIT, for_head: LIMIT, between, to_finish: LIMIT, left_bytes: 64, requests, age };
+        let timed = TimedStream::new(stream, limits, held.connection.clone());
+        (held, timed)
     }
 
     #[tokio::test]
     async fn a_reader_that_stops_is_cut_off_and_one_that_goes_on_is_not() {
         let (here, mut there) = tokio::io::duplex(16);
-        let (_held, mut patient) = patient(here);
+        let (_held, mut timed) = timed(here);
         let reading = tokio::spawn(async move {
             let mut chunk = [0; 16];
             for _ in 0..6 {
@@ -204,16 +204,16 @@ mod tests {
             there
         });
         // Seven times the capacity of the pipe: longer than the limit in all, but never silent for that long.
-        patient.write_all(&[7; 16 * 7]).await.unwrap();
+        timed.write_all(&[7; 16 * 7]).await.unwrap();
         let _there = reading.await.unwrap();
-        let refused = patient.write_all(&[7; 16]).await.unwrap_err();
+        let refused = timed.write_all(&[7; 16]).await.unwrap_err();
         assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
     }
 
     #[tokio::test]
     async fn a_head_that_does_not_end_is_cut_off_however_it_comes() {
         let (here, mut there) = tokio::io::duplex(16);
-        let (_held, mut patient) = patient(here);
+        let (_held, mut timed) = timed(here);
         let dripping = tokio::spawn(async move {
             while there.write_all(b"x").await.is_ok() {
                 tokio::time::sleep(LIMIT / 10).await;
@@ -221,24 +221,24 @@ mod tests {
         });
         let began = Instant::now();
         let refused = loop {
-            if let Err(error) = patient.read_u8().await {
+            if let Err(error) = timed.read_u8().await {
                 break error;
             }
         };
         assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
         assert!(began.elapsed() < 2 * LIMIT, "{:?}", began.elapsed());
-        drop(patient);
+        drop(timed);
         dripping.await.unwrap();
     }
 
     #[tokio::test]
     async fn who_asks_again_and_again_is_never_cut_off() {
         let (here, mut there) = tokio::io::duplex(16);
-        let (held, mut patient) = patient(here);
+        let (held, mut timed) = timed(here);
         for _ in 0..8 {
             there.write_all(b"head").await.unwrap();
             let mut head = [0; 4];
-            patient.read_exact(&mut head).await.unwrap();
+            timed.read_exact(&mut head).await.unwrap();
             assert!(held.connection.begin(ConnectionPhase::Working));
             held.connection.rest();
             tokio::time::sleep(LIMIT / 3).await;
@@ -248,9 +248,9 @@ mod tests {
     #[tokio::test]
     async fn who_asks_nothing_is_waited_for_longer_but_not_without_end() {
         let (here, _there) = tokio::io::duplex(16);
-        let (_held, mut patient) = patient(here);
+        let (_held, mut timed) = timed(here);
         let began = Instant::now();
-        assert_eq!(patient.read_u8().await.unwrap_err().kind(), io::ErrorKind::TimedOut);
+        assert_eq!(timed.read_u8().await.unwrap_err().kind(), io::ErrorKind::TimedOut);
         assert!((2 * LIMIT..5 * LIMIT).contains(&began.elapsed()), "{:?}", began.elapsed());
     }
 
@@ -258,14 +258,14 @@ mod tests {
     async fn what_is_left_of_a_request_is_taken_within_bounds() {
         for (sent, accepted) in [(48, true), (96 + 16 + 1, false)] {
             let (here, mut there) = tokio::io::duplex(16);
-            let (held, mut patient) = patient(here);
+            let (held, mut timed) = timed(here);
             held.connection.leave();
             let sending = tokio::spawn(async move {
                 let sent = there.write_all(&vec![1; sent]).await;
                 (sent.is_ok(), there)
             });
-            patient.shutdown().await.unwrap();
-            drop(patient);
+            timed.shutdown().await.unwrap();
+            drop(timed);
             assert_eq!(sending.await.unwrap().0, accepted, "{sent}");
         }
     }
