@@ -199,7 +199,7 @@ pub fn advising(specification: &Specification) -> [Footprint; 3] {
     ]
 }
 
-/// Returns the footprints to advise by a given policy, the policy itself included.
+/// Returns the memory that advice by a policy takes, including the policy itself.
 pub fn advising_by(policy: &Policy) -> [Footprint; 3] {
     let problem = &policy.specification().problem;
     let sizes = Sizes::of(policy.specification());

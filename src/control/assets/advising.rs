@@ -38,8 +38,8 @@ pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
     RelativeUtility::new(fund.utility, fund.initial_wealth * (1.0 + fund.rate_per_step))
 }
 
-/// Returns the step of `problem`, whose fund has the completed problem `fund`, as if `rows` had been seen, in a ball of
-/// this radius.
+/// Builds the one-period step of `problem` from the returns `rows`, with a ball of this radius. `fund` is the completed
+/// problem of the assets' fund.
 pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> PortfolioStep {
     step_above(floors(fund.support_rule(), rows), problem, fund, rows, radius)
 }

@@ -69,7 +69,7 @@ impl AssetsProblem {
         Specification { problem, design, fund: Some(Box::new(fund)), ..plain }.completed()
     }
 
-    /// Returns the problem that a policy was trained for, as if `history` had been seen; `None` if it has one asset.
+    /// Returns the problem that a policy was trained for, with `history` as its record; `None` if it has one asset.
     pub fn of(specification: &Specification, history: Vec<Vec<f64>>) -> Option<Self> {
         let Specification { problem, fund, .. } = specification;
         let fund = fund.as_deref()?;

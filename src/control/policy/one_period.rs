@@ -30,7 +30,7 @@ impl OnePeriod {
         OnePeriod { advisor: Advisor::with(policy, kept.clone()), kept }
     }
 
-    /// Computes the levels of the investor's caution, if the caution is one of them. Cost: as
+    /// Finds the levels of caution from the record, if the investor follows one of them. Cost: as
     /// [`Specification::resolved`].
     #[must_use]
     pub fn resolved(&self) -> Self {

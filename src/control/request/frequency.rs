@@ -7,7 +7,7 @@ use jiff::civil::{Date, Weekday};
 /// Largest number of days from one trading day to the next: exchanges close for weekends, and for holidays as long as
 /// the golden weeks of Asia or March 1933.
 const LONGEST_REST: i32 = 12;
-/// Days from a week's date to the next one's, if a holiday moves either.
+/// Number of days between the dates of adjacent weeks, either of which a holiday may move.
 const WEEK: RangeInclusive<i32> = 4..=10;
 
 /// Smallest number of days from a month's date to the next one's, if both move to trading days; less is no month.
