@@ -54,7 +54,11 @@ enum Command {
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Print the OpenAPI description.
-    Openapi,
+    Openapi {
+        /// Print it as a page of Markdown, for people.
+        #[arg(long)]
+        page: bool,
+    },
 }
 
 /// Exit code that a shell reports for a program whose output is no longer read.
@@ -105,8 +109,10 @@ async fn outcome() -> ExitCode {
         Command::Move(arguments) => backup::relocate(arguments).await,
         Command::Repair(arguments) => backup::repair(arguments).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
-        Command::Openapi => {
-            print!("{}", ballast::http::description_json());
+        Command::Openapi { page } => {
+            let description =
+                if page { ballast::http::reference_page() } else { ballast::http::description_json().into() };
+            print!("{description}");
             Ok(())
         }
     };

@@ -46,7 +46,7 @@ def share_seen(problem, size):
 
 
 def radius_of(problem, size):
-    """The rules of docs/requests.md that look at the effective number of returns alone."""
+    """The rules of docs/problem.md that look at the effective number of returns alone."""
     rule, share = problem["radius"], share_seen(problem, size)
     if problem["framework"] == "plug_in":
         return 0.0

@@ -5,10 +5,11 @@ mod connection;
 mod description;
 pub mod gate;
 pub mod problem;
+mod reference;
 mod router;
 mod routes;
 mod server;
 pub mod site;
 
-pub use router::description_json;
+pub use router::{description_json, reference_page};
 pub use server::{RunningServer, ServeError, serve};

@@ -27,6 +27,7 @@ use crate::http::gate::access::{CallerOf, Gate, ReadCalls};
 use crate::http::gate::bodies::{self, Bodies};
 use crate::http::gate::hosts::Hosts;
 use crate::http::gate::telemetry;
+use crate::http::reference;
 use crate::http::routes::advise;
 use crate::http::routes::audit;
 use crate::http::routes::backtests;
@@ -132,6 +133,11 @@ static PUBLISHED: LazyLock<String> = LazyLock::new(|| description().to_pretty_js
 /// Returns the description as checked in under `api/openapi.json`.
 pub fn description_json() -> &'static str {
     &PUBLISHED
+}
+
+/// Returns the description as a page for people, as checked in under `docs/requests.md`.
+pub fn reference_page() -> String {
+    reference::page(&description())
 }
 
 /// Returns the whole application; for a replica that only runs jobs, its operator part.

@@ -1,5 +1,5 @@
 //! The README and the pages of `docs/` say what is there: links lead somewhere, files and functions that they name exist,
-//! and `docs/requests.md` has every field of every request with its bounds, its default and an example that fits.
+//! and `docs/requests.md` has every field of every request with its bounds, and an example that fits.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -27,7 +27,7 @@ const FOLDERS: [&str; 12] = [
     "src/",
     "tests/",
 ];
-/// What a name in backticks may be in its file.
+/// Kinds of items that a name in backticks may be in its file.
 const KINDS: [&str; 7] = ["fn", "struct", "enum", "trait", "const", "mod", "type"];
 
 fn read(path: &str) -> String {
@@ -55,7 +55,7 @@ fn prose(page: &str) -> String {
     page.split("\n```").step_by(2).collect::<Vec<&str>>().join("\n")
 }
 
-/// What stands in backticks outside of blocks.
+/// Returns the words in backticks outside of blocks.
 fn spans(text: &str) -> Vec<String> {
     let text = prose(text);
     assert!(text.matches('`').count().is_multiple_of(2), "a backtick without its other: {text}");
@@ -104,14 +104,14 @@ fn every_link_leads_somewhere() {
     assert!(followed > 50, "{followed} links");
 }
 
-/// Whether the file defines the last part of a name such as `Type::function`, and every part before it.
+/// Returns true if the file defines the last part of a name such as `Type::function`, and every part before it.
 fn defines(file: &str, name: &str) -> bool {
     let defined = |part: &str| KINDS.iter().any(|kind| words(file, &format!("{kind} {part}")));
     let variant = |part: &str| part.starts_with(char::is_uppercase) && words(file, part);
     name.split("::").all(|part| defined(part) || variant(part))
 }
 
-/// Whether `text` stands in the file, and not as a part of a longer word.
+/// Returns true if `text` is in the file, and not as a part of a longer word.
 fn words(file: &str, text: &str) -> bool {
     let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
     file.match_indices(text).any(|(at, _)| !file[at + text.len()..].starts_with(is_word))
@@ -159,26 +159,32 @@ fn resolved<'a>(description: &'a Value, schema: &'a Value) -> &'a Value {
     }
 }
 
-/// Every field below a schema, as `outer.inner` and `list[].inner`, with its schema; of a whole that is a list, as `inner`.
-fn fields(description: &Value, schema: &Value, path: &str, found: &mut Vec<(String, Value)>) {
-    let schema = resolved(description, schema);
-    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
-        let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
-        found.push((path.clone(), property.clone()));
-        fields(description, property, &path, found);
-    }
-    for several in ["oneOf", "allOf", "anyOf"] {
-        for one in schema[several].as_array().into_iter().flatten() {
-            fields(description, one, path, found);
-        }
-    }
-    if schema["items"].is_object() {
-        let of_each = if path.is_empty() { String::new() } else { format!("{path}[]") };
-        fields(description, &schema["items"], &of_each, found);
+/// The fields of a schema itself, in all its variants; those of the types it refers to are theirs.
+fn own_fields(schema: &Value, found: &mut Vec<(String, Value)>) {
+    let properties = schema["properties"].as_object().into_iter().flatten();
+    found.extend(properties.map(|(name, property)| (name.clone(), property.clone())));
+    for several in ["oneOf", "allOf"] {
+        schema[several].as_array().into_iter().flatten().for_each(|one| own_fields(one, found));
     }
 }
 
-/// The part of a page under the heading of an operation.
+/// The names of the types that a schema refers to, and those inside them.
+fn named_types(description: &Value, schema: &Value, found: &mut BTreeSet<String>) {
+    match schema {
+        Value::Object(members) => {
+            if let Some(name) = schema["$ref"].as_str().and_then(|name| name.rsplit('/').next())
+                && found.insert(name.to_owned())
+            {
+                named_types(description, resolved(description, schema), found);
+            }
+            members.values().for_each(|member| named_types(description, member, found));
+        }
+        Value::Array(items) => items.iter().for_each(|item| named_types(description, item, found)),
+        _ => {}
+    }
+}
+
+/// The part of a page under the heading of an operation or a type.
 fn section(page: &str, operation: &str) -> String {
     let heading = format!("\n## `{operation}`\n");
     let at = page.find(&heading).unwrap_or_else(|| panic!("no heading {operation}"));
@@ -186,20 +192,8 @@ fn section(page: &str, operation: &str) -> String {
     rest[..rest.find("\n## ").unwrap_or(rest.len())].to_owned()
 }
 
-/// Whether a name of the page is that of a field; `*` stands for any part.
-fn names(name: &str, path: &str) -> bool {
-    let (name, path): (Vec<&str>, Vec<&str>) = (name.split('.').collect(), path.split('.').collect());
-    name.len() == path.len() && name.iter().zip(path).all(|(name, part)| *name == "*" || *name == part)
-}
-
-/// The rows of the tables whose first cell names a field.
-fn rows(section: &str, path: &str) -> Vec<String> {
-    let first =
-        |line: &&str| line.split(" | ").next().is_some_and(|cell| spans(cell).iter().any(|name| names(name, path)));
-    section.lines().filter(|line| line.starts_with("| ")).filter(first).map(str::to_owned).collect()
-}
-
 fn has_number(text: &str, number: f64) -> bool {
+    let text = text.replace(',', "");
     let parts = text.split(|letter: char| !(letter.is_ascii_alphanumeric() || matches!(letter, '.' | '-')));
     let mut numbers = parts.filter_map(|part| part.trim_end_matches('.').parse::<f64>().ok());
     numbers.any(|found| (found - number).abs() <= 1e-3 * number.abs())
@@ -219,80 +213,34 @@ fn ends(schema: &Value) -> Vec<f64> {
 #[test]
 fn every_field_of_every_request_has_its_row_and_its_bounds() {
     let (description, page) = (description(), read("docs/requests.md"));
-    let linked = [
-        ("[`POST /train`](#post-train)", "POST /train"),
-        ("[`POST /observe`](#post-observe)", "POST /observe"),
-        ("[`POST /advise`](#several-assets)", "POST /advise"),
-    ]
-    .map(|(link, title)| (link, section(&page, title)));
-    let mut seen = 0;
+    let (mut seen, mut types) = (0, BTreeSet::new());
     for (path, operations) in description["paths"].as_object().unwrap() {
         for (method, operation) in operations.as_object().unwrap() {
-            let operation_name = format!("{} {path}", method.to_uppercase());
-            let section = section(&page, &operation_name);
+            let section = section(&page, &format!("{} {path}", method.to_uppercase()));
             for parameter in operation["parameters"].as_array().into_iter().flatten() {
                 let name = parameter["name"].as_str().unwrap();
-                assert!(spans(&section).iter().any(|span| span == name), "{operation_name}: no {name}");
-                for end in ends(&parameter["schema"]) {
-                    assert!(has_number(&section, end), "{operation_name}: {name} does not say {end}");
-                }
+                assert!(section.contains(&format!("\n| `{name}` | ")), "{method} {path}: no {name}");
                 seen += 1;
             }
-            let mut found = Vec::new();
-            let body = &operation["requestBody"]["content"]["application/json"]["schema"];
-            fields(&description, body, "", &mut found);
-            for (field, schema) in found {
-                let mut described = rows(&section, &field);
-                let outermost = rows(&section, field.split(['.', '[']).next().unwrap());
-                for (link, elsewhere) in &linked {
-                    if outermost.iter().any(|row| row.contains(link)) {
-                        described.extend(rows(elsewhere, &field));
-                    }
-                }
-                if outermost.iter().any(|row| row.contains("[`problem.centre`](#centres)")) {
-                    described.extend(rows(&linked[0].1, &format!("problem.{field}")));
-                }
-                assert!(!described.is_empty(), "{operation_name}: no row for {field}");
-                for end in ends(&schema) {
-                    assert!(has_number(&described.join(" "), end), "{field} does not say {end}");
-                }
-                seen += 1;
-            }
+            named_types(&description, &operation["requestBody"], &mut types);
         }
     }
-    assert!(seen > 150, "{seen} fields and parameters");
-}
-
-#[test]
-fn every_answer_is_described_where_it_is_given() {
-    let (description, page) = (description(), read("docs/requests.md"));
-    let frontier = section(&page, "POST /frontier");
-    let report = [read("docs/evaluation.md"), read("docs/backtest.md"), frontier].map(|text| spans(&text)).concat();
-    let mut answers: Vec<(String, Vec<String>, BTreeSet<String>)> = Vec::new();
-    for (path, operations) in description["paths"].as_object().unwrap() {
-        for (method, operation) in operations.as_object().unwrap() {
-            let section: Vec<String> = spans(&section(&page, &format!("{} {path}", method.to_uppercase())));
-            for (status, response) in operation["responses"].as_object().unwrap() {
-                let schema = &response["content"]["application/json"]["schema"];
-                if !status.starts_with('2') || !schema["$ref"].is_string() {
-                    continue;
-                }
-                let mut found = Vec::new();
-                fields(&description, schema, "", &mut found);
-                let own = found.into_iter().map(|(field, _)| field).filter(|field| !field.contains(['.', '[']));
-                answers.push((schema["$ref"].to_string(), section.clone(), own.collect()));
+    for name in types {
+        let (section, mut fields) = (section(&page, &name), Vec::new());
+        own_fields(&description["components"]["schemas"][&name], &mut fields);
+        for (field, schema) in fields.into_iter().filter(|(_, schema)| schema["enum"].is_null()) {
+            let rows: Vec<&str> = section.lines().filter(|line| line.starts_with(&format!("| `{field}` | "))).collect();
+            assert!(!rows.is_empty(), "{name}: no row for {field}");
+            for end in ends(&schema) {
+                assert!(rows.iter().any(|row| has_number(row, end)), "{name}.{field} does not say {end}: {rows:?}");
             }
+            seen += 1;
         }
     }
-    assert!(answers.len() >= 15, "{} answers", answers.len());
-    for (schema, _, fields) in &answers {
-        let somewhere = answers.iter().filter(|(other, ..)| other == schema).map(|(_, section, _)| section);
-        let complete = |spans: &Vec<String>| fields.iter().all(|field| spans.contains(field));
-        assert!(somewhere.chain([&report]).any(complete), "no section has all of {schema}: {fields:?}");
-    }
+    assert!(seen > 250, "{seen} fields and parameters");
 }
 
-/// What of a value does not fit a schema.
+/// Returns the parts of a value that do not fit a schema.
 fn misfits(description: &Value, schema: &Value, value: &Value, path: &str) -> Vec<String> {
     let schema = resolved(description, schema);
     if let Some(variants) = schema["oneOf"].as_array() {
@@ -356,28 +304,20 @@ fn the_defaults_are_those_of_a_training() {
     let least = json!({ "problem": { "rate_per_step": 0.002, "history": [0.01, -0.02, 0.03] } });
     let completed = serde_json::from_value::<Specification>(least).unwrap().completed().unwrap();
     let completed = serde_json::to_value(completed).unwrap();
-    let section = section(&read("docs/requests.md"), "POST /train");
-    let mut compared = BTreeSet::new();
-    for row in section.lines().filter(|line| line.starts_with("| `")) {
-        let cells: Vec<&str> = row.trim_matches('|').split(" | ").collect();
-        let (Some(name), Some(default)) = (spans(cells[0]).first().cloned(), cells.get(2)) else { continue };
-        let Some(default) = default.trim().strip_prefix('`').and_then(|rest| rest.split('`').next()) else { continue };
-        let default: Value = serde_json::from_str(default).unwrap_or_else(|error| panic!("{name}: {default}: {error}"));
-        let found = completed.pointer(&format!("/{}", name.replace('.', "/")));
-        assert_eq!(found, Some(&default), "{name}");
-        compared.insert(name);
+    let (description, mut compared) = (description(), 0);
+    for (part, schema) in [
+        ("/problem", "ProblemSpecification"),
+        ("/design", "DesignSpecification"),
+        ("/surrogate", "SurrogateSpecification"),
+        ("/surrogate/bounds", "HyperparameterBounds"),
+    ] {
+        let fields = description["components"]["schemas"][schema]["properties"].as_object().unwrap();
+        for (name, field) in fields.iter().filter(|(_, field)| !field["default"].is_null()) {
+            assert_eq!(completed.pointer(part).unwrap()[name], field["default"], "{part}/{name}");
+            compared += 1;
+        }
     }
-    let parts = ["problem", "design", "surrogate", "surrogate.bounds"];
-    let mut all: Vec<String> = vec!["seed".into()];
-    for part in parts {
-        let object = completed.pointer(&format!("/{}", part.replace('.', "/"))).unwrap().as_object().unwrap();
-        all.extend(object.keys().map(|name| format!("{part}.{name}")));
-    }
-    // Required, a part itself, or another field's value.
-    let said_in_words = ["problem.history", "problem.rate_per_step", "surrogate.bounds", "design.wealth"];
-    all.retain(|name| !said_in_words.contains(&name.as_str()));
-    let missing: Vec<&String> = all.iter().filter(|name| !compared.contains(*name)).collect();
-    assert!(missing.is_empty(), "no default of {missing:?}");
+    assert!(compared >= 15, "{compared} defaults");
 }
 
 /// First cells of all rows of tables whose first column has this heading.
@@ -425,7 +365,7 @@ fn changed(paths: &[String]) -> Option<Date> {
     String::from_utf8(day.stdout).ok()?.trim().parse().ok()
 }
 
-/// Whether code that changed on a day leaves a measurement behind. Some days pass between a change and its measurement, and
+/// Returns true if code that changed on a day leaves a measurement behind. Some days pass between a change and its measurement, and
 /// changes that come one after the other are measured once.
 fn is_outdated(measured: Date, changed: Date) -> bool {
     measured.checked_add(30.days()).unwrap() < changed

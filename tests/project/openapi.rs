@@ -1,5 +1,6 @@
 //! The checked-in description is the one the routes make.
-//! To accept a change: `cargo run -- openapi > api/openapi.json`, and read the difference.
+//! To accept a change: `cargo run -- openapi > api/openapi.json` and `cargo run -- openapi --page > docs/requests.md`, and
+//! read the differences.
 
 use ballast::http::problem::ProblemKind;
 use serde_json::Value;
@@ -12,6 +13,12 @@ fn the_description_has_not_drifted() {
         ballast::http::description_json() == CHECKED_IN,
         "api/openapi.json is out of date: cargo run -- openapi > api/openapi.json"
     );
+}
+
+#[test]
+fn the_page_for_people_has_not_drifted() {
+    let out_of_date = "docs/requests.md is out of date: cargo run -- openapi --page > docs/requests.md";
+    assert!(ballast::http::reference_page() == include_str!("../../docs/requests.md"), "{out_of_date}");
 }
 
 #[test]

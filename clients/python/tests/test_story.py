@@ -150,7 +150,7 @@ def test_what_was_reported_is_put_right(session: Session) -> None:
     assert (first["log_return"], first["reported"].get("date")) == (0.01, "2008-01-31")
     now = first.get("now")
     assert now is not None and now["log_return"] == 0.02
-    assert history["corrections"][0]["told"] == corrected
+    assert history["corrections"][0]["answer"] == corrected
     # An answer from before the correction does not restore the wrong wealth.
     session.observe(missing=True, period=2)
     assert session.wealth == corrected["wealth"]

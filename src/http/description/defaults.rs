@@ -52,8 +52,13 @@ fn documented() -> [(&'static str, Map<String, Value>); 12] {
 fn of<T: Serialize + DeserializeOwned>(least: Value) -> Map<String, Value> {
     let read = serde_json::from_value::<T>(least.clone()).ok().and_then(|read| serde_json::to_value(read).ok());
     let Some(Value::Object(mut whole)) = read else { return Map::new() };
-    whole.retain(|field, value| least.get(field).is_none() && !value.is_null());
+    whole.retain(|field, value| least.get(field).is_none() && !has_null(value));
     whole
+}
+
+/// Returns true if a value, or a part of it, is filled in later.
+fn has_null(value: &Value) -> bool {
+    value.is_null() || value.as_object().is_some_and(|members| members.values().any(has_null))
 }
 
 #[cfg(test)]

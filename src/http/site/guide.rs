@@ -61,6 +61,8 @@ const PARTS: &[(&str, &[GuidePage])] = documents! {
     ],
     "Reference": [
         "requests" "Every request and field" "docs/requests.md",
+        "problem" "The fields of a problem" "docs/problem.md",
+        "sessions" "Sessions" "docs/sessions.md",
         "policy-format" "The format of a policy" "docs/policy-format.md",
         "walk-through" "From a call to the code" "docs/walk-through.md",
         "paper-to-code" "From the paper to the code" "docs/paper-to-code.md",

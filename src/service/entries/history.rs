@@ -106,8 +106,7 @@ pub struct Correction {
     #[serde(flatten)]
     pub correction: Correct,
     /// The answer to it.
-    #[serde(rename = "told")]
-    pub answered: Corrected,
+    pub answer: Corrected,
     pub corrected_ms: i64,
 }
 
@@ -223,7 +222,7 @@ fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction
             EntryKind::Observation => {}
             EntryKind::Correction => corrections.push(Correction {
                 correction: content(entry, periods.names())?,
-                answered: answer(entry, periods.names())?,
+                answer: answer(entry, periods.names())?,
                 corrected_ms: entry.created_ms,
             }),
             EntryKind::Renewal => renewals.push(Renewal {

@@ -2052,7 +2052,7 @@ class TrainAssets(TypedDict):
     """Name of the policy, at most 100 letters."""
     notes: NotRequired[str | None]
     """Notes, at most 2,000 letters."""
-    tags: NotRequired[list[str] | None]
+    tags: NotRequired[list[Tag] | None]
     """Tags: at most 20, all different, of 1 to 50 letters each."""
 
 
@@ -2425,7 +2425,7 @@ class Corrected(Uncertainty):
 class Correction(Correct):
     """One correction, as it was made."""
 
-    told: Corrected
+    answer: Corrected
     """The answer to it."""
     corrected_ms: int
 
