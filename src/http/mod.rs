@@ -5,7 +5,6 @@ mod connection;
 mod description;
 pub mod gate;
 pub mod problem;
-mod reference;
 mod router;
 mod routes;
 mod server;

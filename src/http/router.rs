@@ -27,7 +27,7 @@ use crate::http::gate::access::{CallerOf, Gate, ReadCalls};
 use crate::http::gate::bodies::{self, Bodies};
 use crate::http::gate::hosts::Hosts;
 use crate::http::gate::telemetry;
-use crate::http::reference;
+use crate::http::description::reference;
 use crate::http::routes::advise;
 use crate::http::routes::audit;
 use crate::http::routes::backtests;

@@ -4,4 +4,5 @@ pub(super) mod bounds;
 pub(super) mod defaults;
 pub(super) mod documentation;
 pub(super) mod problem_responses;
+pub(super) mod reference;
 pub(super) mod schema;
