@@ -1,4 +1,4 @@
-//! Floor 4: translates between the wire and the use cases, and does nothing else.
+//! Floor 5: translates between the wire and the use cases, and does nothing else.
 
 pub mod api_client;
 mod connection;

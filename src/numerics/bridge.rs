@@ -10,7 +10,8 @@
 //! H is simulated over the directions of bridges, and the quantile integrates their lengths out. H is the length, which
 //! has a chi law, times the statistic over the direction; the two are independent. Source: paper, section 2.1, (2.4).
 //!
-//! Beside it: the law of the statistic, its paths, its quantiles for laws that grow, and for funds of several assets.
+//! Its modules hold the law of the statistic, its paths, its quantiles for laws that grow, and for funds of several
+//! assets.
 
 pub mod calibration;
 pub mod funds;

@@ -4,7 +4,7 @@
 //!
 //! Source: Rasmussen and Williams 2006, sections 2.2 and 5.4.
 //!
-//! Beside it: kernel, likelihood, fit, linear systems and the selection of points.
+//! Its modules hold kernel, likelihood, fit, linear systems and the selection of points.
 
 pub mod cholesky;
 pub mod farthest;

@@ -1,6 +1,6 @@
 //! Laws that can be sampled and integrated against.
 //!
-//! Beside it: empirical laws and their moments, and what is estimated from them.
+//! Its modules hold empirical laws and their moments, and what is estimated from them.
 
 pub mod confidence_region;
 pub mod empirical;

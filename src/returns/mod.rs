@@ -1,10 +1,10 @@
-//! Reads returns from text that people paste or programs write. The page, the command line and every client use this
-//! one reader.
+//! Floor 2: reads returns from text that people paste or programs write. The page, the command line and every client
+//! use this one reader.
 //!
 //! Text does not say what its numbers are. If their meaning follows from the text, it is used and stated in a sentence;
 //! if it does not follow, the caller is asked. A cell that cannot be right is refused by its line, its column and its
 //! value. Nothing is skipped silently, because a misread record gives wrong advice that looks right. Checked by:
-//! `tests/service/advice/returns.rs`.
+//! `tests/service/returns.rs`.
 
 mod bank;
 mod cells;

@@ -1,6 +1,7 @@
 //! Jobs as their users see them; each tenant sees only its own.
 //!
-//! Beside it: the worker that runs jobs, their progress, and the renewer, which trains the next policies of sessions.
+//! Its modules hold the worker that runs jobs, the progress of jobs, and the renewer, which trains the next policies of
+//! sessions.
 
 pub(super) mod due;
 pub(super) mod idempotency;

@@ -1,4 +1,4 @@
-//! Floor 3: use cases: train, open a session, observe, act. No HTTP types.
+//! Floor 4: use cases: train, open a session, observe, act. No HTTP types.
 //!
 //! [`Service`] is all that a transport needs: the store, the jobs and their trainer, the prepared policies and the live
 //! sessions. Everything acknowledged is in the store first; memory only saves recomputing.

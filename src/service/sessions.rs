@@ -8,8 +8,8 @@
 //! A session belongs to its tenant and does not exist for others. Slots are named by tenant and session, so no call
 //! waits for, fills or empties the slot of another tenant.
 //!
-//! Beside it: the state of one session in memory, its rows, its slots and its sequence of policies. What is recorded of a
-//! session is decided in [`crate::service::entries`].
+//! Its modules hold the state of one session in memory, its rows, its slots and its sequence of policies. What is
+//! recorded of a session is decided in [`crate::service::entries`].
 
 pub mod assets;
 pub(super) mod content;

@@ -1,6 +1,6 @@
 //! Jobs as users see them: created once, listed, cancelled, and deleted after they have ended.
 //!
-//! Beside it: the life of a job, its leases, its turns and names, and the deletion of ended ones.
+//! Its modules hold the life of a job, its leases, its turns and names, and the deletion of ended ones.
 
 pub(super) mod job;
 pub(super) mod leases;

@@ -1,4 +1,4 @@
-//! Floor 2: durable facts. One contract, [`Store`], over SQLite in a folder or PostgreSQL.
+//! Floor 3: durable facts. One contract, [`Store`], over SQLite in a folder or PostgreSQL.
 //!
 //! Promises, strongest first:
 //!

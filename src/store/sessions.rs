@@ -1,6 +1,6 @@
 //! Sessions: the start of each live investor.
 //!
-//! Beside it: the entries of sessions, how a change is noticed, and the lists in which sessions are found.
+//! Its modules hold the entries of sessions, how a change is noticed, and the lists in which sessions are found.
 
 pub(super) mod attention;
 pub(super) mod entries;

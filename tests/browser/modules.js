@@ -5,7 +5,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 
-const FOLDER = fileURLToPath(new URL("../../src/http/dashboard", import.meta.url));
+const FOLDER = fileURLToPath(new URL("../../src/http/site/dashboard", import.meta.url));
 
 /** A module by its name. Copied first: beside the sources nothing tells Node that they are ES modules. */
 export async function dashboardModule(name) {

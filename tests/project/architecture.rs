@@ -552,6 +552,17 @@ fn declared_files(sources: &[Source]) -> BTreeSet<String> {
 }
 
 #[test]
+fn every_floor_says_its_number_and_the_readme_agrees() {
+    let read = |path: &str| fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
+    let readme = read("README.md");
+    for (number, floor) in FLOORS.into_iter().enumerate() {
+        let head = read(&format!("src/{floor}/mod.rs"));
+        assert!(head.starts_with(&format!("//! Floor {number}: ")), "{floor}");
+        assert!(readme.contains(&format!("| {number} | `src/{floor}/` |")), "{floor}");
+    }
+}
+
+#[test]
 fn the_source_keeps_the_rules_of_the_house() {
     let sources = sources();
     let visited: BTreeSet<String> = sources.iter().map(|source| source.path.clone()).collect();
@@ -671,7 +682,7 @@ fn a_broken_rule_is_found() {
     assert_eq!(faults_of("control/progress.rs", "use utoipa::ToSchema;").len(), 0);
     assert_eq!(faults_of("store/jobs.rs", "fn f() { let now = Instant::now(); }").len(), 1);
     assert_eq!(faults_of("control/backward.rs", "fn f() { std::thread::sleep(PAUSE); }").len(), 1);
-    assert_eq!(faults_of("service/process/figures/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);
+    assert_eq!(faults_of("service/process/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);
     assert_eq!(faults_of("http/a.rs", "fn f() { g().unwrap(); panic!(\"no\"); todo!() }").len(), 3);
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(70))).len(), 1);
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(69))).len(), 0);
@@ -691,7 +702,7 @@ fn a_banned_name_and_a_banned_opening_are_found() {
     }
     for opening in BANNED_OPENINGS {
         let found = format!("http/a.rs:2: a doc comment begins with {opening:?}");
-        assert_eq!(faults_of("http/a.rs", &format!("\n/// {opening} a law.\nstruct A;")), [found.clone()]);
+        assert_eq!(faults_of("http/a.rs", &format!("\n/// {opening} a law.\nstruct A;")), std::slice::from_ref(&found));
         assert_eq!(faults_of("http/a.rs", &format!("\n//! {opening}: a law.")), [found]);
         assert_eq!(faults_of("http/a.rs", &format!("// {opening} a law.\n/// A law.\n/// {opening} it.")), [""; 0]);
     }

@@ -10,7 +10,7 @@ use reqwest::header::{ACCEPT, ETAG, IF_NONE_MATCH};
 use serde_json::{Value, json};
 
 fn files() -> BTreeMap<String, Vec<u8>> {
-    files_of("src/http/dashboard")
+    files_of("src/http/site/dashboard")
 }
 
 fn files_of(folder: &str) -> BTreeMap<String, Vec<u8>> {
@@ -81,7 +81,7 @@ async fn the_page_of_the_interface_is_served_and_loads_nothing_from_elsewhere() 
     const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
         connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
     let app = App::start().await;
-    let ours = files_of("src/http/documentation");
+    let ours = files_of("src/http/description/documentation");
     let page = String::from_utf8(ours["index.html"].clone()).expect("UTF-8");
     assert_eq!(served(&app, "/docs", "index.html", page.as_bytes()).await, POLICY);
     for file in ["page.css", "start.js"] {

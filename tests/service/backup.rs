@@ -1,4 +1,4 @@
-//! What an operator does to a store: check it, back it up while it is written to, restore it.
+//! The work of an operator on a store: check it, back it up while it is written to, restore it.
 
 use std::path::Path;
 use std::process::Child;

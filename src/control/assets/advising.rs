@@ -107,7 +107,7 @@ impl AssetsAdvice {
     /// of wealth; and the reason if nothing is held. Cost: its levels of caution, if one is followed, and the joint
     /// factor under `bridge` and `calibrated`. Also [`PortfolioStep::solve_from`], twice if a return may fall below those
     /// seen, and once for each level of a short record.
-    /// Checked by: `tests/service/advice/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
+    /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     ///
     /// # Errors

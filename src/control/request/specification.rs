@@ -163,7 +163,7 @@ impl UtilitySpecification {
 
     /// Returns the utility with its risk aversion per unit of wealth, for an investor who starts with `initial_wealth`:
     /// `risk_aversion = risk_aversion_relative / initial_wealth`.
-    /// Checked by: `tests/service/advice/advise.rs::a_relative_risk_aversion_is_of_the_wealth_at_the_start`.
+    /// Checked by: `tests/service/advise.rs::a_relative_risk_aversion_is_of_the_wealth_at_the_start`.
     #[must_use]
     pub fn absolute(self, initial_wealth: f64) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! What is believed of the coming return: a framework turns the law of the returns seen into an uncertainty set, and
+//! The belief about the coming return: a framework turns the law of the returns seen into an uncertainty set, and
 //! into the summary from which the features of a law are made.
 //!
 //! No wealth, no action and no utility: every controlled problem uses the same laws.

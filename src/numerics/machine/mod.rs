@@ -1,4 +1,4 @@
-//! What concerns the processor and not mathematics: vector loops, random streams, digits, interruption.
+//! Tools that concern the processor and not mathematics: vector loops, random streams, digits, interruption.
 
 pub mod digits;
 pub(crate) mod dispatch;

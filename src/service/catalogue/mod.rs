@@ -1,4 +1,4 @@
-//! What a tenant owns: policies, labels, and the overview of sessions.
+//! The things that a tenant owns: policies, labels, and the overview of sessions.
 
 pub mod labels;
 pub mod overview;

@@ -152,7 +152,7 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
 }
 
 /// Doubts a log-return z that lies far from a record with mean m and standard deviation s: |z - m| > 4 s, at any size.
-/// Checked by: `tests/service/entries/doubts.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
+/// Checked by: `tests/service/doubts.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
 pub(in crate::service) fn of_return(
     field: &str,
     value: f64,

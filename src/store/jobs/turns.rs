@@ -9,7 +9,7 @@
 //! Over PostgreSQL, concurrent claims skip a tenant that another claim serves or that is just queueing; it keeps its
 //! number, and so its turn. Cost of a claim: one index lookup for each tenant that it skips, however much is queued.
 //!
-//! Checked by: `tests/service/callers/turns.rs`, `tests/service/store_model.rs`.
+//! Checked by: `tests/service/turns.rs`, `tests/service/store_model.rs`.
 
 use crate::store::engine::error::Failure;
 use crate::store::engine::query::{StoreConnection, query};

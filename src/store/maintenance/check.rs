@@ -13,15 +13,12 @@ use sqlx::postgres::PgConnection;
 
 use crate::store::engine::codec::to_sql;
 use crate::store::engine::error::{Cause, Failure, StoreError};
-use crate::store::engine::migrations;
-use crate::store::engine::postgres;
 use crate::store::engine::query::{Query, StoreConnection, StoreRow, query};
-use crate::store::engine::sqlite;
+use crate::store::engine::{migrations, postgres, sqlite};
 use crate::store::jobs::job::JobRow;
 use crate::store::jobs::leases;
 use crate::store::sessions::SessionRow;
-use crate::store::sessions::entries;
-use crate::store::sessions::entries::EntryRow;
+use crate::store::sessions::entries::{self, EntryRow};
 use crate::store::tenants::audit_chain::{self, AuditChain};
 use crate::store::tenants::keys::KeyRow;
 use crate::store::tenants::quotas::{ASSET_BYTES, ENTRY_BYTES, ROW_BYTES};

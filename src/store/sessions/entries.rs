@@ -11,12 +11,9 @@ use crate::store::engine::codec::{Seal, from_sql, hexadecimal, to_sql};
 use crate::store::engine::error::Failure;
 use crate::store::engine::postgres::Database;
 use crate::store::engine::query::{Query, StoreConnection, StoreRow, query};
-use crate::store::sessions::head::Head;
-use crate::store::tenants::audit::{Actor, AuditAction, AuditRow};
 use crate::store::tenants::audit_chain;
 use crate::store::tenants::quotas::{self, Quotas, Usage};
-use crate::store::tenants::tenant::Tenant;
-use crate::store::{Engine, Store, StoreError};
+use crate::store::{Actor, AuditAction, AuditRow, Engine, Head, Store, StoreError, Tenant};
 
 /// The kind of event that an entry records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
