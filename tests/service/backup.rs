@@ -1,4 +1,4 @@
-//! The work of an operator on a store: check it, back it up while it is written to, restore it.
+//! Operations on a store: check it, back it up while it is written to, restore it.
 
 use std::path::Path;
 use std::process::Child;
@@ -18,14 +18,14 @@ const HORIZON: usize = 5;
 /// Periods that a client lives: one less than there are, so that every session still has an advice.
 const LIVED: usize = HORIZON - 1;
 
-/// What it printed, where it succeeded.
+/// Returns the output of a command that must succeed.
 fn succeeds(arguments: &[&str]) -> String {
     let output = ballast(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What it complained of, where it failed.
+/// Returns the complaint of a command that must fail.
 fn fails(arguments: &[&str]) -> String {
     let output = ballast(arguments);
     assert!(!output.status.success(), "{arguments:?} succeeded: {}", String::from_utf8_lossy(&output.stdout));
