@@ -108,7 +108,7 @@ impl Inspection {
         sqlite::opening::inspect(dir).await.map(|connection| CheckReader::Sqlite(connection).into())
     }
 
-    /// Opens a [`backup`](mod@crate::store::maintenance::backup), to which nothing writes.
+    /// Opens a file that `backup` wrote, to which nothing writes.
     ///
     /// # Errors
     /// As [`Inspection::of_folder`].
