@@ -13,8 +13,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::compare::ComparisonRun;
-use super::paper;
-use super::tables;
+use super::{paper, tables};
 
 #[derive(Debug, Clone, Args)]
 pub struct Evaluate {

@@ -17,36 +17,17 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::problem::{ProblemDocument, ProblemKind};
-use crate::http::description::bounds;
-use crate::http::description::defaults;
-use crate::http::description::documentation;
-use crate::http::description::documentation::Published;
-use crate::http::description::problem_responses;
-use crate::http::description::reference;
-use crate::http::gate::access;
-use crate::http::gate::access::{CallerOf, Gate, ReadCalls};
+use crate::http::description::documentation::{self, Published};
+use crate::http::description::{bounds, defaults, problem_responses, reference};
+use crate::http::gate::access::{self, CallerOf, Gate, ReadCalls};
 use crate::http::gate::bodies::{self, Bodies};
 use crate::http::gate::hosts::Hosts;
 use crate::http::gate::telemetry;
-use crate::http::routes::advise;
-use crate::http::routes::audit;
-use crate::http::routes::backtests;
-use crate::http::routes::evaluations;
-use crate::http::routes::events;
-use crate::http::routes::frontiers;
-use crate::http::routes::holder;
-use crate::http::routes::jobs;
-use crate::http::routes::labels;
-use crate::http::routes::operations;
-use crate::http::routes::overview;
-use crate::http::routes::policies;
-use crate::http::routes::reports;
-use crate::http::routes::returns;
-use crate::http::routes::sessions;
-use crate::http::routes::what_if;
-use crate::http::routes::wire;
-use crate::http::site::dashboard;
-use crate::http::site::guide;
+use crate::http::routes::{
+    advise, audit, backtests, evaluations, events, frontiers, holder, jobs, labels, operations, overview, policies,
+    reports, returns, sessions, what_if, wire,
+};
+use crate::http::site::{dashboard, guide};
 use crate::service::Service;
 use crate::service::process::config::Config;
 

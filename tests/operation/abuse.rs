@@ -5,8 +5,8 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until, within};
-use crate::support::process::Process;
-use crate::support::{App, process, read, specification, trained};
+use crate::support::process::{self, Process};
+use crate::support::{App, read, specification, trained};
 use ballast::service::callers::allowance::Limits;
 use futures_util::future::join_all;
 use reqwest::StatusCode;

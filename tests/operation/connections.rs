@@ -9,8 +9,8 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until, within};
-use crate::support::process::Process;
-use crate::support::{App, process, specification};
+use crate::support::process::{self, Process};
+use crate::support::{App, specification};
 use reqwest::header::AUTHORIZATION;
 use serde_json::{Value, json};
 

@@ -11,8 +11,7 @@
 use std::path::PathBuf;
 
 use crate::support::{App, specification};
-use ballast::store::backup;
-use ballast::store::{Damage, Inspection, Store, restore};
+use ballast::store::{Damage, Inspection, Store, backup, restore};
 use serde_json::{Value, json};
 
 const RETURNS: [[f64; 2]; 2] = [[0.021, -0.034], [-0.012, 0.055]];

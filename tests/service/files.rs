@@ -5,10 +5,9 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use crate::support::patience::{assert_within, patience, until};
-use crate::support::process::Process;
-use crate::support::{App, process, specification};
-use ballast::store::backup;
-use ballast::store::{Damage, Store};
+use crate::support::process::{self, Process};
+use crate::support::{App, specification};
+use ballast::store::{Damage, Store, backup};
 use tempfile::TempDir;
 
 /// The exit code of a process whose store failed.

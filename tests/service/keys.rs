@@ -3,8 +3,8 @@
 use std::process::Command;
 
 use crate::support::patience::{self, patience};
-use crate::support::process::Process;
-use crate::support::{App, issue_key, postgres, process, read, specification};
+use crate::support::process::{self, Process};
+use crate::support::{App, issue_key, postgres, read, specification};
 use ballast::service::process::config::StoreLocation;
 use ballast::store::{KeyRing, KeyRole};
 use reqwest::header::{AUTHORIZATION, WWW_AUTHENTICATE};

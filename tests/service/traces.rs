@@ -6,8 +6,8 @@ use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
 use crate::support::patience::patience;
-use crate::support::process::Process;
-use crate::support::{App, process, specification};
+use crate::support::process::{self, Process};
+use crate::support::{App, specification};
 
 /// A collector: its address, and what was posted to it, path and body.
 fn collector() -> (String, Receiver<(String, Vec<u8>)>) {

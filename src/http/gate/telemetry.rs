@@ -17,8 +17,7 @@ use crate::http::gate::access::Asker;
 use crate::http::problem::{self, shortened};
 use crate::service::callers::keys::KeyFigures;
 use crate::service::metrics as names;
-use crate::service::process::figures;
-use crate::service::process::spans;
+use crate::service::process::{figures, spans};
 use crate::store::JobCounts;
 
 /// The recorder of the process; the `metrics` crate allows one.

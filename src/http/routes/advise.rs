@@ -10,9 +10,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::http::gate::access::{CallerOf, HeavyCalls};
-use crate::http::gate::bodies;
-use crate::http::gate::decode;
 use crate::http::gate::extract::JsonBytes;
+use crate::http::gate::{bodies, decode};
 use crate::http::problem::ProblemDocument;
 use crate::service::Service;
 use crate::service::advice::advise::{Advise, Advised};

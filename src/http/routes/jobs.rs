@@ -16,9 +16,8 @@ use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, default_seed,
 };
 use crate::http::gate::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
-use crate::http::gate::bodies;
-use crate::http::gate::decode;
 use crate::http::gate::extract::{Id, JsonBytes, Parameters};
+use crate::http::gate::{bodies, decode};
 use crate::http::problem::{ProblemDocument, ProblemKind};
 use crate::http::routes::advise::{ProblemShape, peek_shape};
 use crate::http::routes::page::{self, Page};

@@ -19,9 +19,9 @@ use crate::service::Service;
 use crate::service::catalogue::overview::Listed;
 use crate::service::entries::drift::DriftLevel;
 use crate::service::process::memory::Large;
-use crate::store::LONGEST_TAG;
 use crate::store::{
-    Attention, CareCounts, Counted, Labels, SessionFilter, SessionKey, SessionOrder, SessionPlace, SessionQuery,
+    Attention, CareCounts, Counted, LONGEST_TAG, Labels, SessionFilter, SessionKey, SessionOrder, SessionPlace,
+    SessionQuery,
 };
 
 /// Most letters of a search text: more than any name has.

@@ -9,9 +9,8 @@ use axum::response::{IntoResponse, Response};
 
 use crate::control::policy::Policy;
 use crate::http::gate::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
-use crate::http::gate::bodies;
-use crate::http::gate::decode;
 use crate::http::gate::extract::{Id, JsonBytes, Parameters};
+use crate::http::gate::{bodies, decode};
 use crate::http::problem::ProblemDocument;
 use crate::http::routes::page::{self, Page};
 use crate::http::routes::wire;

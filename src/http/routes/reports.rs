@@ -12,10 +12,8 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use crate::http::gate::access::{CallerOf, LiveCalls};
-use crate::http::gate::bodies;
-use crate::http::gate::decode;
 use crate::http::gate::extract::JsonBytes;
-use crate::http::gate::telemetry;
+use crate::http::gate::{bodies, decode, telemetry};
 use crate::http::problem::ProblemDocument;
 use crate::service::Service;
 use crate::service::entries::answer::Observed;

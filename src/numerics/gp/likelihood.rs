@@ -5,8 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::DMatrix;
 
 use crate::numerics::gp::cholesky::Cholesky;
-use crate::numerics::gp::matern;
-use crate::numerics::gp::{Hyperparameters, kernel_lower, squared_distances_below};
+use crate::numerics::gp::{Hyperparameters, kernel_lower, matern, squared_distances_below};
 
 /// Returns the log marginal likelihood and its gradient, in the order log length scales, log signal, log noise
 /// variance.

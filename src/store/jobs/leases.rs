@@ -17,12 +17,10 @@ use crate::store::engine::error::Failure;
 use crate::store::engine::query::{Query, StoreConnection, StoreRow, query};
 use crate::store::jobs::job::{ClaimedJob, JobOutcome, JobRow};
 use crate::store::jobs::state::{JobEvent, JobState};
-use crate::store::jobs::turns;
-use crate::store::jobs::{end, find, labels_of};
-use crate::store::labels;
+use crate::store::jobs::{end, find, labels_of, turns};
 use crate::store::sessions::words::{Labelled, Worded};
 use crate::store::tenants::quotas::{self, Quotas, Usage};
-use crate::store::{Store, StoreError, policies};
+use crate::store::{Store, StoreError, labels, policies};
 
 /// The job fails once this many workers died under it between two checkpoints.
 const MOST_DEATHS: i64 = 3;

@@ -18,8 +18,7 @@ use crate::store::jobs::job::{JobRow, NewJob};
 use crate::store::jobs::training_names::{
     OF_SESSION, TrainingRequest, name, next_renewal, of_specification, queued_for_sessions,
 };
-use crate::store::jobs::turns;
-use crate::store::jobs::{cancel, count, insert};
+use crate::store::jobs::{cancel, count, insert, turns};
 use crate::store::sessions::idempotency::FOR_SESSIONS;
 use crate::store::tenants::audit::Actor;
 use crate::store::tenants::quotas::Quotas;

@@ -10,15 +10,14 @@ use serde::de::DeserializeOwned;
 use super::{JobEnd, Worker, failed, reported, requested};
 use crate::control::cache::Cache;
 use crate::control::error::TrainError;
-use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
 use crate::control::evaluation::walk_forward::{Decision, SharedWork};
-use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::backtest_assets::{AssetsBacktestRequest, BacktestQuestion};
+use crate::control::{estimate, pool};
 use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
