@@ -71,7 +71,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
             return Err(FieldError::new("problem.support", "none", rule).into());
         }
         let laws = Laws::new(&specification);
-        let selection = FeatureSelection::new(&specification, laws.radii.varies(), laws.summarises_ball());
+        let selection = FeatureSelection::new(&specification, &laws);
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
         let law = continuous_law(sampling_law, &specification.problem);
         let history = specification.problem.learning.law(&specification.problem.history);

@@ -162,7 +162,7 @@ impl Candidates for DesignSolver<'_> {
             // Laws do not depend on the holdings: states are only needed if wealth is a feature.
             match problem.selection.has_wealth() {
                 true => problem.features_of(step, states[index - some.start].wealth, &law),
-                false => problem.selection.after(Vec::new(), &law),
+                false => problem.selection.of_law(&law),
             }
         };
         some.clone().zip(laws).map(features).collect()

@@ -71,7 +71,7 @@ pub struct ControlledSolution {
 impl<P: Controlled> ControlledStep<'_, P> {
     /// Returns the features of a state and its law: the description, then the features of the law.
     pub fn features(&self, state: &P::State, law: &EmpiricalDistribution) -> Features {
-        self.selection.after(self.problem.describe(self.step, state), &self.laws.summary(law))
+        self.selection.of_law(&self.laws.summary(law)).after(self.problem.describe(self.step, state))
     }
 
     /// Solves the step. Cost: a prediction at each of some hundreds of returns, and some thirty actions priced.
@@ -143,9 +143,10 @@ impl<P: Controlled> Field for ControlledField<'_, P> {
         let mut gains = Vec::new();
         if let Some(value) = next {
             for (law, &log_return) in laws.summaries_with(self.law, returns).iter().zip(returns) {
+                let law = selection.of_law(law);
                 for &action in &self.actions {
                     let next = self.next(action, log_return);
-                    let gain = value.gain(&selection.after(problem.describe(step + 1, &next), law));
+                    let gain = value.gain(&law.clone().after(problem.describe(step + 1, &next)));
                     gains.push(if problem.has_floor() { gain.max(0.0) } else { gain });
                 }
             }

@@ -34,7 +34,7 @@ impl Problem {
     /// Builds the problem with `kept` as the cache of recomputable results.
     pub fn with(specification: &Specification, kept: Cache) -> Self {
         let laws = Laws::with(specification, kept);
-        let selection = FeatureSelection::new(specification, laws.radii.varies(), laws.summarises_ball());
+        let selection = FeatureSelection::new(specification, &laws);
         let periods = Dynamics::of(&specification.problem);
         Problem { specification: specification.clone(), laws, selection, periods }
     }

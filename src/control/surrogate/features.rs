@@ -3,7 +3,7 @@
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::specification::{FeatureMap, Specification};
-use crate::control::uncertainty::laws::LawSummary;
+use crate::control::uncertainty::laws::{LawSummary, Laws};
 
 /// Standard deviations below this count as this: the log stays finite.
 const SMALLEST_DEVIATION: f64 = 1e-8;
@@ -30,10 +30,17 @@ pub struct FeatureSelection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Features(pub(super) Vec<f64>);
 
+impl Features {
+    /// Returns the features of a law after those of a physical state.
+    pub fn after(self, mut described: Vec<f64>) -> Features {
+        described.extend(self.0);
+        Features(described)
+    }
+}
+
 impl FeatureSelection {
-    /// Selects the features. `radius_varies` is true if laws of one sample size have different radii, and `ball` if
-    /// summaries of laws include the ball.
-    pub fn new(specification: &Specification, radius_varies: bool, ball: bool) -> Self {
+    /// Selects the features of a specification with these laws.
+    pub fn new(specification: &Specification, laws: &Laws) -> Self {
         let problem = &specification.problem;
         let learns = problem.framework.learns();
         let parametric = problem.framework.is_parametric();
@@ -44,8 +51,8 @@ impl FeatureSelection {
             map,
             wealth: problem.depends_on_wealth(),
             moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
-            radius: learns && radius_varies && map == FeatureMap::Standardized,
-            ball,
+            radius: learns && laws.radii.varies() && map == FeatureMap::Standardized,
+            ball: laws.summarises_ball(),
             risk_aversion: RelativeUtility::new(problem.utility, total).relative_risk_aversion(),
         }
     }
@@ -95,15 +102,23 @@ impl FeatureSelection {
     /// investor with one period alone. The robust allocation and its value change most where the ratio passes 0 and 1;
     /// asinh compresses its ends, which matter less.
     pub fn of(&self, total: f64, law: &LawSummary) -> Features {
-        let described = if self.wealth { vec![self.wealth(total)] } else { Vec::new() };
-        self.after(described, law)
+        let mut features = Vec::with_capacity(self.moments + 5);
+        if self.wealth {
+            features.push(self.wealth(total));
+        }
+        self.push_law(&mut features, law);
+        Features(features)
     }
 
-    /// Returns the features of a law after those that describe the rest of a state.
-    pub fn after(&self, described: Vec<f64>, law: &LawSummary) -> Features {
+    /// Returns the features of a law alone.
+    pub fn of_law(&self, law: &LawSummary) -> Features {
+        let mut features = Vec::with_capacity(self.moments + 4);
+        self.push_law(&mut features, law);
+        Features(features)
+    }
+
+    fn push_law(&self, features: &mut Vec<f64>, law: &LawSummary) {
         let LawSummary { moments, radii, robust_excess, robust_variance } = law;
-        let mut features = described;
-        features.reserve_exact(self.moments + 4);
         for order in 1..=self.moments {
             features.push(match self.map {
                 FeatureMap::Standardized => moments.shape(order, SMALLEST_DEVIATION),
@@ -121,6 +136,5 @@ impl FeatureSelection {
             features.push(ratio(variance));
             features.push(ratio(robust_variance.max(SMALLEST_VARIANCE_LEFT * variance)));
         }
-        Features(features)
     }
 }

@@ -6,6 +6,7 @@ use crate::control::request::framework::Framework;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{Interval, LawExtent};
+use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::law::volatility::rescaled;
 
@@ -57,6 +58,12 @@ pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
         }
         _ => history.to_vec(),
     }
+}
+
+/// Returns the law of returns, if the framework knows it.
+pub fn known_law(problem: &ProblemSpecification) -> Option<ContinuousLaw> {
+    let law = problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
+    (problem.framework == Framework::KnownLaw).then(|| continuous_law(law, problem))
 }
 
 impl Centring {
@@ -124,6 +131,15 @@ impl Centring {
         Centre::gathered(masses.filter(|(_, mass)| *mass > NO_MASS))
     }
 
+    /// Returns the centre if the law of returns is known: the law by its quadrature. Returns beyond those accepted are
+    /// clamped to their bounds, as the simulated returns of the same law are, because an exponential of a heavy tail has
+    /// no mean.
+    pub fn known_centre(&self, law: &ContinuousLaw) -> Centre {
+        let Interval { min, max } = self.accepted;
+        let (atoms, masses) = law.quadrature();
+        Centre::gathered(atoms.into_iter().map(|atom| atom.clamp(min, max)).zip(masses))
+    }
+
     /// Returns an upper bound on the returns of the centre while `periods` more returns are learned, each of them at
     /// most the bound before it.
     pub fn highest(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
@@ -135,16 +151,13 @@ impl Centring {
 }
 
 impl Centre {
-    /// Returns the centre if nothing is learned: the known law by its quadrature, or the centre of the history. Returns
-    /// of a known law beyond those accepted are clamped to their bounds, as the simulated returns of the same law are,
-    /// because an exponential of a heavy tail has no mean.
+    /// Returns the centre if nothing is learned: that of the known law, or of the history.
     pub fn frozen(problem: &ProblemSpecification) -> Self {
-        if problem.framework == Framework::KnownLaw {
-            let law = problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
-            let (atoms, masses) = continuous_law(law, problem).quadrature();
-            return Centre::gathered(atoms.into_iter().map(|atom| admissible(atom, problem)).zip(masses));
+        let centring = Centring::of(problem);
+        match known_law(problem) {
+            Some(law) => centring.known_centre(&law),
+            None => centring.centre(&problem.learning.law(&record(&problem.history, problem))),
         }
-        Centring::of(problem).centre(&problem.learning.law(&record(&problem.history, problem)))
     }
 
     /// Adds up the masses of equal adjacent atoms.

@@ -7,13 +7,14 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use super::UncertaintySet;
-use super::centre::{Centre, Centring};
+use super::centre::{Centring, known_law};
 use super::radius::{Measure, Radii, RadiusEstimator};
 use crate::control::cache::Cache;
 use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{FeatureMap, Specification};
 use crate::control::request::support::{LawExtent, Support};
+use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::law::exponential_mean::{ExponentialMean, WorstExponential};
@@ -37,8 +38,10 @@ pub struct Laws {
     pub radii: RadiusEstimator,
     /// Centres of the uncertainty sets.
     pub centring: Centring,
-    /// The centre of every ball, if nothing is learned.
-    fixed_centre: Option<Centre>,
+    /// True if the set follows the law of the returns seen.
+    learns: bool,
+    /// The law of returns, if the framework knows it.
+    known_law: Option<ContinuousLaw>,
     /// The uncertainty set of every law, if nothing is learned; computed once.
     fixed: OnceLock<FixedSet>,
 }
@@ -73,7 +76,6 @@ impl Laws {
     pub fn with(specification: &Specification, kept: Cache) -> Self {
         let problem = &specification.problem;
         let framework = problem.framework;
-        let learns = framework.learns() && !problem.centre.takes_order();
         let is_ball = framework.learns() && !framework.is_parametric();
         Laws {
             framework,
@@ -82,13 +84,10 @@ impl Laws {
             summarises_ball: is_ball && specification.surrogate.features == FeatureMap::Standardized,
             radii: RadiusEstimator::new(specification, kept),
             centring: Centring::of(problem),
-            fixed_centre: (!learns).then(|| Centre::frozen(problem)),
+            learns: framework.learns() && !problem.centre.takes_order(),
+            known_law: known_law(problem),
             fixed: OnceLock::new(),
         }
-    }
-
-    fn learns(&self) -> bool {
-        self.fixed_centre.is_none()
     }
 
     /// Returns true if summaries include the ball.
@@ -98,47 +97,41 @@ impl Laws {
 
     /// Returns the uncertainty set at a law: around the law itself if the framework learns.
     pub fn uncertainty_set(&self, law: &EmpiricalDistribution) -> Cow<'_, UncertaintySet> {
-        match &self.fixed_centre {
-            None => Cow::Owned(self.learned_set(law, self.radii.radius(law))),
-            Some(centre) => Cow::Borrowed(&self.fixed(centre).set),
+        match self.learns {
+            true => Cow::Owned(self.learned_set(law, self.radii.radius(law))),
+            false => Cow::Borrowed(&self.fixed().set),
         }
     }
 
     /// Returns the uncertainty set with this radius, in the same unit: the known radius of the law, or a hypothetical
     /// one.
     pub fn uncertainty_set_within(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
-        match &self.fixed_centre {
-            None => self.learned_set(law, radius),
-            Some(centre) => self.fixed(centre).set.clone().with_radius(radius, self.support),
+        match self.learns {
+            true => self.learned_set(law, radius),
+            false => self.fixed().set.clone().with_radius(radius, self.support),
         }
     }
 
     /// Returns the radius of the uncertainty set at a law.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
-        match &self.fixed_centre {
-            None => self.radii.radius(law),
-            Some(centre) => self.fixed(centre).measure.radius,
-        }
+        if self.learns { self.radii.radius(law) } else { self.fixed().measure.radius }
     }
 
     /// Returns the radius at a law and its parts.
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
-        match &self.fixed_centre {
-            None => self.radii.measure(law),
-            Some(centre) => self.fixed(centre).measure,
-        }
+        if self.learns { self.radii.measure(law) } else { self.fixed().measure }
     }
 
     /// Returns how many numbers are read to measure a law, or `None` if these are yet to be computed.
     pub fn cost(&self, law: &EmpiricalDistribution) -> Option<usize> {
-        if self.learns() { self.radii.cost(law.sample_size()) } else { self.fixed.get().map(|_| 0) }
+        if self.learns { self.radii.cost(law.sample_size()) } else { self.fixed.get().map(|_| 0) }
     }
 
     /// Computes the data that measuring a law reads.
     pub fn prepare(&self, law: &EmpiricalDistribution) {
-        match &self.fixed_centre {
-            None => self.radii.prepare(law.sample_size()),
-            Some(centre) => _ = self.fixed(centre),
+        match self.learns {
+            true => self.radii.prepare(law.sample_size()),
+            false => _ = self.fixed(),
         }
     }
 
@@ -152,20 +145,20 @@ impl Laws {
     /// Returns an upper bound on the returns of the centre while `periods` more returns are learned, each of them at
     /// most the bound before it. For estimates that are learned, it is the best return accepted.
     pub fn best_return(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
-        match (&self.fixed_centre, self.framework.is_parametric()) {
-            (Some(centre), _) => self.fixed(centre).set.best_return(),
-            (None, true) => LOG_RETURN,
-            (None, false) => self.centring.highest(law, periods),
+        match (self.learns, self.framework.is_parametric()) {
+            (false, _) => self.fixed().set.best_return(),
+            (true, true) => LOG_RETURN,
+            (true, false) => self.centring.highest(law, periods),
         }
     }
 
-    fn fixed(&self, centre: &Centre) -> &FixedSet {
+    fn fixed(&self) -> &FixedSet {
         self.fixed.get_or_init(|| {
             let history = &self.radii.learned;
             let measure = self.radii.measure(history);
-            let set = match self.framework.is_parametric() {
-                true => self.learned_set(history, measure.radius),
-                false => UncertaintySet::around(centre.clone(), measure.radius, self.support),
+            let set = match &self.known_law {
+                Some(law) => UncertaintySet::around(self.centring.known_centre(law), measure.radius, self.support),
+                None => self.learned_set(history, measure.radius),
             };
             FixedSet { set, measure }
         })
@@ -214,7 +207,7 @@ impl Laws {
     /// Returns the summaries of the laws that follow from `law` when each of `returns` (ascending) is learned.
     pub fn summaries_with(&self, law: &EmpiricalDistribution, returns: &[f64]) -> Vec<LawSummary> {
         let before = CentralMoments::of(law);
-        if !self.learns() {
+        if !self.learns {
             return vec![without_ball(before); returns.len()];
         }
         if !self.summarises_ball {
