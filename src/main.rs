@@ -6,6 +6,7 @@ mod command;
 
 use std::process::ExitCode;
 
+use ballast::report::{end_where_nobody_reads, with_causes};
 use ballast::service::process::config::Config;
 use clap::{Parser, Subcommand};
 use command::{advise, audit, backtest, backup, check, demo, frontier, healthcheck, keys, serve};
@@ -61,22 +62,6 @@ enum Command {
     },
 }
 
-/// Exit code that a shell reports for a program whose output is no longer read.
-const NOBODY_READS: i32 = 141;
-
-/// Ends the process silently if the reader of its output is gone, as `head` is once it has read enough. Other panics
-/// are reported as usual.
-fn end_where_nobody_reads() {
-    let tell = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        let message = panic.payload_as_str().unwrap_or_default();
-        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
-            std::process::exit(NOBODY_READS);
-        }
-        tell(panic);
-    }));
-}
-
 fn main() -> ExitCode {
     end_where_nobody_reads();
     let blocking_threads = Config::new("").blocking_threads();
@@ -119,7 +104,7 @@ async fn outcome() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("ballast: {}", command::with_causes(error.as_ref()));
+            eprintln!("ballast: {}", with_causes(error.as_ref()));
             ExitCode::FAILURE
         }
     }

@@ -18,6 +18,7 @@ mod tables;
 use std::error::Error;
 use std::process::ExitCode;
 
+use ballast::report::{end_where_nobody_reads, with_causes};
 use clap::{Parser, Subcommand};
 
 /// Measurements and experiments with Ballast.
@@ -52,6 +53,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    end_where_nobody_reads();
     match outcome(CommandLine::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -59,12 +61,6 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// Formats an error and its causes on one line.
-fn with_causes(error: &dyn Error) -> String {
-    let causes = std::iter::successors(error.source(), |&cause| cause.source());
-    causes.fold(error.to_string(), |line, cause| format!("{line}: {cause}"))
 }
 
 fn outcome(command: Command) -> Result<(), Box<dyn Error>> {

@@ -1,6 +1,6 @@
 //! `ballast-lab coverage` and `ballast-lab reproduce`, as a reader of the documents runs them.
 
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 #[test]
 fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_option_it_refuses() {
@@ -26,6 +26,18 @@ fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_opti
         let (_, refused) = run(&arguments);
         assert!(refused.contains(&format!("{option} ")), "{refused}");
     }
+}
+
+/// A reader that ends, as `head` does once it has read enough, is no fault of the program.
+#[test]
+fn a_reader_that_ends_is_no_fault() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast-lab"));
+    command.args(["coverage", "--records", "20", "--sizes", "5"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert_eq!((output.status.code(), complaint.contains("panicked")), (Some(141), false), "{complaint}");
 }
 
 /// A run of ten histories can tell nothing about the paper, and says so of every statement; no figure is a zero with a sign.

@@ -18,9 +18,3 @@ pub mod serve;
 mod store_location;
 mod tls_client;
 mod traces;
-
-/// Formats an error and its causes on one line.
-pub fn with_causes(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(error.source(), |cause| cause.source());
-    causes.fold(error.to_string(), |line, cause| format!("{line}: {cause}"))
-}

@@ -5,6 +5,8 @@
 
 mod csv;
 mod file;
+mod terminal;
 
 pub use self::csv::Csv;
 pub use file::{FileError, Files, html};
+pub use terminal::{end_where_nobody_reads, with_causes};
