@@ -1,5 +1,5 @@
-//! Many callers ask for the largest answers, and half of them read nothing. The process stays within its memory, and other
-//! callers do not wait.
+//! Many callers ask for the largest answers, and half of them read nothing; or all ask for sessions that a restarted
+//! process must replay first. The process stays within its memory, and other callers do not wait.
 
 use std::time::{Duration, Instant};
 
@@ -84,6 +84,79 @@ fn made_of(answer: Option<Answer>, name: &str) -> Result<String, String> {
     }
 }
 
+/// Sessions that are replayed after a restart.
+const REPLAYED: usize = 20;
+
+/// Callers ask for sessions that a new process must replay, at the same time.
+pub async fn replayed(trials: usize) -> Outcome {
+    let (site, mut tally) = (Site::limited(&["--memory-limit", "1GB"]), Tally::default());
+    let mut server = site.start().await?;
+    let mut caller = Caller::new(&[&server.url]);
+    let opening = json!({ "policy": imported(&caller, &trained(&unending())).await?, "rolling": true });
+    let mut sessions = Vec::new();
+    for _ in 0..REPLAYED {
+        sessions.push(made_of(caller.post("/sessions", &opening).await, "session")?);
+    }
+    let mut period = 0;
+    for _ in 0..trials {
+        let last = period + MOST_PERIODS.min(PERIODS * attack_time().as_secs() as usize);
+        while period < last {
+            period += 1;
+            tally.audit.acknowledged += report_all(&caller, &sessions, period).await?;
+        }
+        let before = advice(&caller, &sessions[0]).await?;
+        server.signal("-KILL");
+        server.ended().await;
+        server = site.start().await?;
+        tally.started(&server);
+        caller = Caller::new(&[&server.url]);
+        let alive = Pulse::of(caller.another(), "/livez".to_owned());
+        let replaying = join_all((0..CALLERS).map(async |number| {
+            let path = format!("/action?session={}", sessions[number % REPLAYED]);
+            let started = Instant::now();
+            let answer = ask(server.url.trim_start_matches("http://"), &caller.request("GET", &path), true).await;
+            answer.map(|()| started.elapsed()).map_err(|error| error.to_string())
+        }));
+        let slowest = replaying.await.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().max().unwrap_or_default();
+        let alive = alive.stop().await;
+        alive.report(within(ANSWERED), &mut tally);
+        let peak = server.peak_mb();
+        tally.note = format!(
+            "{REPLAYED} sessions of {period} periods: {} ms at most, {peak} MB resident, p99 of /livez {} ms",
+            slowest.as_millis(),
+            alive.p99()
+        );
+        if peak > MOST_MB {
+            tally.complain(tally.note.clone());
+        }
+        tally.stale += usize::from(before != advice(&caller, &sessions[0]).await?);
+        (tally.trials, tally.faults) = (tally.trials + 1, tally.faults + 1);
+    }
+    tally.inspect(&site).await;
+    tally.listen(&site);
+    Ok(Some(tally))
+}
+
+/// Reports a period of every session; returns how many reports were acknowledged.
+async fn report_all(caller: &Caller, sessions: &[String], period: usize) -> Result<usize, String> {
+    let report = |session| json!({ "session": session, "period": period, "log_return": log_return(period) });
+    let reports: Value = sessions.iter().map(report).collect();
+    match caller.post("/observe", &reports).await {
+        Some((200, answers)) if answers.as_array().is_some_and(|answers| answers.len() == sessions.len()) => {
+            let refused = answers.as_array().into_iter().flatten().find(|answer| answer["status"] != json!(200));
+            refused.map_or(Ok(sessions.len()), |answer| Err(format!("period {period}: {answer}")))
+        }
+        other => Err(format!("period {period}: {other:?}")),
+    }
+}
+
+async fn advice(caller: &Caller, session: &str) -> Result<Value, String> {
+    match caller.get(&format!("/action?session={session}")).await {
+        Some((200, advice)) => Ok(advice),
+        other => Err(format!("no advice: {other:?}")),
+    }
+}
+
 /// Imports a policy; returns its name.
 async fn imported(caller: &Caller, policy: &[u8]) -> Result<String, String> {
     let policy: Value = serde_json::from_slice(policy).map_err(|error| error.to_string())?;
@@ -94,13 +167,18 @@ fn log_return(number: usize) -> f64 {
     0.004 + 0.02 * (1.7 * number as f64).sin()
 }
 
-/// Opens a rolling session and reports periods in proportion to the length of the attack.
-async fn long(caller: &Caller) -> Result<String, String> {
+/// A training whose sessions may go on without an end.
+fn unending() -> Value {
     let mut training = specification(2);
     training["problem"]["learning"] = json!({ "kind": "decay", "half_life": 1 });
     training["problem"]["utility"] = json!({ "kind": "power", "risk_aversion": 3 });
     training["design"]["initial_laws"] = json!("resampled");
-    let policy = imported(caller, &trained(&training)).await?;
+    training
+}
+
+/// Opens a rolling session and reports periods in proportion to the length of the attack.
+async fn long(caller: &Caller) -> Result<String, String> {
+    let policy = imported(caller, &trained(&unending())).await?;
     let opened = caller.post("/sessions", &json!({ "policy": policy, "rolling": true })).await;
     let session = made_of(opened, "session")?;
     for period in 1..=MOST_PERIODS.min(PERIODS * attack_time().as_secs() as usize) {

@@ -18,31 +18,24 @@ pub async fn batches(trials: usize) -> Outcome {
 
 /// Clients with batches of as many reports as one may have: threads and memory stay within what they may be.
 pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
-    const CLIENTS: usize = 8;
+    const CLIENTS: usize = 4;
     const SESSIONS: usize = 1000;
     const MOST_THREADS: usize = 64;
     const MOST_MB: usize = 300;
     let caller = &tenants.neighbour;
     let policy = import(caller).await;
-    let opening = async |opened: usize| {
-        let (caller, mut sessions) = (caller.another(), Vec::new());
-        for _ in 0..opened {
-            sessions.extend(caller.open(&policy).await);
-        }
-        sessions
-    };
-    let sessions = join_all((0..CLIENTS).map(|_| opening(SESSIONS / CLIENTS))).await.concat();
+    // Each client reports to sessions of its own, so that every report is recorded.
+    let opening = (0..CLIENTS).map(|_| open(caller, &policy, SESSIONS));
+    let sessions = join_all(opening).await;
     let pulse = tenants.pulse("").await?;
     let (end, mut threads) = (Instant::now() + attack_time(), 0);
-    let reporting = join_all((0..CLIENTS).map(async |number| {
+    let reporting = join_all(sessions.iter().map(async |sessions| {
         let (caller, mut reports) = (caller.another(), 0);
         for period in 1.. {
             if Instant::now() > end {
                 break;
             }
-            // Each client has the same sessions: all but one are told that somebody was before them.
-            let report =
-                |session: &String| json!({ "session": session, "period": period, "log_return": 0.001 * number as f64 });
+            let report = |session: &String| json!({ "session": session, "period": period, "log_return": 0.001 });
             let batch: Vec<Value> = sessions.iter().map(report).collect();
             caller.post("/observe", &Value::Array(batch)).await;
             reports += 1;
@@ -66,17 +59,25 @@ pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
     Ok(calls)
 }
 
+/// Opens so many sessions of a policy, one after the other.
+async fn open(caller: &Caller, policy: &str, count: usize) -> Vec<String> {
+    let (caller, mut sessions) = (caller.another(), Vec::new());
+    for _ in 0..count {
+        sessions.extend(caller.open(policy).await);
+    }
+    sessions
+}
+
 pub async fn searches(trials: usize) -> Outcome {
     Tenants::attacked(Site::new(), trials, Attack::Search).await
 }
 
 /// Searches and lists in the order of wealth: the other's lists are answered as before.
 pub async fn search(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
-    const SESSIONS: usize = 300;
+    const OPENING: usize = 8;
+    const SESSIONS: usize = 500;
     let policy = import(&tenants.neighbour).await;
-    for _ in 0..SESSIONS {
-        tenants.neighbour.open(&policy).await.ok_or("no session")?;
-    }
+    join_all((0..OPENING).map(|_| open(&tenants.neighbour, &policy, SESSIONS))).await;
     let pulse = Pulse::of(tenants.owner.another(), "/sessions".to_owned());
     let end = Instant::now() + attack_time();
     let paths = ["/sessions?search=zz", "/sessions?sort=-wealth&count=care"];
