@@ -126,8 +126,7 @@ impl SessionStart {
         check_rows("history", &rows, &fund.assets, None)?;
         let history = rows.concat();
         let assets = Assets::at(&fund.assets, rows, holdings.as_ref())?;
-        let holding = assets.fund.holdings.iter().sum::<f64>().min(1.0);
-        let state = advisor.initial_state(Some(&assets.fund.returns()), wealth)?.with_holding(holding)?;
+        let state = assets.fund.begin(advisor, wealth)?;
         Ok(Beginning { state, assets: Some(assets.into()), history })
     }
 }

@@ -19,10 +19,11 @@ use super::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::actions::ActionInterval;
-use crate::control::problem::state::State;
+use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::fund::FundSpecification;
+use crate::control::request::learning::Learning;
 use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification,
 };
@@ -94,11 +95,30 @@ impl AssetsProblem {
     }
 }
 
+/// Returns the share of wealth in all assets together.
+fn total(shares: &[f64]) -> f64 {
+    shares.iter().sum::<f64>().min(1.0)
+}
+
 impl Fund {
     /// Starts a fund from the returns `rows` and these shares of wealth, before a composition is chosen.
     pub fn at(rows: Vec<Vec<f64>>, holdings: Vec<f64>) -> Self {
         let composition = inverse_volatility(&rows);
         Fund { rows, before: composition.clone(), composition, holdings }
+    }
+
+    /// Returns the state at the start of a session with this fund; `wealth` defaults to that of the policy.
+    ///
+    /// # Errors
+    /// The wealth breaks a rule, or the returns of the fund are not a valid history.
+    pub fn begin(&self, advisor: &Advisor, wealth: Option<f64>) -> Result<State, FieldError> {
+        advisor.initial_state(Some(&self.returns()), wealth)?.with_holding(total(&self.holdings))
+    }
+
+    /// Makes `rows` the returns of the law, as a renewal does, and returns the state with the law of the fund.
+    pub fn renew(&mut self, rows: Vec<Vec<f64>>, learning: Learning, state: &State) -> State {
+        self.rows = rows;
+        State { law: learning.law(&self.returns()), ..*state }
     }
 
     /// Replaces the composition by this one.
@@ -120,6 +140,29 @@ impl Fund {
         if total > 0.0 { of(executed, total) } else { of(&self.composition, 1.0) }
     }
 
+    /// Returns the shares of wealth in the assets that sum to `total`.
+    pub fn shares(&self, total: f64) -> Vec<f64> {
+        self.composition.iter().map(|share| total * share).collect()
+    }
+
+    /// Returns the outcome of a period in which the shares of wealth `executed` were held. `rate` and `flow` replace
+    /// those of the policy's terms.
+    pub fn outcome(
+        &self,
+        executed: &[f64],
+        log_returns: Option<&[f64]>,
+        rate: Option<f64>,
+        flow: Option<f64>,
+    ) -> PeriodOutcome {
+        PeriodOutcome {
+            action: total(executed),
+            log_return: log_returns.map(|row| self.log_return(executed, row)),
+            rate,
+            flow,
+            traded: Some(self.traded(executed)),
+        }
+    }
+
     /// Returns the share of wealth that is traded to reach `executed`.
     pub fn traded(&self, executed: &[f64]) -> f64 {
         self.holdings.iter().zip(executed).map(|(held, share)| f64::abs(share - held)).sum()
@@ -139,6 +182,16 @@ impl Fund {
         let returns = fund_returns(&self.rows, composition);
         let law = advisor.specification().problem.learning.law(&returns);
         State { wealth: state.wealth, holding: state.holding, law }
+    }
+
+    /// Prepares the period after `step`: chooses the composition if the policy advises that period, and returns the
+    /// state of the fund, with the one-step solution if one made the proposal. Cost: that of [`Self::compose`].
+    pub fn enter(&mut self, advisor: &Advisor, step: usize, state: &State) -> (State, Option<AssetsSolution>) {
+        let Specification { problem, fund, .. } = advisor.specification();
+        match fund.as_deref().filter(|_| step < problem.horizon) {
+            Some(fund) => self.compose(advisor, fund, step, state),
+            None => (State { law: problem.learning.law(&self.returns()), ..*state }, None),
+        }
     }
 
     /// Chooses the composition before the period after `step`, which is below the horizon. Returns the state of its

@@ -26,6 +26,7 @@ pub mod composition;
 mod cuts;
 pub mod fund;
 mod interior;
+mod renewal;
 mod trading;
 pub mod worst;
 

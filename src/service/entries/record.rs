@@ -20,6 +20,14 @@ impl PeriodReturns {
             PeriodReturns::One(_) => None,
         }
     }
+
+    /// Returns the log-return of one asset if it is not missing.
+    pub(in crate::service) fn one(&self) -> Option<f64> {
+        match self {
+            PeriodReturns::One(log_return) => *log_return,
+            PeriodReturns::Several(_) => None,
+        }
+    }
 }
 
 /// Log-returns in the order observed; several assets date after date.

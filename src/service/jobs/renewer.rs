@@ -17,12 +17,7 @@ use tokio::time::MissedTickBehavior;
 use self::attempts::{Attempts, request};
 use self::naming::next_labels;
 use self::under_way::{Left, UnderWay};
-use crate::control::error::FieldError;
-use crate::control::request::assets::AssetsProblem;
-use crate::control::request::specification::Specification;
-use crate::control::request::support::Interval;
 use crate::service::entries::periods::Periods;
-use crate::service::entries::record::SessionRecord;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Jobs;
 use crate::service::metrics::RENEWALS;
@@ -242,7 +237,7 @@ impl Renewer {
             let periods = Periods::of(&facts)?;
             let record = periods.replay()?.record;
             let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
-            Ok::<_, ServiceError>(next(advisor.specification(), &record, renew.window, rate, wealth)?)
+            Ok::<_, ServiceError>(advisor.specification().next(record.last(renew.window), rate, wealth)?)
         };
         let specification = self.sessions.resolving.run(tenant, specify).await??;
         let request = request(live, attempts.number, attempts.count);
@@ -257,34 +252,6 @@ impl Renewer {
             SessionTraining::Later => Left::Room,
             SessionTraining::Obsolete => Left::Nothing,
         })
-    }
-}
-
-/// Returns the specification of the next policy: the same, with the observed returns and the last observed rate. If the
-/// problem depends on wealth, present wealth replaces initial wealth and the design interval is scaled with it.
-fn next(
-    specification: &Specification,
-    record: &SessionRecord,
-    window: Option<usize>,
-    rate: Option<f64>,
-    wealth: f64,
-) -> Result<Specification, FieldError> {
-    let mut next = specification.clone();
-    let last = record.last(window);
-    let problem = &mut next.problem;
-    if record.assets() == 1 {
-        problem.history = last.to_vec();
-    }
-    problem.rate_per_step = rate.unwrap_or(problem.rate_per_step);
-    if problem.depends_on_wealth() {
-        let factor = wealth / problem.initial_wealth;
-        problem.initial_wealth = wealth;
-        let moved = |Interval { min, max }| Interval { min: min * factor, max: max * factor };
-        next.design.wealth = next.design.wealth.map(moved);
-    }
-    match AssetsProblem::of(&next, record.rows_of(last)) {
-        Some(problem) => problem.training(next.design, next.surrogate, next.seed),
-        None => Ok(next),
     }
 }
 

@@ -121,15 +121,10 @@ impl Assets {
     }
 
     /// Chooses the composition before the period after `step`, if the policy advises that period, and returns the state
-    /// of the fund. Cost: that of [`Fund::compose`].
+    /// of the fund. Cost: that of [`Fund::enter`].
     pub(in crate::service) fn compose(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
-        let problem = &advisor.specification().problem;
-        let Some(of) = advisor.specification().fund.as_deref().filter(|_| step < problem.horizon) else {
-            self.one_step = None;
-            return State { law: problem.learning.law(&self.fund.returns()), ..*state };
-        };
-        let (composed, solution) = self.fund.compose(advisor, of, step, state);
-        let bank = 1.0 + problem.rate_per_step;
+        let (composed, solution) = self.fund.enter(advisor, step, state);
+        let bank = 1.0 + advisor.specification().problem.rate_per_step;
         self.one_step = solution.map(|solution| self.fund.one_step(&self.names, &solution, state.wealth * bank));
         composed
     }
@@ -148,7 +143,7 @@ impl Assets {
 
     /// Returns the shares of wealth in the assets that sum to `total`.
     pub fn shares(&self, total: f64) -> Vec<f64> {
-        self.fund.composition.iter().map(|share| total * share).collect()
+        self.fund.shares(total)
     }
 
     /// Returns the shares of wealth held in a period, given the `advised` total.

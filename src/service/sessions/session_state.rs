@@ -79,9 +79,9 @@ impl SessionState {
         let mut assets = self.assets.clone();
         let state = match &mut assets {
             Some(assets) => {
-                assets.fund.rows = record.rows_of(last);
-                check_rows("history", &assets.fund.rows, &assets.names, None)?;
-                State { law: learning.law(&assets.fund.returns()), ..self.state }
+                let rows = record.rows_of(last);
+                check_rows("history", &rows, &assets.names, None)?;
+                assets.fund.renew(rows, learning, &self.state)
             }
             None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
         };
@@ -132,25 +132,18 @@ impl SessionState {
         (advised, periods_per_year): (f64, Option<f64>),
     ) -> Result<Transition, FieldError> {
         let seen = self.read(report)?;
-        let (executed, traded) = match &self.assets {
+        let Report { rate, flow, .. } = *report;
+        let (executed, realised) = match &self.assets {
             Some(assets) => {
                 let executed = assets.executed(report, advised)?;
-                let traded = assets.fund.traded(&executed);
-                (executed, Some(traded))
+                let realised = assets.fund.outcome(&executed, seen.row(), rate, flow);
+                (executed, realised)
             }
-            None => (Vec::new(), None),
+            None => {
+                let action = report.executed_allocation.unwrap_or(advised);
+                (Vec::new(), PeriodOutcome { action, log_return: seen.one(), rate, flow, traded: None })
+            }
         };
-        let executed_allocation = match &self.assets {
-            Some(_) => executed.iter().sum::<f64>().min(1.0),
-            None => report.executed_allocation.unwrap_or(advised),
-        };
-        let log_return = match (&seen, &self.assets) {
-            (PeriodReturns::Several(Some(row)), Some(assets)) => Some(assets.fund.log_return(&executed, row)),
-            (PeriodReturns::One(log_return), _) => *log_return,
-            _ => None,
-        };
-        let Report { rate, flow, .. } = *report;
-        let realised = PeriodOutcome { action: executed_allocation, log_return, rate, flow, traded };
         let mut state = self.state.next_state(dynamics, &realised);
         state.wealth = match report.wealth {
             Some(reported) => reported,
@@ -162,6 +155,7 @@ impl SessionState {
         let mut standing = SessionState { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
         standing.learn(&seen, &executed, period);
         standing.price_as(report);
+        let PeriodOutcome { action: executed_allocation, log_return, .. } = realised;
         Ok(Transition { seen, log_return, executed_allocation, executed, standing })
     }
 
