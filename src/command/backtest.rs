@@ -2,7 +2,7 @@
 //!
 //! Every `--every` periods, by default a year of them, a policy is trained on the window before and followed until the
 //! next training. Nothing later than the start of a period is used for its allocation. A file of several assets is
-//! tested with the one-step problem and with common rules (`assets`). The result is a page to read, and the same as
+//! tested with a trained policy or the one-step problem, and with common rules (`assets`). The result is a page to read, and the same as
 //! JSON and CSV.
 
 use std::fmt;
@@ -15,6 +15,7 @@ use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::pool::{PoolError, TrainingPool};
 use ballast::control::progress::Watch;
 use ballast::control::request::backtest::{BacktestRequest, Rates, defaults};
+use ballast::control::request::backtest_assets::StrategyFamily;
 use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::support::Support;
@@ -44,6 +45,10 @@ pub struct BacktestArgs {
     /// that strategies know, several numbers or `all`; 10 years, 20 years and all unless given
     #[arg(long, value_delimiter = ',')]
     window: Vec<Window>,
+    /// For several assets: `policy`, the trained policy that a session follows, `one_step`, the one-step problem solved
+    /// in every period, or both; `one_step` unless given
+    #[arg(long, value_delimiter = ',', value_parser = family)]
+    strategies: Vec<StrategyFamily>,
     /// Periods from one training to the next, or for several assets from one measurement of the radius; a year of them
     /// unless given
     #[arg(long)]
@@ -73,7 +78,7 @@ pub struct BacktestArgs {
     /// Relative risk aversion: 1 is log utility
     #[arg(long, default_value_t = defaults::risk_aversion())]
     risk_aversion: f64,
-    /// Trading cost, in hundredths of a per cent of the amount traded; policies are trained with it, strategies of
+    /// Trading cost, in hundredths of a per cent of the amount traded; policies are trained with it, other strategies of
     /// several assets do not take it into account
     #[arg(long, default_value_t = 0.0)]
     cost_bp: f64,
@@ -200,6 +205,10 @@ impl BacktestArgs {
                 return Err(refused("--window", given.join(","), rule));
             }
         };
+        if !self.strategies.is_empty() {
+            let rule = "must be left out, because the file has one asset";
+            return Err(refused("--strategies", format!("{} names", self.strategies.len()), rule));
+        }
         let rows = returns.rows();
         Ok(BacktestRequest {
             log_returns: None,
@@ -243,6 +252,14 @@ impl BacktestArgs {
 
 fn centre(text: &str) -> Result<CentreSpecification, String> {
     decode::json(text.as_bytes()).map_err(|problem| problem.detail.into())
+}
+
+fn family(text: &str) -> Result<StrategyFamily, &'static str> {
+    match text {
+        "policy" => Ok(StrategyFamily::Policy),
+        "one_step" => Ok(StrategyFamily::OneStep),
+        _ => Err("must be policy or one_step"),
+    }
 }
 
 fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {

@@ -298,7 +298,31 @@ pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, thread
     let steps = product(&[threads, known, backtest.record.assets.len(), STEP_NUMBERS, NUMBER]);
     let bridges = product(&[threads, known, FACTOR_PATHS, NUMBER]);
     let record = held.saturating_add(books).saturating_add(LEAST);
-    Footprint::of(field, periods, record).and("windows", backtest.choices.windows.len(), steps.saturating_add(bridges))
+    let solved = Footprint::of(field, periods, record).and(
+        "windows",
+        backtest.choices.windows.len(),
+        steps.saturating_add(bridges),
+    );
+    let Some((sizes, at_once)) = heaviest_of_assets(backtest, threads) else { return solved };
+    let policies = product(&[at_once, sizes.policy().saturating_add(sizes.prepared())]);
+    let kept = training_keeps(&sizes).saturating_mul(at_once).saturating_add(sizes.statistics(threads));
+    solved.and("count", sizes.count, product(&[at_once, sizes.fit()])).and("horizon", sizes.horizon, policies).and(
+        "every",
+        backtest.choices.every,
+        kept.saturating_add(sizes.solving(threads)),
+    )
+}
+
+/// Returns the bytes of the cache for such a walk-forward.
+pub fn kept_by_backtest_of_assets(backtest: &AssetsBacktest, threads: usize) -> usize {
+    heaviest_of_assets(backtest, threads).map_or(0, |(sizes, at_once)| training_keeps(&sizes).saturating_mul(at_once))
+}
+
+/// Returns the sizes of the last policy of the longest window, and how many are trained side by side.
+fn heaviest_of_assets(backtest: &AssetsBacktest, threads: usize) -> Option<(Sizes, usize)> {
+    let walks = backtest.fund_walks();
+    let longest = walks.iter().max_by_key(|walk| walk.window.unwrap_or(usize::MAX))?;
+    Some((Sizes::of(&longest.last_of_fund()?), threads.min(walks.len())))
 }
 
 /// Returns the bytes of the cache for such a walk-forward.

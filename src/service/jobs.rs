@@ -203,7 +203,7 @@ impl Jobs {
             BacktestQuestion::Assets(request) => {
                 let backtest = AssetsBacktest::from_request(&request)?;
                 let estimate = estimate::backtest_of_assets(&backtest, request.returns().0, self.threads);
-                let (steps, warnings) = (backtest.strategies().len(), backtest.warnings(&request));
+                let (steps, warnings) = (backtest.step_count(), backtest.warnings(&request));
                 (BacktestQuestion::Assets(request), estimate, steps, warnings)
             }
         };

@@ -12,7 +12,7 @@ const { colourOf, colourOfLevel, colourOfMix } = await dashboardModule("strategi
 const PAGES = [
   ["adaptive", "static", "plug_in", "known_law", "parametric_adaptive", "parametric_static", "all_bank", "sixty_forty", "all_stock"],
   ["static", "plug_in", "cost_blind", "own_mix", "sixty_forty", "all_stock", "all_bank"],
-  ["robust", "robust_sup", "robust_static", "plug_in", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"],
+  ["policy", "robust", "robust_sup", "robust_static", "plug_in", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"],
 ];
 
 test("every strategy has a colour, no two of a page the same, and the same ones on every page", () => {

@@ -15,6 +15,7 @@ mod doubts;
 mod encryption;
 mod files;
 mod frontier;
+mod fund_renewal;
 mod funds;
 mod keys;
 mod labels;

@@ -1,4 +1,4 @@
-//! Walk-forward of a file of several assets, by the one-step problem and by common rules.
+//! Walk-forward of a file of several assets, by a trained policy or the one-step problem, and by common rules.
 
 use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsChoices};
 use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsWalked};
@@ -31,25 +31,19 @@ impl AssetsBacktestPage {
 impl BacktestArgs {
     /// Builds the walk-forward that these arguments request.
     fn of_assets(&self, record: AssetsRecord) -> Result<AssetsBacktest, BacktestError> {
-        let of_training = [
-            ("--horizon", self.horizon.map(|horizon| horizon.to_string())),
-            ("--count", self.count.map(|count| count.to_string())),
+        let of_one = [
             ("--cost-blind", self.cost_blind.then(|| "given".to_owned())),
             ("--scale", self.scale.map(|scale| scale.to_string())),
             ("--centre", self.centre.as_ref().map(|centre| centre.name().to_owned())),
         ];
-        if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {
-            return Err(refused(
-                option,
-                value,
-                "must be left out with several assets, because nothing is trained for them",
-            ));
+        if let Some((option, value)) = of_one.into_iter().find_map(|(option, value)| Some((option, value?))) {
+            return Err(refused(option, value, "must be left out with several assets"));
         }
         if let Some(caution) = self.caution {
             return Err(refused(
                 "--caution",
                 caution.name(),
-                "must be left out with several assets, because every level is compared",
+                "must be left out with several assets: the one-step problem is walked at every level, a policy at balanced",
             ));
         }
         let usual = AssetsChoices::usual(record.periods_per_year, record.rows.len());
@@ -70,8 +64,11 @@ impl BacktestArgs {
             }
         };
         let choices = AssetsChoices {
+            strategies: if self.strategies.is_empty() { usual.strategies } else { self.strategies.clone() },
             windows: if windows.is_empty() { usual.windows } else { windows },
-            every: self.every.unwrap_or(usual.every),
+            every: self.every.unwrap_or(usual.every.min(self.horizon.unwrap_or(usual.every))),
+            horizon: self.horizon,
+            count: self.count,
             alpha,
             support: self.support.unwrap_or(usual.support),
             risk_aversion: self.risk_aversion,

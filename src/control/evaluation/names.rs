@@ -29,6 +29,8 @@ pub enum StrategyKind {
     AllBank,
     /// A constant mix of the average allocation of the main adaptive strategy, known only at the end.
     OwnMix,
+    /// Several assets: the trained policy of their fund, as a session follows it.
+    Policy,
     /// Several assets: the best shares against the worst law in a ball of the norm `scaled_one`.
     Robust,
     /// Several assets: the best shares against the worst law in a ball of the norm `sup`.
@@ -57,6 +59,7 @@ impl StrategyKind {
             StrategyKind::AllStock => "All in stocks",
             StrategyKind::AllBank => "All in the bank",
             StrategyKind::OwnMix => "Hindsight",
+            StrategyKind::Policy => "Policy",
             StrategyKind::Robust => "Robust",
             StrategyKind::RobustSup => "Robust, sup norm",
             StrategyKind::RobustStatic => "Robust, rarely renewed",

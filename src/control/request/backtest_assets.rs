@@ -10,7 +10,9 @@ use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, fre
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::frequency::Frequency;
 use super::radius_rules::ALPHA;
-use super::rules::{LOG_RETURNS, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST, return_bounds, whole, within};
+use super::rules::{
+    COUNT, HORIZON, LOG_RETURNS, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST, return_bounds, whole, within,
+};
 use super::specification::default_seed;
 use super::support::Support;
 use crate::control::error::FieldError;
@@ -21,8 +23,22 @@ pub const MOST_READ: usize = 1_000_000_000;
 pub const MOST_HELD: usize = 2_000_000;
 /// Limit on the number of windows: a chart of more would have too many lines.
 pub const MOST_WINDOWS: usize = 5;
+/// Number of families of strategies: `policy` and `one_step`.
+pub const MOST_FAMILIES: usize = 2;
 
-/// A walk-forward through a record of several assets. It compares the one-step problem with rules that people use.
+/// Strategies of a walk-forward of several assets that are compared with the rules that people use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StrategyFamily {
+    /// The policy of a fund of the assets, trained anew every `every` periods, as a session that renews itself follows
+    /// it.
+    Policy,
+    /// The one-step problem, solved anew in every period.
+    OneStep,
+}
+
+/// A walk-forward through a record of several assets. It compares the trained policy of a session, or the one-step
+/// problem, with rules that people use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetsBacktestRequest {
@@ -43,14 +59,26 @@ pub struct AssetsBacktestRequest {
     /// Number of periods in a year, 1 to 366. Default: derived from `dates`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<usize>,
+    /// The strategies that are compared with the rules that people use: `policy`, `one_step` or both. Default:
+    /// `["one_step"]`, because a policy takes several times as long.
+    #[serde(default = "one_step")]
+    pub strategies: Vec<StrategyFamily>,
     /// Numbers of most recent periods that strategies know; null stands for all periods since the first. Default: 10
     /// years, 20 years and all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub windows: Option<Vec<Option<usize>>>,
-    /// Number of periods between estimates of the radius, and between choices of the static strategy. Default: one
-    /// year.
+    /// Number of periods between trainings of the policy, between estimates of the radius, and between choices of the
+    /// static strategy. Default: one year, or `horizon` if that is shorter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
+    /// Number of periods that a policy looks ahead, from `every` to 520. Default: `every`. Must be absent unless
+    /// `strategies` has `policy`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub horizon: Option<usize>,
+    /// Number of design points per step of a policy, 10 to 10,000. Default 100. Must be absent unless `strategies` has
+    /// `policy`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<usize>,
     /// Miscoverage of the radius, 0.001 to 0.999: the probability that the ball misses the true law. Default 0.1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<f64>,
@@ -60,12 +88,18 @@ pub struct AssetsBacktestRequest {
     /// Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3.
     #[serde(default = "defaults::risk_aversion")]
     pub risk_aversion: f64,
-    /// Trading cost, as a share of the amount traded, 0 to 0.1. No strategy takes it into account. Default 0.
+    /// Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it; no other strategy takes it
+    /// into account. Default 0.
     #[serde(default)]
     pub trading_cost: f64,
     /// Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,
+}
+
+/// Returns the default strategies.
+fn one_step() -> Vec<StrategyFamily> {
+    vec![StrategyFamily::OneStep]
 }
 
 /// A walk-forward of one asset, or of several assets if the request has the field `assets`.
@@ -97,8 +131,11 @@ impl Bounded for AssetsBacktestRequest {
         ("simple_returns", ValueBounds::list(&PERIODS, &ValueBounds::list(&ASSETS, &SIMPLE_RETURNS))),
         ("dates", ValueBounds::list(&PERIODS, &ValueBounds::Any)),
         ("periods_per_year", ValueBounds::count(&YEAR)),
+        ("strategies", ValueBounds::List(1, MOST_FAMILIES, &ValueBounds::Any)),
         ("windows", ValueBounds::List(1, MOST_WINDOWS, &ValueBounds::Any)),
         ("every", ValueBounds::Count(1, *DATES.end())),
+        ("horizon", ValueBounds::count(&HORIZON)),
+        ("count", ValueBounds::count(&COUNT)),
         ("alpha", ValueBounds::number(ALPHA)),
         ("risk_aversion", ValueBounds::number(RELATIVE_RISK_AVERSION)),
         ("trading_cost", ValueBounds::number(TRADING_COST)),

@@ -1,10 +1,10 @@
 //! Turns a request for a walk-forward of several assets into a prepared walk-forward.
 
 use super::report::AssetsChoices;
-use super::rules::{Rule, strategies};
+use super::rules::Rule;
 use super::{AssetsBacktest, AssetsRecord};
 use crate::control::error::FieldError;
-use crate::control::request::backtest::days;
+use crate::control::request::backtest::{MOST_STEPS, MOST_TRAININGS, days};
 use crate::control::request::backtest_assets::{AssetsBacktestRequest, MOST_HELD, MOST_READ};
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::warnings::Warning;
@@ -29,8 +29,11 @@ impl AssetsBacktest {
         };
         let usual = AssetsChoices::usual(periods_per_year, request.dates.len());
         let choices = AssetsChoices {
+            strategies: request.strategies.clone(),
             windows: request.windows.clone().unwrap_or(usual.windows),
-            every: request.every.unwrap_or(usual.every),
+            every: request.every.unwrap_or(usual.every.min(request.horizon.unwrap_or(usual.every))),
+            horizon: request.horizon,
+            count: request.count,
             alpha: request.alpha.unwrap_or(usual.alpha),
             support: request.support,
             risk_aversion: request.risk_aversion,
@@ -44,7 +47,7 @@ impl AssetsBacktest {
 
     /// Returns the number of shares that all strategies hold over all periods.
     pub fn shares(&self) -> usize {
-        let held = self.lived().len().saturating_mul(strategies(&self.choices.windows).len());
+        let held = self.lived().len().saturating_mul(self.strategies().len());
         held.saturating_mul(self.record.assets.len())
     }
 
@@ -62,17 +65,30 @@ impl AssetsBacktest {
             );
             return Err(FieldError::new("windows", format!("{} windows", self.choices.windows.len()), rule));
         }
+        let trainings = self.trainings();
+        let steps = trainings.saturating_mul(self.choices.horizon.unwrap_or_default());
+        if trainings > MOST_TRAININGS || steps > MOST_STEPS {
+            let rule = format!(
+                "must be larger: {trainings} policies of {steps} steps in all would be trained, and at most {MOST_TRAININGS} of {MOST_STEPS} steps are allowed"
+            );
+            return Err(FieldError::new("every", self.choices.every, rule));
+        }
         Ok(())
+    }
+
+    /// Returns the number of policies that are trained.
+    fn trainings(&self) -> usize {
+        self.fund_walks().iter().map(|walk| walk.starts().count()).sum()
     }
 
     /// Returns how many log-returns the one-step problems of all periods read.
     fn read(&self) -> usize {
-        let is_solved = |rule: &Rule| matches!(rule, Rule::Robust { .. });
+        let is_solved = |rule: &Rule| matches!(rule, Rule::Robust { .. } | Rule::Policy { .. });
         let periods = self.first..self.record.rows.len();
         let known = |window: Option<usize>| {
             periods.clone().map(|period| window.map_or(period, |window| window.min(period))).sum::<usize>()
         };
-        let solved = strategies(&self.choices.windows).into_iter().filter(|strategy| is_solved(&strategy.rule));
+        let solved = self.strategies().into_iter().filter(|strategy| is_solved(&strategy.rule));
         solved.map(|strategy| known(strategy.window)).sum::<usize>().saturating_mul(self.record.assets.len())
     }
 

@@ -5,10 +5,13 @@
 //! knows. It holds them through the period; nothing later is used. *Robust* is the one-step problem
 //! ([`crate::control::assets`]) under power or log utility. Its ball is that of `POST /advise` ([`FundsBall`]) at a
 //! level of caution, recomputed at the start of every block of periods. *Static* solves once per block and keeps its
-//! shares; *plug-in* has the radius 0. No strategy takes the trading cost into account. Nothing is trained: a policy
-//! over many periods holds the shares that the one-step problem proposes, and its worth beyond that is some basis
-//! points a year.
+//! shares; *plug-in* has the radius 0. None of these takes the trading cost into account. *Policy* is trained: it holds what
+//! a live session holds ([`policy`]), with the trading cost in its training.
 
+use serde::{Deserialize, Serialize};
+
+use self::choices::WINDOW_YEARS;
+use self::policy::{FundWalk, HeldPeriod};
 use self::report::AssetsChoices;
 use self::rules::{AssetsStrategy, NONE, Rule, equal, strategies};
 use crate::control::assets::advising::FundsBall;
@@ -19,27 +22,22 @@ use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
-use crate::control::request::assets::{AssetsProblem, DATES, check_names, check_rows};
-use crate::control::request::backtest::{defaults, too_long, usual_window};
-use crate::control::request::backtest_assets::MOST_WINDOWS;
+use crate::control::request::assets::{AssetsProblem, check_names, check_rows};
+use crate::control::request::backtest::{too_long, usual_window};
+use crate::control::request::backtest_assets::StrategyFamily;
 use crate::control::request::caution::CautionLevel;
-use crate::control::request::caution_rules::check_support;
 use crate::control::request::frequency::Frequency;
 use crate::control::request::frontier::asked_of;
 use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::radius_rules::ALPHA;
-use crate::control::request::rules::{RELATIVE_RISK_AVERSION, TRADING_COST, whole, within};
-use crate::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
-use crate::control::request::support::Support;
+use crate::control::request::specification::{DesignSpecification, ProblemSpecification, UtilitySpecification};
 
+mod choices;
 mod figures;
 mod from_request;
+pub mod policy;
 pub mod report;
 pub mod rules;
 mod words;
-
-/// Lengths of the default windows in years, besides the window of all known returns.
-const WINDOW_YEARS: [usize; 2] = [10, 20];
 
 /// Returns of several assets and of the bank, period by period.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +65,15 @@ pub struct AssetsBacktest {
     pub choices: AssetsChoices,
     /// The first period that is decided: after the longest window, or after 20 years if all returns are known.
     pub first: usize,
+}
+
+/// The decisions of one strategy, period by period.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum AssetsDecisions {
+    /// Shares of wealth in the assets, whose accounts are still to be computed.
+    Shares(Vec<Vec<f64>>),
+    /// Shares and results of a policy, as a session reports them.
+    Lived(Vec<HeldPeriod>),
 }
 
 /// The decisions and results of one strategy.
@@ -100,53 +107,13 @@ impl AssetsRecord {
     }
 }
 
-impl AssetsChoices {
-    /// Returns the default choices for a record of `found` periods with `periods_per_year` in a year. The windows are
-    /// those that leave one year of the record, or else half of it.
-    pub fn usual(periods_per_year: usize, found: usize) -> Self {
-        let long = WINDOW_YEARS.map(|years| years * periods_per_year);
-        let mut windows: Vec<_> =
-            long.into_iter().filter(|window| window + periods_per_year <= found).map(Some).collect();
-        if windows.is_empty() {
-            windows.push(Some(usual_window(long[0], found, periods_per_year)));
-        }
-        AssetsChoices {
-            windows: windows.into_iter().chain([None]).collect(),
-            every: periods_per_year,
-            alpha: 0.1,
-            risk_aversion: defaults::risk_aversion(),
-            support: Support::default(),
-            trading_cost: 0.0,
-            seed: default_seed(),
-        }
-    }
-
-    fn check(&self) -> Result<(), FieldError> {
-        let count = self.windows.len();
-        if !(1..=MOST_WINDOWS).contains(&count) {
-            return Err(FieldError::new("window", format!("{count} windows"), format!("must be 1 to {MOST_WINDOWS}")));
-        }
-        for (index, window) in self.windows.iter().enumerate() {
-            window.map_or(Ok(()), |window| whole("window", window, &DATES))?;
-            if self.windows[..index].contains(window) {
-                let value = window.map_or("all".to_owned(), |window| window.to_string());
-                return Err(FieldError::new("window", value, "must not be named twice"));
-            }
-        }
-        whole("every", self.every, &(1..=*DATES.end()))?;
-        within("alpha", self.alpha, ALPHA.0, ALPHA.1)?;
-        check_support("support", self.support)?;
-        within("risk_aversion", self.risk_aversion, RELATIVE_RISK_AVERSION.0, RELATIVE_RISK_AVERSION.1)?;
-        within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)
-    }
-}
-
 impl AssetsBacktest {
     /// Checks the choices, and every window of the record.
     ///
     /// # Errors
     /// A field that breaks its rule; the record is `simple_returns`.
     pub fn new(record: AssetsRecord, choices: AssetsChoices) -> Result<Self, FieldError> {
+        let choices = choices.with_policy();
         choices.check()?;
         check_names("assets", &record.assets)?;
         let (found, year) = (record.rows.len(), record.periods_per_year);
@@ -196,12 +163,28 @@ impl AssetsBacktest {
 
     /// Returns the number of parts of the work: blocks of periods per strategy, and radii per window.
     pub fn parts(&self) -> usize {
-        self.starts().count() * (self.strategies().len() + self.choices.windows.len())
+        self.starts().count() * (self.strategies().len() + self.solved_windows().len())
     }
 
     /// Returns the strategies in their order.
     pub fn strategies(&self) -> Vec<AssetsStrategy> {
-        strategies(&self.choices.windows)
+        strategies(&self.choices.windows, &self.choices.strategies)
+    }
+
+    /// Returns the strategies, each with the number of its first step of work in a job.
+    pub fn steps(&self) -> Vec<(usize, AssetsStrategy)> {
+        let number = |next: &mut usize, strategy: AssetsStrategy| {
+            let first = *next;
+            *next += self.fund_walk(strategy).map_or(1, |walk| walk.starts().count());
+            Some((first, strategy))
+        };
+        self.strategies().into_iter().scan(0, number).collect()
+    }
+
+    /// Returns the number of steps of work in a job: one for each policy that is trained, and for each other strategy.
+    pub fn step_count(&self) -> usize {
+        // The last strategy trains no policy.
+        self.steps().last().map_or(0, |(first, _)| first + 1)
     }
 
     /// Returns the first period of each block.
@@ -238,7 +221,42 @@ impl AssetsBacktest {
             let starts = self.starts().map(|start| (window, start)).collect();
             pool::map(starts, ball).into_iter().collect()
         };
-        self.choices.windows.iter().map(of_window).collect()
+        self.solved_windows().iter().map(of_window).collect()
+    }
+
+    /// Returns the windows whose balls are needed: all, or none if no strategy solves the one-step problem.
+    fn solved_windows(&self) -> &[Option<usize>] {
+        match self.choices.strategies.contains(&StrategyFamily::OneStep) {
+            true => &self.choices.windows,
+            false => &[],
+        }
+    }
+
+    /// Returns the walks of the strategies that follow a policy.
+    pub fn fund_walks(&self) -> Vec<FundWalk<'_>> {
+        self.strategies().into_iter().filter_map(|strategy| self.fund_walk(strategy)).collect()
+    }
+
+    /// Returns the walk of a strategy that follows a policy; `None` for the others.
+    pub fn fund_walk(&self, strategy: AssetsStrategy) -> Option<FundWalk<'_>> {
+        let Rule::Policy { caution } = strategy.rule else { return None };
+        let AssetsChoices { every, horizon, count, trading_cost, seed, .. } = self.choices;
+        let problem = AssetsProblem {
+            horizon,
+            trading_cost,
+            caution: Some(caution),
+            ..self.problem(self.first, strategy.window)
+        };
+        let design = DesignSpecification { count, ..DesignSpecification::default() };
+        Some(FundWalk {
+            record: &self.record,
+            first: self.first,
+            window: strategy.window,
+            every,
+            problem,
+            design,
+            seed,
+        })
     }
 
     /// Returns the problem that `POST /advise` would solve before a period with a window of returns. The bank is
@@ -254,43 +272,52 @@ impl AssetsBacktest {
         asked_of(self.record.assets.clone(), self.record.known(period, window).to_vec(), &specification)
     }
 
-    /// Returns the shares that a strategy holds in every period, given the balls.
+    /// Returns the decisions of a strategy in every period, given the balls.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`].
+    /// As [`AssetsStrategy::decide`].
     pub fn decide(
         &self,
         strategy: AssetsStrategy,
         balls: &[Vec<FundsBall>],
         watch: &Watch,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Vec<f64>>, TrainError> {
+    ) -> Result<AssetsDecisions, TrainError> {
         strategy.decide(self, self.balls_of(strategy, balls), watch, done)
     }
 
-    /// Computes the accounts of the shares that every strategy held.
-    pub fn walked(self, balls: &[Vec<FundsBall>], held: Vec<Vec<Vec<f64>>>) -> AssetsWalked {
-        let line = |(strategy, held)| self.line(strategy, held, self.balls_of(strategy, balls));
-        let lines = self.strategies().into_iter().zip(held).map(line).collect();
+    /// Computes the accounts of the decisions of every strategy.
+    pub fn walked(self, balls: &[Vec<FundsBall>], decided: Vec<AssetsDecisions>) -> AssetsWalked {
+        let line = |(strategy, decided)| self.line(strategy, decided, self.balls_of(strategy, balls));
+        let lines = self.strategies().into_iter().zip(decided).map(line).collect();
         AssetsWalked { lines, backtest: self }
     }
 
     fn balls_of<'a>(&self, strategy: AssetsStrategy, balls: &'a [Vec<FundsBall>]) -> &'a [FundsBall] {
         let at = self.choices.windows.iter().position(|window| *window == strategy.window);
-        at.map_or(&[][..], |at| &balls[at])
+        at.and_then(|at| balls.get(at)).map_or(&[][..], |balls| balls)
     }
 
-    fn line(&self, strategy: AssetsStrategy, held: Vec<Vec<f64>>, balls: &[FundsBall]) -> AssetsLine {
+    fn line(&self, strategy: AssetsStrategy, decided: AssetsDecisions, balls: &[FundsBall]) -> AssetsLine {
         let keep =
             |held: &[Vec<f64>]| keep_assets(held, self.lived(), self.bank(), self.choices.trading_cost, INITIAL_WEALTH);
-        let account = keep(&held);
+        let level = strategy.rule.caution().unwrap_or(NONE);
+        let radius = |period: usize| balls.get(period / self.choices.every).map_or(0.0, |ball| ball.radius_at(level));
+        let (held, account, radii) = match decided {
+            AssetsDecisions::Shares(held) => {
+                let (account, radii) = (keep(&held), (0..held.len()).map(radius).collect());
+                (held, account, radii)
+            }
+            AssetsDecisions::Lived(periods) => {
+                let (account, radii) = (Account::of_policy(&periods), periods.iter().map(|held| held.radius).collect());
+                (periods.into_iter().map(|held| held.shares).collect::<Vec<_>>(), account, radii)
+            }
+        };
         let is_equal = matches!(strategy.rule, Rule::Equal { .. });
         let mix = |total| keep(&vec![equal(self.record.assets.len(), total); held.len()]);
         let own_mix = (!is_equal).then(|| MixBooks::new(account.mean_allocation(), mix));
-        let level = strategy.rule.caution().unwrap_or(NONE);
-        let radius = |period: usize| balls.get(period / self.choices.every).map_or(0.0, |ball| ball.radius_at(level));
         let name = strategy.name(|window| self.window_in_words(window));
-        AssetsLine { name, strategy, radii: (0..held.len()).map(radius).collect(), held, account, own_mix }
+        AssetsLine { name, strategy, radii, held, account, own_mix }
     }
 }
 

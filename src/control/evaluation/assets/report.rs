@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 use crate::control::evaluation::names::StrategyKind;
+use crate::control::request::backtest_assets::StrategyFamily;
 use crate::control::request::support::Support;
 
 /// Name and version of the report format.
@@ -44,10 +45,17 @@ pub struct AssetsBacktestReport {
 /// The choices of a walk-forward of several assets.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsChoices {
+    /// The strategies that are compared with the rules that people use.
+    pub strategies: Vec<StrategyFamily>,
     /// Numbers of past periods that strategies know; null means all since the first.
     pub windows: Vec<Option<usize>>,
-    /// Periods from one measurement of the radius, and one choice of the static strategy, to the next.
+    /// Periods from one training of the policy, one measurement of the radius, and one choice of the static strategy, to
+    /// the next.
     pub every: usize,
+    /// Periods that a policy looks ahead; null if none is trained.
+    pub horizon: Option<usize>,
+    /// Design points per step of a policy; null if none is trained.
+    pub count: Option<usize>,
     /// Miscoverage of the radius.
     pub alpha: f64,
     /// The log-returns of each asset that the adversary may use.

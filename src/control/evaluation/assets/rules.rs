@@ -1,6 +1,6 @@
 //! Rules that choose the shares of several assets.
 
-use super::AssetsBacktest;
+use super::{AssetsBacktest, AssetsDecisions};
 use crate::control::assets::advising::{FundsBall, floors};
 use crate::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use crate::control::error::TrainError;
@@ -8,6 +8,7 @@ use crate::control::evaluation::names::{StrategyKind, caution_in_words};
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
+use crate::control::request::backtest_assets::StrategyFamily;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::fund::GroundNorm;
 use crate::numerics::transport::least_variance::least_variance;
@@ -16,6 +17,11 @@ use crate::numerics::transport::water_filling::inverse_volatility;
 /// A rule that chooses shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
+    /// The policy of the assets' fund, trained anew at the start of every block of periods.
+    Policy {
+        /// Share of the radius that is used.
+        caution: CautionLevel,
+    },
     /// The one-step problem, solved in every period. With no caution it is plug-in: the empirical law is taken as true.
     Robust {
         /// The adversary's cost of moving a law.
@@ -55,17 +61,22 @@ const SUP_LEVELS: [CautionLevel; 2] = [CautionLevel::Balanced, CautionLevel::Pap
 /// The caution that uses none of the radius and so trusts the record.
 pub const NONE: CautionLevel = CautionLevel::Scale(0.0);
 
-/// Returns the strategies compared for each window, and the two that use no returns.
-pub fn strategies(windows: &[Option<usize>]) -> Vec<AssetsStrategy> {
+/// Returns the rules of a family.
+fn rules_of(family: StrategyFamily) -> Vec<Rule> {
     let robust = LEVELS.into_iter().map(|caution| Rule::Robust { norm: GroundNorm::ScaledOne, caution });
     let sup = SUP_LEVELS.into_iter().map(|caution| Rule::Robust { norm: GroundNorm::Sup, caution });
-    let others = [
-        Rule::Static { caution: CautionLevel::Balanced },
-        Rule::Robust { norm: GroundNorm::Sup, caution: NONE },
-        Rule::MinimumVariance,
-        Rule::InverseVolatility,
-    ];
-    let rules: Vec<Rule> = robust.chain(sup).chain(others).collect();
+    let others =
+        [Rule::Static { caution: CautionLevel::Balanced }, Rule::Robust { norm: GroundNorm::Sup, caution: NONE }];
+    match family {
+        StrategyFamily::Policy => vec![Rule::Policy { caution: CautionLevel::Balanced }],
+        StrategyFamily::OneStep => robust.chain(sup).chain(others).collect(),
+    }
+}
+
+/// Returns the strategies compared for each window, and the two that use no returns.
+pub fn strategies(windows: &[Option<usize>], families: &[StrategyFamily]) -> Vec<AssetsStrategy> {
+    let of_families = families.iter().flat_map(|family| rules_of(*family));
+    let rules: Vec<Rule> = of_families.chain([Rule::MinimumVariance, Rule::InverseVolatility]).collect();
     let of_windows = windows.iter().flat_map(|&window| rules.iter().map(move |&rule| AssetsStrategy { rule, window }));
     let equal = [1.0, 0.6].map(|share| AssetsStrategy { rule: Rule::Equal { share }, window: None });
     of_windows.chain(equal).collect()
@@ -75,6 +86,7 @@ impl Rule {
     /// Returns the kind of the rule.
     pub fn kind(self) -> StrategyKind {
         match self {
+            Rule::Policy { .. } => StrategyKind::Policy,
             Rule::Robust { caution: NONE, .. } => StrategyKind::PlugIn,
             Rule::Robust { norm: GroundNorm::ScaledOne, .. } => StrategyKind::Robust,
             Rule::Robust { norm: GroundNorm::Sup, .. } => StrategyKind::RobustSup,
@@ -89,7 +101,9 @@ impl Rule {
     /// Returns the level of caution, if the rule uses a radius.
     pub fn caution(self) -> Option<CautionLevel> {
         match self {
-            Rule::Robust { caution, .. } | Rule::Static { caution, .. } => Some(caution).filter(|level| *level != NONE),
+            Rule::Policy { caution } | Rule::Robust { caution, .. } | Rule::Static { caution, .. } => {
+                Some(caution).filter(|level| *level != NONE)
+            }
             _ => None,
         }
     }
@@ -111,18 +125,21 @@ impl AssetsStrategy {
         format!("{}{caution}{window}", self.rule.kind().name())
     }
 
-    /// Returns the shares of wealth in every period that is decided; `balls` are those of the blocks of periods. `done`
-    /// is called after every block.
+    /// Returns the decisions of all periods; `balls` are those of the blocks of periods. `done` is called after every
+    /// block.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`].
+    /// As [`FundWalk::run`](super::policy::FundWalk::run).
     pub fn decide(
         &self,
         backtest: &AssetsBacktest,
         balls: &[FundsBall],
         watch: &Watch,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Vec<f64>>, TrainError> {
+    ) -> Result<AssetsDecisions, TrainError> {
+        if let Some(walk) = backtest.fund_walk(*self) {
+            return walk.run(watch, done).map(AssetsDecisions::Lived);
+        }
         let (every, first, periods) = (backtest.choices.every, backtest.first, backtest.record.rows.len());
         let (mut last, mut held): (Option<AssetsSolution>, Vec<Vec<f64>>) = (None, Vec::new());
         for period in first..periods {
@@ -143,12 +160,12 @@ impl AssetsStrategy {
                 (None, Rule::InverseVolatility) => inverse_volatility(rows),
                 (None, Rule::Equal { share }) => equal(rows[0].len(), share),
                 (None, Rule::Robust { norm, caution }) => solved(norm, caution),
-                (None, Rule::Static { caution }) => solved(GroundNorm::ScaledOne, caution),
+                (None, Rule::Static { caution } | Rule::Policy { caution }) => solved(GroundNorm::ScaledOne, caution),
             };
             held.push(shares);
         }
         done();
-        Ok(held)
+        Ok(AssetsDecisions::Shares(held))
     }
 }
 

@@ -34,7 +34,13 @@ pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures]) -> Vec<String
         format!("Effective number of assets held: {}.", ranges(&walked.lines, figures, number, 1, "")),
         format!("Average share of wealth held: {}.", ranges(&walked.lines, figures, share, 0, " %")),
         format!("Largest fall from a peak: {}.", ranges(&walked.lines, figures, fall, 0, " %")),
-        cost(walked.backtest.choices.trading_cost, "no strategy knows of it"),
+        cost(
+            walked.backtest.choices.trading_cost,
+            match walked.backtest.choices.horizon {
+                Some(_) => "policies are trained with it, and no other strategy knows of it",
+                None => "no strategy knows of it",
+            },
+        ),
     ]);
     sentences
 }

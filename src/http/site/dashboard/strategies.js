@@ -11,7 +11,7 @@ const TOKENS = [
   ["known_law", "cost_blind", "inverse_volatility"],
   ["parametric_adaptive", "robust_sup"],
   ["parametric_static", "minimum_variance"],
-  ["own_mix"],
+  ["own_mix", "policy"],
 ];
 
 export const colourOf = (kind) => TOKENS.findIndex((kinds) => kinds.includes(kind));

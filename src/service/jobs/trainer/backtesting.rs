@@ -10,8 +10,10 @@ use serde::de::DeserializeOwned;
 use super::{JobEnd, Worker, failed, reported, requested};
 use crate::control::cache::Cache;
 use crate::control::error::TrainError;
-use crate::control::evaluation::assets::AssetsBacktest;
+use crate::control::evaluation::assets::policy::WalkedTenure;
 use crate::control::evaluation::assets::report::AssetsBacktestReport;
+use crate::control::evaluation::assets::rules::AssetsStrategy;
+use crate::control::evaluation::assets::{AssetsBacktest, AssetsDecisions};
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
 use crate::control::evaluation::walk_forward::{Decision, SharedWork};
@@ -32,7 +34,7 @@ impl Worker {
         reported(&BacktestReport::new(&backtest.walked(decisions)))
     }
 
-    /// Runs a walk-forward of several assets. A checkpoint holds all that a strategy held.
+    /// Runs a walk-forward of several assets. A checkpoint holds the decisions of a strategy, or of one of its policies.
     fn backtest_of_assets(
         &self,
         claimed: &ClaimedJob,
@@ -41,17 +43,28 @@ impl Worker {
     ) -> Result<JobOutcome, JobEnd> {
         let backtest = AssetsBacktest::from_request(request).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::backtest_of_assets(&backtest, request.returns().0, self.threads))?;
+        let kept = Cache::new(estimate::kept_by_backtest_of_assets(&backtest, self.threads));
         let checkpoints = self.checkpoints(claimed)?;
         let watch = Watch { stop, progress: &|_| {} };
         let report = self.pool.install(|| {
             let balls = backtest.balls(&watch, &|| {})?;
-            let decide = |(index, strategy)| {
-                let decided = || backtest.decide(strategy, &balls, &watch, &|| {});
-                self.checkpointed(claimed, &checkpoints, Some(index), decided)
+            let decide = |(step, strategy): (usize, AssetsStrategy)| {
+                let Some(walk) = backtest.fund_walk(strategy) else {
+                    let decided = || backtest.decide(strategy, &balls, &watch, &|| {});
+                    return self.checkpointed(claimed, &checkpoints, Some(step), decided);
+                };
+                let mut tenures: Vec<WalkedTenure> = Vec::new();
+                for (index, start) in walk.starts().enumerate() {
+                    let before = tenures.last().map(|tenure| &tenure.after);
+                    let decided = || walk.tenure(start, before, (&watch, kept.clone()));
+                    let tenure = self.checkpointed(claimed, &checkpoints, Some(step + index), decided)?;
+                    tenures.push(tenure);
+                }
+                Ok(AssetsDecisions::Lived(tenures.into_iter().flat_map(|tenure| tenure.periods).collect()))
             };
-            let held = pool::map(backtest.strategies().into_iter().enumerate().collect(), decide);
-            let held = held.into_iter().collect::<Result<_, JobEnd>>()?;
-            Ok::<_, JobEnd>(AssetsBacktestReport::new(&backtest.walked(&balls, held)))
+            let decided = pool::map(backtest.steps(), decide);
+            let decided = decided.into_iter().collect::<Result<_, JobEnd>>()?;
+            Ok::<_, JobEnd>(AssetsBacktestReport::new(&backtest.walked(&balls, decided)))
         })?;
         reported(&report)
     }
