@@ -8,9 +8,9 @@ use ballast::control::assets::advising::FundsBall;
 use ballast::control::cache::Cache;
 use ballast::control::error::TrainError;
 use ballast::control::estimate;
-use ballast::control::evaluation::assets::AssetsBacktest;
 use ballast::control::evaluation::assets::report::AssetsBacktestReport;
 use ballast::control::evaluation::assets::rules::AssetsStrategy;
+use ballast::control::evaluation::assets::{AssetsBacktest, AssetsDecisions};
 use ballast::control::evaluation::backtest::Backtest;
 use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::frontier::Frontier;
@@ -173,16 +173,18 @@ fn frontiers() {
 
 /// The memory of walk-forwards of several assets: the bridges and steps of a long window, and the books of a long record.
 fn walks_of_assets(pool: &TrainingPool) {
-    let request = |assets: usize, dates: usize, window: usize| {
+    let request_with = |assets: usize, dates: usize, window: usize, rest: Value| {
         let row = |date: usize| -> Vec<f64> {
             (0..assets).map(|asset| 0.004 + 0.03 * ((date * (7 + asset) * 7919) as f64).sin()).collect()
         };
         let names: Vec<String> = (0..assets).map(|asset| format!("asset {asset}")).collect();
         let date = |year: usize| format!("{:04}-{:02}", 1800 + year / 12, year % 12 + 1);
-        let request = json!({ "assets": names, "log_returns": (0..dates).map(row).collect::<Vec<_>>(), "rate": 0.002,
+        let mut request = json!({ "assets": names, "log_returns": (0..dates).map(row).collect::<Vec<_>>(), "rate": 0.002,
             "dates": (0..dates).map(date).collect::<Vec<_>>(), "windows": [window], "support": { "rule": "none" } });
+        rest.as_object().unwrap().iter().for_each(|(name, value)| request[name] = value.clone());
         AssetsBacktest::from_request(&serde_json::from_value(request).unwrap()).unwrap()
     };
+    let request = |assets: usize, dates: usize, window: usize| request_with(assets, dates, window, json!({}));
     let watch = Watch::unwatched();
     let backtest = request(30, 1912, 1900);
     let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
@@ -199,12 +201,21 @@ fn walks_of_assets(pool: &TrainingPool) {
     let (strategies, lived) = (backtest.strategies().len(), backtest.lived().len());
     let (peak, _) = most_bytes(|| {
         let share = |period: usize| (0..20).map(|asset| 0.003 * (period + asset) as f64 % 0.05).collect();
-        let held = vec![(0..lived).map(share).collect::<Vec<Vec<f64>>>(); strategies];
+        let held = vec![AssetsDecisions::Shares((0..lived).map(share).collect()); strategies];
         let ball = FundsBall { radius_factor: 1.0, radius: 0.0123456789, levels: None };
         let balls = [vec![ball; lived]];
         serde_json::to_string(&AssetsBacktestReport::new(&backtest.walked(&balls, held))).unwrap()
     });
     holds("a record of several assets", estimated, peak);
+    let trained = json!({ "strategies": ["policy"], "every": 2, "count": 700 });
+    let backtest = request_with(6, 48, 36, trained);
+    let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
+    let kept = Cache::new(estimate::kept_by_backtest_of_assets(&backtest, THREADS));
+    let (peak, _) = most_bytes(|| {
+        let walk = backtest.fund_walks().remove(0);
+        pool.install(|| walk.tenure(walk.first, None, (&watch, kept)).unwrap())
+    });
+    holds("a policy of several assets", estimated, peak);
 }
 
 /// The memory of walk-forwards: the trainings of a stretch side by side, and the books of a long record.

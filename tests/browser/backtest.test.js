@@ -195,6 +195,9 @@ test("a record of several assets is asked for, and its report shows what was hel
   await page.getByText("How the backtest works, and for the quant").click();
   await page.getByLabel("History used").waitFor();
   assert.equal(await page.getByLabel("Design points").isVisible(), false);
+  await page.getByLabel("Strategies").selectOption({ label: "The trained policy of a session" });
+  assert.equal(await page.getByLabel("Design points").isVisible(), true);
+  await page.getByLabel("Strategies").selectOption({ label: "The one-step rule" });
   await page.getByLabel("History used").fill("1; all");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   await page.getByText("History used is 1; it must be from 2 to 2000.").waitFor();
@@ -202,7 +205,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   const request = (await asked).postDataJSON();
-  assert.deepEqual([request.assets, request.windows, request.alpha, request.log_returns.length], [["fund", "bonds"], [8, null], 0.1, QUARTERS]);
+  assert.deepEqual([request.assets, request.strategies, request.windows, request.alpha, request.log_returns.length], [["fund", "bonds"], ["one_step"], [8, null], 0.1, QUARTERS]);
   await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
   const told = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
   assert.equal(await page.locator("h1").textContent(), "Backtest of fund and bonds, March 2006 to December 2017");

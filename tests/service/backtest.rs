@@ -289,6 +289,57 @@ async fn a_job_reports_of_several_assets_what_the_command_reports() {
     assert_eq!(report(&app, &job).await, whole);
 }
 
+/// The policy of a session by the job and by the command, also if the job was stopped between two policies. Its wealth is
+/// that of the formula, from the shares it held.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_policy_of_several_assets_is_walked_by_the_job_and_by_the_command() {
+    let mut app = App::start().await;
+    let request = of_assets(28, &json!({ "strategies": ["policy"], "horizon": 3, "count": 10 }));
+    let job = queue(&app, &request).await;
+    let walked = report(&app, &job).await;
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (file_of_assets(folder.path(), 28), folder.path().join("report"));
+    let command = Command::new(env!("CARGO_BIN_EXE_ballast"))
+        .args(["backtest".as_ref(), file.as_os_str(), "--out".as_ref(), out.as_os_str()])
+        .args(
+            "--strategies policy --window 12,all --every 2 --horizon 3 --count 10 --alpha 0.9 --cost-bp 100".split(' '),
+        )
+        .output()
+        .unwrap();
+    assert!(command.status.success(), "{}", String::from_utf8_lossy(&command.stderr));
+    let text = std::fs::read_to_string(out.join("report.json")).unwrap();
+    assert_eq!(walked, serde_json::from_str::<Value>(&text).unwrap());
+    let names: Vec<&Value> = walked["strategies"].as_array().unwrap().iter().map(|one| &one["strategy"]).collect();
+    assert_eq!((names.len(), names[0]), (8, &json!("Policy, balanced, knows 3 years")), "{names:?}");
+    assert!(walked["sentences"].to_string().contains("policies are trained with it"), "{}", walked["sentences"]);
+    // Eight policies for each window, and six strategies that train none.
+    let steps = app.get(&format!("/jobs/{job}")).await.1["progress"]["steps_total"].clone();
+    assert_eq!(steps, json!(22));
+
+    let (risky, bank, _) = record(28);
+    let policy = &walked["periods"][0];
+    let at = |figures: &Value, period: usize| figures[period].as_f64().unwrap();
+    let (mut wealth, mut held, mut most) = (100.0, [0.0, 0.0], 0.0_f64);
+    for period in 0..16 {
+        let quarter = 12 + period;
+        let shares = ["energy", "health"].map(|name| at(&policy["allocations"][name], period));
+        let traded: f64 = shares.iter().zip(held).map(|(share, had)| f64::abs(share - had)).sum();
+        let grown = [shares[0] * (1.0 + risky[quarter]), shares[1] * (1.0 + other(quarter))];
+        let growth = (1.0 - shares[0] - shares[1]) * (1.0 + bank[quarter]) + grown[0] + grown[1];
+        wealth *= (1.0 - 0.01 * traded) * growth;
+        held = grown.map(|position| position / growth);
+        most = most.max(shares[0] + shares[1]);
+        assert!((at(&policy["wealth"], period) / wealth - 1.0).abs() < 1e-12, "{period}: {policy}");
+        assert!((at(&policy["traded"], period) - traded).abs() < 1e-12, "{period}: {policy}");
+    }
+    assert!(most > 0.05, "{policy}");
+
+    let job = queue(&app, &request).await;
+    app.until(&job, |job| job["progress"]["steps_done"].as_u64() > Some(0) || job["finished_ms"].is_i64()).await;
+    app.restart().await;
+    assert_eq!(report(&app, &job).await, walked);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_walk_forward_of_several_assets_is_cancelled_and_warned_of() {
     let app = App::start().await;
@@ -370,7 +421,10 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
     );
 
     for (options, complaint) in [
-        ("--horizon 4", "--horizon is 4: must be left out with several assets, because nothing is trained for them"),
+        (
+            "--horizon 4",
+            "--horizon is 4: must be left out unless strategies has policy, because nothing else is trained",
+        ),
         ("--alpha 0.1,0.2", "--alpha is 2 levels: must be one level if there are several assets"),
         ("--window 40", "--window is 40: must be at most 24: the record has 28 periods"),
         (

@@ -3,7 +3,6 @@
 use crate::support::App;
 use crate::support::patience::until;
 use crate::support::values::number;
-use ballast::control::evaluation::account::keep_assets;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::assets::policy::{FundWalk, HeldPeriod};
 use ballast::control::pool::TrainingPool;

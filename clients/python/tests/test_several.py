@@ -29,6 +29,11 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
     assert report["format"] == "ballast-backtest-assets-1" and report["assets"] == ["energy", "health"]
     assert report["choices"]["windows"] == [8, None]
     assert ballast.assets_walk_forward(job.id).report() == report
+    trained = ballast.backtest_assets(
+        TABLE, kind="simple", rate=0.002, strategies=["policy"], windows=[8], every=4, horizon=5, count=10, alpha=0.9
+    )
+    choices = trained.report()["choices"]
+    assert [choices[name] for name in ("strategies", "horizon", "count")] == [["policy"], 5, 10]
 
     strategies = job.frame()
     assert list(strategies.index) == [figures["strategy"] for figures in report["strategies"]]

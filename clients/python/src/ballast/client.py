@@ -330,8 +330,11 @@ class _Ballast:
         assets: Sequence[str] | None = None,
         dates: Iterable[object] | None = None,
         periods_per_year: int | None = None,
+        strategies: Sequence[wire.StrategyFamily] | None = None,
         windows: Sequence[int | None] | None = None,
         every: int | None = None,
+        horizon: int | None = None,
+        count: int | None = None,
         alpha: float | None = None,
         support: wire.Support | None = None,
         risk_aversion: float | None = None,
@@ -343,8 +346,9 @@ class _Ballast:
         it.
 
         ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``. ``rate`` and ``dates`` are as in
-        ``backtest``, but dates are required. ``windows`` says how many of the last periods each strategy learns from,
-        with ``None`` for all. The service chooses what you leave out, and the report shows what it chose. Raises
+        ``backtest``, but dates are required. ``strategies`` has ``"policy"``, the trained policy that a session follows,
+        ``"one_step"``, the one-step rule, or both; ``horizon`` and ``count`` are those of a policy. ``windows`` says how
+        many of the last periods each strategy learns from, with ``None`` for all. The service chooses what you leave out, and the report shows what it chose. Raises
         ``ValueError`` before anything is queued if ``returns``, ``rate`` or ``dates`` cannot be correct.
         """
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
@@ -356,8 +360,11 @@ class _Ballast:
             "log_returns": found.rows,
             **beside,
             "periods_per_year": periods_per_year,
+            "strategies": None if strategies is None else list(strategies),
             "windows": None if windows is None else list(windows),
             "every": every,
+            "horizon": horizon,
+            "count": count,
             "alpha": alpha,
             "support": support,
             "risk_aversion": risk_aversion,

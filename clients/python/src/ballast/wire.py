@@ -1032,7 +1032,11 @@ class Spread(TypedDict):
     """Value below which nine tenths of the paths lie."""
 
 
-StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"]
+StrategyFamily: TypeAlias = Literal["policy", "one_step"]
+"""Strategies of a walk-forward of several assets that are compared with the rules that people use."""
+
+
+StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "policy", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"]
 """A kind of strategy in a walk-forward, which decides its colour and its sentences."""
 
 
@@ -1357,7 +1361,10 @@ class Advice(TypedDict):
 
 
 class AssetsBacktestRequest(TypedDict):
-    """A walk-forward through a record of several assets. It compares the one-step problem with rules that people use."""
+    """
+    A walk-forward through a record of several assets. It compares the trained policy of a session, or the one-step
+    problem, with rules that people use.
+    """
 
     assets: list[Asset]
     """Names of the assets, 2 to 30, all different, in the order of the columns."""
@@ -1374,6 +1381,11 @@ class AssetsBacktestRequest(TypedDict):
     """Date of each period, evenly spaced: `2008-01-31`, `2008-01` or `2008`."""
     periods_per_year: NotRequired[int | None]
     """Number of periods in a year, 1 to 366. Default: derived from `dates`."""
+    strategies: NotRequired[list[StrategyFamily]]
+    """
+    The strategies that are compared with the rules that people use: `policy`, `one_step` or both. Default:
+    `["one_step"]`, because a policy takes several times as long.
+    """
     windows: NotRequired[list[Window] | None]
     """
     Numbers of most recent periods that strategies know; null stands for all periods since the first. Default: 10
@@ -1381,8 +1393,18 @@ class AssetsBacktestRequest(TypedDict):
     """
     every: NotRequired[int | None]
     """
-    Number of periods between estimates of the radius, and between choices of the static strategy. Default: one
-    year.
+    Number of periods between trainings of the policy, between estimates of the radius, and between choices of the
+    static strategy. Default: one year, or `horizon` if that is shorter.
+    """
+    horizon: NotRequired[int | None]
+    """
+    Number of periods that a policy looks ahead, from `every` to 520. Default: `every`. Must be absent unless
+    `strategies` has `policy`.
+    """
+    count: NotRequired[int | None]
+    """
+    Number of design points per step of a policy, 10 to 10,000. Default 100. Must be absent unless `strategies` has
+    `policy`.
     """
     alpha: NotRequired[float | None]
     """Miscoverage of the radius, 0.001 to 0.999: the probability that the ball misses the true law. Default 0.1."""
@@ -1391,7 +1413,10 @@ class AssetsBacktestRequest(TypedDict):
     risk_aversion: NotRequired[float]
     """Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3."""
     trading_cost: NotRequired[float]
-    """Trading cost, as a share of the amount traded, 0 to 0.1. No strategy takes it into account. Default 0."""
+    """
+    Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it; no other strategy takes it
+    into account. Default 0.
+    """
     seed: NotRequired[int]
     """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
 
@@ -1399,10 +1424,19 @@ class AssetsBacktestRequest(TypedDict):
 class AssetsChoices(TypedDict):
     """The choices of a walk-forward of several assets."""
 
+    strategies: list[StrategyFamily]
+    """The strategies that are compared with the rules that people use."""
     windows: list[int | None]
     """Numbers of past periods that strategies know; null means all since the first."""
     every: int
-    """Periods from one measurement of the radius, and one choice of the static strategy, to the next."""
+    """
+    Periods from one training of the policy, one measurement of the radius, and one choice of the static strategy, to
+    the next.
+    """
+    horizon: NotRequired[int | None]
+    """Periods that a policy looks ahead; null if none is trained."""
+    count: NotRequired[int | None]
+    """Design points per step of a policy; null if none is trained."""
     alpha: float
     """Miscoverage of the radius."""
     support: Support

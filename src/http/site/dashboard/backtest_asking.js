@@ -14,6 +14,8 @@ const windowsOf = (text) => text.split(";").map((part) => (part.trim() === "all"
 /** Default confidence levels, for several assets and for one. */
 const LEVELS = { true: "90", false: "95; 90; 50" };
 const OWN = "own";
+/** Strategies of several assets that are compared with the rules that people use, as the request names them. */
+const FAMILIES = { one_step: "The one-step rule", policy: "The trained policy of a session", "policy,one_step": "Both" };
 /** Twenty years for the first training, and ten to backtest. */
 const EXAMPLE = { latest: 360 };
 
@@ -50,6 +52,13 @@ function asking() {
   investor.control.value = "balanced";
   const aversion = input({ name: "risk_aversion", label: "Risk aversion", note: "Relative risk aversion, 1 to 100.", value: "3" });
   aversion.element.hidden = true;
+  const families = select({
+    name: "strategies",
+    label: "Strategies",
+    note: "Compared with rules that people use. A policy takes several times as long as the one-step rule.",
+    choices: FAMILIES,
+    changed: () => shown(),
+  });
   const window = input({ name: "window", label: "Trained on", note: "Number of periods before. Blank: 20 years, or half of a shorter record." });
   const every = input({ name: "every", label: "Retrained every", note: "Number of periods. Blank: a year." });
   const horizon = input({ name: "horizon", label: "Looking ahead", note: "Number of periods. Blank: until the next training." });
@@ -58,8 +67,11 @@ function asking() {
   const seed = input({ name: "seed", label: "Seed", value: "1" });
   const blind = select({ name: "cost_blind", label: "Policies take the trading cost into account", choices: { false: "Yes", true: "No" } });
   const isSeveral = () => (record?.series.length ?? 0) > 1;
+  const isTrained = () => !isSeveral() || families.control.value.includes("policy");
   const shown = () => {
-    for (const { element } of [horizon, points, blind]) element.hidden = isSeveral();
+    families.element.hidden = !isSeveral();
+    blind.element.hidden = isSeveral();
+    for (const { element } of [horizon, points]) element.hidden = !isTrained();
     const asked = isSeveral()
       ? { window: ["History used", "Number of periods, or \u201call\u201d; separate several by semicolons. Blank: 10 years, 20 years and all, as far as the record allows."], alpha: ["Confidence, %", "One level."] }
       : { window: ["Trained on", "Number of periods before. Blank: 20 years, or half of a shorter record."], alpha: ["Confidence, %", "One to three, separated by semicolons. The report says most about the second."] };
@@ -76,7 +88,7 @@ function asking() {
   };
   shown();
   const send = h("button", { type: "submit" }, "Backtest");
-  const more = h("details", {}, h("summary", {}, "How the backtest works, and for the quant"), fieldset("How the backtest works", [window, every, horizon, levels, blind, points, seed]));
+  const more = h("details", {}, h("summary", {}, "How the backtest works, and for the quant"), fieldset("How the backtest works", [families, window, every, horizon, levels, blind, points, seed]));
   const form = h(
     "form",
     { novalidate: true },
@@ -100,9 +112,10 @@ function asking() {
     if (isSeveral()) {
       if (request.alpha.length === 1) [request.alpha] = request.alpha;
       if (text(window) !== "") request.windows = windowsOf(text(window));
+      request.strategies = families.control.value.split(",");
     } else request.cost_blind = blind.control.value === "true";
     if (!yearly.element.hidden) request.periods_per_year = typed(text(yearly));
-    for (const field of isSeveral() ? [every, seed] : [window, every, horizon, points, seed]) if (text(field) !== "") request[field.name] = typed(text(field));
+    for (const field of [...(isSeveral() ? [] : [window]), every, ...(isTrained() ? [horizon, points] : []), seed]) if (text(field) !== "") request[field.name] = typed(text(field));
     return request;
   };
   const ask = async () => {

@@ -31,15 +31,17 @@ export function ofAssets(report) {
 
 /** Describes the record, the method and the investor. */
 export function walkedAssets({ assets, choices, lines, unit, times }) {
-  const { every, trading_cost, risk_aversion } = choices;
+  const { every, trading_cost, risk_aversion, strategies } = choices;
   const length = lines[0].wealth.length - 1;
   const investor = investorWords(risk_aversion === 1 ? { kind: "log" } : { kind: "power", risk_aversion });
-  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded, and no strategy takes that into account.` : "Trading is free here, so strategies that trade often look better than they would in reality.";
+  const isTrained = strategies.includes("policy");
+  const known = isTrained ? "policies are trained with that, and no other strategy takes it into account" : "no strategy takes that into account";
+  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded, and ${known}.` : "Trading is free here, so strategies that trade often look better than they would in reality.";
   return h(
     "div",
     { class: "words" },
     h("p", {}, `${count(lines.length)} ways to hold ${count(assets.length)} assets, through ${counted(length, unit)}, ${times.name(1)} to ${times.name(length)}, for ${investor}.`),
-    h("p", {}, `Each ${unit} a strategy decides from the returns that it knows, and never from later ones. The caution is set again every ${counted(every, unit)}. ${cost}`),
+    h("p", {}, `Each ${unit} a strategy decides from the returns that it knows, and never from later ones. The caution is set again every ${counted(every, unit)}. ${isTrained ? `As often the next policy is trained, and followed as a session follows it. ` : ""}${cost}`),
   );
 }
 
