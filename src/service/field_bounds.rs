@@ -9,7 +9,9 @@ use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
 use crate::service::advice::returns::ReadReturns;
 use crate::service::advice::what_if::{POINTS, SweepRange, WhatIf};
-use crate::service::entries::report::{Correct, LONGEST_REASON, MOST_CORRECTIONS, Observe, PRICE, Report};
+use crate::service::entries::report::{
+    Correct, END_PRICE, LONGEST_REASON, MOST_CORRECTIONS, Observe, PRICE, REPORTED_RETURN, Report,
+};
 use crate::service::entries::reports::REPORTS;
 use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewing};
 
@@ -17,6 +19,8 @@ use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewing};
 pub const LISTED_REPORTS: ValueBounds = ValueBounds::list(&REPORTS, &ValueBounds::Any);
 const WEALTHS: ValueBounds = ValueBounds::number(WEALTH);
 const PRICES: ValueBounds = ValueBounds::number(PRICE);
+const END_PRICES: ValueBounds = ValueBounds::number(END_PRICE);
+const REPORTED_RETURNS: ValueBounds = ValueBounds::number(REPORTED_RETURN);
 const FROM_ONE: ValueBounds = ValueBounds::CountFrom(1);
 /// The bounds of a name that may not be empty.
 const GIVEN: ValueBounds = ValueBounds::Text(1, usize::MAX);
@@ -29,14 +33,14 @@ impl Bounded for SessionStart {
 impl Bounded for Report {
     const BOUNDS: &'static [FieldBounds] = &[
         ("log_return", LOG_RETURNS),
-        ("simple_return", SIMPLE_RETURNS),
-        ("price", PRICES),
+        ("simple_return", REPORTED_RETURNS),
+        ("price", END_PRICES),
         ("previous_price", PRICES),
         ("rate", ValueBounds::number(RATE)),
         ("flow", ValueBounds::Number(-WEALTH.1, WEALTH.1)),
         ("log_returns", ValueBounds::ByAsset(&LOG_RETURNS)),
-        ("simple_returns", ValueBounds::ByAsset(&SIMPLE_RETURNS)),
-        ("prices", ValueBounds::ByAsset(&PRICES)),
+        ("simple_returns", ValueBounds::ByAsset(&REPORTED_RETURNS)),
+        ("prices", ValueBounds::ByAsset(&END_PRICES)),
         ("previous_prices", ValueBounds::ByAsset(&PRICES)),
         ("executed_allocation", SHARES),
         ("executed_allocations", ValueBounds::ByAsset(&SHARES)),
@@ -81,8 +85,8 @@ impl Bounded for WhatIf {
         ("simple_return", SIMPLE_RETURNS),
         ("holdings", ValueBounds::ByAsset(&SHARES)),
         ("log_returns", ValueBounds::ByAsset(&LOG_RETURNS)),
-        ("simple_returns", ValueBounds::ByAsset(&SIMPLE_RETURNS)),
-        ("prices", ValueBounds::ByAsset(&PRICES)),
+        ("simple_returns", ValueBounds::ByAsset(&REPORTED_RETURNS)),
+        ("prices", ValueBounds::ByAsset(&END_PRICES)),
         ("previous_prices", ValueBounds::ByAsset(&PRICES)),
     ];
 }

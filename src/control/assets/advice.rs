@@ -72,7 +72,7 @@ pub struct WorstMean {
 }
 
 /// Returns the values by the names of the assets.
-pub fn named(names: &[String], values: &[f64]) -> BTreeMap<String, f64> {
+pub fn named<T: Copy>(names: &[String], values: &[T]) -> BTreeMap<String, T> {
     names.iter().cloned().zip(values.iter().copied()).collect()
 }
 

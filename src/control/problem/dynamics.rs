@@ -107,7 +107,9 @@ impl Dynamics {
     pub fn next_after(self, wealth: f64, traded: f64, action: f64, log_return: f64) -> (f64, f64) {
         let growth = self.growth(action, log_return);
         let grown = wealth * self.left(traded) * growth;
-        let (next, share) = (grown + self.contribution, action * log_return.exp() / growth);
+        // If everything was held and lost, nothing is held any more.
+        let share = if growth > 0.0 { action * log_return.exp() / growth } else { 0.0 };
+        let next = grown + self.contribution;
         // If wealth cannot pay for a withdrawal nothing is left; if it hardly can, the asset is sold as well.
         (next, if next > 0.0 { (share * (grown / next)).min(1.0) } else { share })
     }

@@ -26,6 +26,18 @@ impl PeriodOutcome {
     pub fn of(action: f64, log_return: f64) -> Self {
         PeriodOutcome { action, log_return: Some(log_return), rate: None, flow: None, traded: None }
     }
+
+    /// Returns the dynamics of the period with the rate and the flow that were realised.
+    pub fn dynamics(&self, dynamics: Dynamics) -> Dynamics {
+        let rate_per_step = self.rate.unwrap_or(dynamics.rate_per_step);
+        let contribution = self.flow.unwrap_or(dynamics.contribution);
+        Dynamics { rate_per_step, contribution, ..dynamics }
+    }
+
+    /// Returns the share of wealth bought and sold, from the share `holding`.
+    pub fn turnover(&self, holding: f64) -> f64 {
+        self.traded.unwrap_or_else(|| f64::abs(self.action - holding))
+    }
 }
 
 /// Wealth, the share of it held, and the empirical law of log-returns.
@@ -63,11 +75,8 @@ impl State {
     /// Returns G(y, a, z): next wealth and holding after a period of `dynamics` with the values `realised`, and the law
     /// with the return learned.
     pub fn next_state(&self, dynamics: Dynamics, realised: &PeriodOutcome) -> State {
-        let PeriodOutcome { action, log_return, rate, flow, traded } = *realised;
-        let rate_per_step = rate.unwrap_or(dynamics.rate_per_step);
-        let contribution = flow.unwrap_or(dynamics.contribution);
-        let dynamics = Dynamics { rate_per_step, contribution, ..dynamics };
-        let traded = traded.unwrap_or_else(|| f64::abs(action - self.holding));
+        let PeriodOutcome { action, log_return, .. } = *realised;
+        let (dynamics, traded) = (realised.dynamics(dynamics), realised.turnover(self.holding));
         let (wealth, holding) = dynamics.next_after(self.wealth, traded, action, log_return.unwrap_or(0.0));
         let mut law = self.law.clone();
         log_return.into_iter().for_each(|seen| law.push(seen));

@@ -45,13 +45,13 @@ pub struct WhatIf {
     pub holdings: Option<BTreeMap<String, f64>>,
     /// Returns of several assets in the coming period, in one of three ways; the advice is for the period after.
     #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
-    pub log_returns: Option<BTreeMap<String, f64>>,
+    pub log_returns: Option<BTreeMap<String, Option<f64>>>,
     /// The returns as `price / previous price - 1` instead.
-    pub simple_returns: Option<BTreeMap<String, f64>>,
+    pub simple_returns: Option<BTreeMap<String, Option<f64>>>,
     /// Prices of several assets at the end of the coming period.
-    pub prices: Option<BTreeMap<String, f64>>,
+    pub prices: Option<BTreeMap<String, Option<f64>>>,
     /// Prices of several assets at its start. Default: those reported for the period before.
-    pub previous_prices: Option<BTreeMap<String, f64>>,
+    pub previous_prices: Option<BTreeMap<String, Option<f64>>>,
     /// `worst_case`: solve the step, and show the whole worst-case law.
     pub explain: Option<Explain>,
     /// A range for one of the fields above; every point is solved.

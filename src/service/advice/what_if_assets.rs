@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::what_if::{Hypothesis, WhatIfResult};
@@ -27,7 +26,7 @@ pub struct AssetsWhatIfPoint {
     pub wealth: f64,
     /// The returns of the hypothesis by asset, if it has any.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub log_returns: Option<BTreeMap<String, f64>>,
+    pub log_returns: Option<BTreeMap<String, Option<f64>>>,
     /// The factor on the radius in the hypothesis, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_scale: Option<f64>,
@@ -115,7 +114,7 @@ impl WhatIfScenario {
                     _ => error,
                 }
             })?;
-            log_returns = passed.seen.row().map(<[f64]>::to_vec);
+            log_returns = standing.assets.as_ref().and_then(|assets| assets.shown(&passed.seen));
             (standing, step, period) = (passed.standing, following, period + 1);
             standing.compose(advisor, step);
         }
@@ -126,7 +125,7 @@ impl WhatIfScenario {
         Ok(AssetsWhatIfPoint {
             period,
             wealth,
-            log_returns: log_returns.map(|row| named(&assets.names, &row)),
+            log_returns,
             radius_scale: hypothesis.radius_scale(),
             advice: FundAdvice::new(&advice, assets),
             gamma: worst_case.as_ref().map(|worst| worst.multiplier),

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use crate::service::entries::notes::{self, PeriodNote};
 use crate::service::entries::report::Report;
 use crate::service::sessions::assets::{Composition, ObservedAssets};
 
@@ -13,6 +14,8 @@ pub(super) struct Acknowledged {
     executed_allocation: f64,
     wealth: f64,
     assets: Option<ObservedAssets>,
+    #[serde(default)]
+    notes: Vec<PeriodNote>,
 }
 
 impl Acknowledged {
@@ -20,20 +23,23 @@ impl Acknowledged {
     /// them.
     pub(in crate::service) fn report(&self, reported: &Report) -> Report {
         let Report { date, rate, flow, .. } = *reported;
-        let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::default() };
+        let wealth = Some(self.wealth);
+        let common = Report { wealth, date, rate, flow, is_recorded: true, ..Report::default() };
+        let of_lost = |asset| notes::is_lost(&self.notes, asset).then_some(f64::NEG_INFINITY);
         match &self.assets {
             Some(assets) => Report {
-                log_returns: assets.log_returns.clone(),
+                log_returns: assets.log_returns.as_ref().map(|all| {
+                    all.iter().map(|(name, seen)| (name.clone(), seen.or_else(|| of_lost(Some(name))))).collect()
+                }),
                 missing: assets.log_returns.is_none(),
                 executed_allocations: Some(assets.executed_allocations.clone()),
                 ..common
             },
-            None => Report {
-                log_return: self.log_return,
-                missing: self.log_return.is_none(),
-                executed_allocation: Some(self.executed_allocation),
-                ..common
-            },
+            None => {
+                let log_return = self.log_return.or_else(|| of_lost(None));
+                let executed_allocation = Some(self.executed_allocation);
+                Report { log_return, missing: log_return.is_none(), executed_allocation, ..common }
+            }
         }
     }
 

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::problem::actions::Band;
 use crate::service::entries::drift::Drift;
+use crate::service::entries::notes::PeriodNote;
 use crate::service::sessions::assets::{Composition, ObservedAssets};
 
 /// The session after an observation.
@@ -14,8 +15,11 @@ use crate::service::sessions::assets::{Composition, ObservedAssets};
 pub struct Observed {
     pub session: String,
     pub period: usize,
-    /// Null if it is missing.
+    /// Null if it is missing, or after a total loss, which `notes` says.
     pub log_return: Option<f64>,
+    /// Notes on the period: losses that the law does not learn in full, and prices that did not come.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<PeriodNote>,
     /// The holdings that are best kept at the start of the period. If trading costs nothing, both ends are the advised
     /// allocation.
     #[schema(value_type = [f64; 2])]
@@ -50,7 +54,7 @@ pub struct Corrected {
     pub correction: usize,
     /// The period corrected, inserted or removed.
     pub period: usize,
-    /// Its log-return now; null if it is missing or removed.
+    /// Its log-return now; null if it is missing, removed or a total loss.
     pub log_return: Option<f64>,
     /// Periods observed now.
     pub observed: usize,

@@ -54,6 +54,8 @@ pub enum DoubtReason {
     FutureDay,
     /// Its return lies more than 4 standard deviations from the record.
     UnusualReturn,
+    /// Its return is -100 %.
+    TotalLoss,
     /// Most reports in the list for the same policy and day have another return.
     DiffersFromPeers,
 }
@@ -151,7 +153,7 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
     Some(Doubt { missing, ..Doubt::new(DoubtReason::MissingPeriods, "date", day.to_string(), sentence) })
 }
 
-/// Doubts a log-return z that lies far from a record with mean m and standard deviation s: |z - m| > 4 s, at any size.
+/// Doubts a total loss, and a log-return z that lies far from a record with mean m and standard deviation s: |z - m| > 4 s, at any size.
 /// Checked by: `tests/service/doubts.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
 pub(in crate::service) fn of_return(
     field: &str,
@@ -159,6 +161,10 @@ pub(in crate::service) fn of_return(
     (mean, deviation): (f64, f64),
     log_return: f64,
 ) -> Option<Doubt> {
+    if log_return == f64::NEG_INFINITY {
+        let sentence = "a return of -100 % is a total loss: a total loss is always doubted".to_owned();
+        return Some(Doubt::new(DoubtReason::TotalLoss, field, value, sentence));
+    }
     let distance = (log_return - mean).abs();
     if distance <= (UNUSUAL_DEVIATIONS * deviation).max(ROUNDING) {
         return None;

@@ -12,6 +12,7 @@ use crate::control::policy::advisor::AdviceMode;
 use crate::control::request::terms::Terms;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::entries::answer::{Corrected, Observed};
+use crate::service::entries::notes::{self, PeriodNote};
 use crate::service::entries::periods::{Periods, Replay, ReplayedPeriod, SessionPeriod};
 use crate::service::entries::report::{Correct, Report};
 use crate::service::error::ServiceError;
@@ -74,8 +75,11 @@ pub struct Now {
     /// Its present report, if it was corrected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reported: Option<Report>,
-    /// Null if it is missing.
+    /// Null if it is missing, or after a total loss, which `notes` says.
     pub log_return: Option<f64>,
+    /// Notes on the period: losses that the law does not learn in full, and prices that did not come.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<PeriodNote>,
     /// Figures of several assets by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<AssetsNow>,
@@ -96,8 +100,9 @@ pub struct Now {
 /// A period of several assets after all corrections.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct AssetsNow {
-    /// Log-returns by asset name; null if they are missing.
-    pub log_returns: Option<BTreeMap<String, f64>>,
+    /// Log-returns by asset name; null if they are missing. Null for an asset whose price did not come, or that lost
+    /// everything, which `notes` says.
+    pub log_returns: Option<BTreeMap<String, Option<f64>>>,
 }
 
 /// One correction, as it was made.
@@ -262,11 +267,11 @@ fn observations(
 /// Builds the period that leaves the session in the state `after`.
 fn now(period: &SessionPeriod, passed: ReplayedPeriod, after: &SessionState, advice: &Advice) -> Now {
     let ReplayedPeriod { before, seen, log_return, executed_allocation, .. } = passed;
-    let names = before.assets.as_ref().map(|assets| &assets.names);
     Now {
         reported: (!period.corrections.is_empty()).then(|| period.report.clone()),
         log_return,
-        assets: names.map(|names| AssetsNow { log_returns: seen.row().map(|row| named(names, row)) }),
+        notes: notes::of(&seen, before.names()),
+        assets: before.assets.as_ref().map(|assets| AssetsNow { log_returns: assets.shown(&seen) }),
         advised_allocation: advice.allocation,
         executed_allocation,
         wealth: after.state.wealth,
@@ -285,7 +290,7 @@ fn inserted(
     (advice, uncertainty): (&Advice, Uncertainty),
 ) -> Observed {
     let assets = passed.before.assets.as_ref().map(|assets| ObservedAssets {
-        log_returns: passed.seen.row().map(|row| named(&assets.names, row)),
+        log_returns: assets.shown(&passed.seen),
         advised_allocations: named(&assets.names, &passed.executed),
         executed_allocations: named(&assets.names, &passed.executed),
         composed: assets.composed(),
@@ -294,6 +299,7 @@ fn inserted(
         session: session.to_owned(),
         period,
         log_return: passed.log_return,
+        notes: notes::of(&passed.seen, passed.before.names()),
         band: advice.band,
         advised_allocation: passed.executed_allocation,
         executed_allocation: passed.executed_allocation,

@@ -3,12 +3,14 @@
 
 pub(super) mod acknowledged;
 pub mod answer;
+pub(super) mod assets_report;
 pub mod change;
 pub(super) mod corrections;
 pub(super) mod days;
 pub mod doubts;
 pub mod drift;
 pub mod history;
+pub mod notes;
 pub mod periods;
 pub(super) mod record;
 pub(super) mod recording;

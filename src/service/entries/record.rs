@@ -3,30 +3,33 @@
 use crate::control::request::assets::DATES;
 use crate::control::request::rules;
 
-/// The returns of a period; `None` if they are missing.
+/// The lowest log-return that a law learns; a total loss counts as this much.
+pub(in crate::service) const LEAST_LEARNED: f64 = -rules::LOG_RETURN;
+
+/// The log-returns of a period, one for each asset of the session.
 #[derive(Debug, Clone, PartialEq)]
-pub enum PeriodReturns {
-    /// The log-return of one asset.
-    One(Option<f64>),
-    /// The log-returns of several assets.
-    Several(Option<Vec<f64>>),
+pub struct PeriodReturns {
+    /// In the order of the assets: minus infinity after a total loss, and `None` if it is missing.
+    pub log_returns: Vec<Option<f64>>,
+    /// Indices of the assets whose return also covers earlier periods, in which their price did not come.
+    pub late: Vec<usize>,
 }
 
 impl PeriodReturns {
-    /// Returns the row of several assets if it is not missing.
-    pub(in crate::service) fn row(&self) -> Option<&[f64]> {
-        match self {
-            PeriodReturns::Several(row) => row.as_deref(),
-            PeriodReturns::One(_) => None,
-        }
+    /// Returns whether every return is missing.
+    pub(in crate::service) fn is_missing(&self) -> bool {
+        self.log_returns.iter().all(Option::is_none)
     }
 
-    /// Returns the log-return of one asset if it is not missing.
-    pub(in crate::service) fn one(&self) -> Option<f64> {
-        match self {
-            PeriodReturns::One(log_return) => *log_return,
-            PeriodReturns::Several(_) => None,
-        }
+    /// Returns the log-returns that move wealth: an asset without a return counts as unmoved.
+    pub(in crate::service) fn moves(&self) -> Vec<f64> {
+        self.log_returns.iter().map(|log_return| log_return.unwrap_or(0.0)).collect()
+    }
+
+    /// Returns the row that a law learns. `None` if there is no return of every asset over this period alone.
+    pub(in crate::service) fn learned(&self) -> Option<Vec<f64>> {
+        let row: Option<Vec<f64>> = self.log_returns.iter().copied().collect();
+        row.filter(|_| self.late.is_empty()).map(|row| row.into_iter().map(|z| z.max(LEAST_LEARNED)).collect())
     }
 }
 
@@ -43,12 +46,9 @@ impl SessionRecord {
         SessionRecord { assets, values }
     }
 
-    /// Appends the returns of a period.
+    /// Appends the returns of a period, if there is one of every asset.
     pub(in crate::service) fn learn(&mut self, seen: &PeriodReturns) {
-        match seen {
-            PeriodReturns::One(log_return) => self.values.extend(log_return),
-            PeriodReturns::Several(row) => self.values.extend(row.iter().flatten()),
-        }
+        self.values.extend(seen.learned().into_iter().flatten());
     }
 
     /// Returns the number of assets.

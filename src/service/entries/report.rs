@@ -14,12 +14,15 @@ use crate::service::entries::doubts::Doubt;
 
 /// The range of prices: any currency, any quantity.
 pub const PRICE: (f64, f64) = (1e-12, 1e15);
+/// The range of prices at the end of a period, where 0 is a total loss.
+pub const END_PRICE: (f64, f64) = (0.0, PRICE.1);
+/// The range of simple returns in a report, where -1 is a total loss.
+pub const REPORTED_RETURN: (f64, f64) = (-1.0, rules::SIMPLE_RETURN.1);
 /// The most corrections of a session: a replay goes through all of them.
 pub const MOST_CORRECTIONS: usize = 1_000;
 /// The most characters of a reason.
 pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
-const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
 pub(in crate::service) const OF_SEVERAL: &str =
     "must be absent: the session has one asset, and the field is for several";
 pub(in crate::service) const OF_ONE: &str = "must be absent: the session has several assets, and the field is for one";
@@ -37,28 +40,30 @@ macro_rules! reporting {
             #[schema(example = 0.012)]
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub log_return: Option<f64>,
-            /// `price / previous price - 1`.
+            /// `price / previous price - 1`; -1 is a total loss.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub simple_return: Option<f64>,
-            /// Price at the end of the period.
+            /// Price at the end of the period; 0 is a total loss.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub price: Option<f64>,
             /// Price at the start of the period. Default: the price reported for the period before.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub previous_price: Option<f64>,
-            /// Log-returns of several assets by name; each has one.
+            /// Log-returns of several assets by name. Each has one, or null if its price did not come.
             #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
             #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub log_returns: Option<BTreeMap<String, f64>>,
-            /// `price / previous price - 1` of several assets by name.
+            pub log_returns: Option<BTreeMap<String, Option<f64>>>,
+            /// `price / previous price - 1` of several assets by name; -1 is a total loss. The return after a null
+            /// covers every period since the last price.
             #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub simple_returns: Option<BTreeMap<String, f64>>,
-            /// Prices of several assets at the end of the period.
+            pub simple_returns: Option<BTreeMap<String, Option<f64>>>,
+            /// Prices of several assets at the end of the period; 0 is a total loss.
             #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub prices: Option<BTreeMap<String, f64>>,
-            /// Prices of several assets at the start of the period. Default: those reported for the period before.
+            pub prices: Option<BTreeMap<String, Option<f64>>>,
+            /// Prices of several assets at the start of the period, or the last one that came. Default: those reported
+            /// before.
             #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub previous_prices: Option<BTreeMap<String, f64>>,
+            pub previous_prices: Option<BTreeMap<String, Option<f64>>>,
             /// Given instead of a return if none is known: the law does not change, and the holdings count as unmoved.
             #[serde(default, skip_serializing_if = "std::ops::Not::not")]
             pub missing: bool,
@@ -87,7 +92,11 @@ macro_rules! reporting {
 
 reporting! {
     /// The record of a period: its return, given in exactly one of three ways or as missing, and the trades in it.
-    Report {}
+    Report {
+        /// True if its numbers come from the record, in which a log-return may be minus infinity after a total loss.
+        #[serde(skip)]
+        is_recorded: bool,
+    }
 }
 
 reporting! {
@@ -162,6 +171,16 @@ macro_rules! report_of {
 report_of!(Observe);
 report_of!(Correct);
 
+/// Converts a reported simple return to a log-return: minus infinity for a total loss.
+pub(in crate::service) fn reported_log_return(field: &str, simple_return: f64) -> Result<f64, FieldError> {
+    rules::within(field, simple_return, REPORTED_RETURN.0, REPORTED_RETURN.1)?;
+    if simple_return >= rules::SIMPLE_RETURN.0 {
+        log_return_of(field, simple_return)
+    } else {
+        Ok(simple_return.ln_1p())
+    }
+}
+
 /// Converts a simple return, named `field` in messages, to a log-return.
 pub(in crate::service) fn log_return_of(field: &str, simple_return: f64) -> Result<f64, FieldError> {
     rules::within(field, simple_return, rules::SIMPLE_RETURN.0, rules::SIMPLE_RETURN.1)?;
@@ -201,8 +220,8 @@ impl Report {
     pub(in crate::service) fn log_return(&self, known_price: Option<f64>) -> Result<Option<f64>, FieldError> {
         none_of(&self.of_several(), OF_SEVERAL)?;
         match (self.log_return, self.simple_return, self.price, self.missing) {
-            (Some(value), None, None, false) => rules::log_return("log_return", value).map(|()| Some(value)),
-            (None, Some(value), None, false) => log_return_of("simple_return", value).map(Some),
+            (Some(value), None, None, false) => self.given_log_return("log_return", value).map(Some),
+            (None, Some(value), None, false) => reported_log_return("simple_return", value).map(Some),
             (None, None, Some(price), false) => self.between_prices(price, known_price).map(Some),
             (None, None, None, true) => Ok(None),
             (None, None, None, false) => {
@@ -212,56 +231,6 @@ impl Report {
             (.., true) => Err(FieldError::new("missing", true, ONE_RETURN)),
             (Some(value), ..) => Err(FieldError::new("log_return", value, ONE_RETURN)),
             (None, Some(value), ..) => Err(FieldError::new("simple_return", value, ONE_RETURN)),
-        }
-    }
-
-    /// Returns the log-returns of several assets with these names; `known` are the prices reported for the period
-    /// before.
-    ///
-    /// # Errors
-    /// They are not given in exactly one way, one is out of bounds, or an asset has none.
-    pub(in crate::service) fn log_returns(
-        &self,
-        names: &[String],
-        known: Option<&[f64]>,
-    ) -> Result<Option<Vec<f64>>, FieldError> {
-        let of_one = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
-        let values = [self.log_return, self.simple_return, self.price, self.previous_price, self.executed_allocation];
-        none_of(&std::array::from_fn::<_, 5, _>(|index| (of_one[index], values[index].is_some())), OF_ONE)?;
-        if self.previous_prices.is_some() && self.prices.is_none() {
-            return Err(FieldError::new("previous_prices", "an object", "must be absent unless prices are given"));
-        }
-        let read = |field: &str, values, of: &dyn Fn(&str, usize, f64) -> Result<f64, FieldError>| {
-            let values = by_name(field, values, names)?;
-            let one = |(asset, value): (usize, f64)| of(&format!("{field}.{}", names[asset]), asset, value);
-            values.into_iter().enumerate().map(one).collect::<Result<Vec<f64>, FieldError>>().map(Some)
-        };
-        match (&self.log_returns, &self.simple_returns, &self.prices, self.missing) {
-            (Some(values), None, None, false) => {
-                read("log_returns", values, &|field, _, value| rules::log_return(field, value).map(|()| value))
-            }
-            (None, Some(values), None, false) => {
-                read("simple_returns", values, &|field, _, value| log_return_of(field, value))
-            }
-            (None, None, Some(prices), false) => {
-                let given = self.previous_prices.as_ref().map(|before| by_name("previous_prices", before, names));
-                let given = given.transpose()?;
-                let before = given.as_deref().or(known).ok_or_else(|| {
-                    let rule = "must be given with prices if the period before was not reported with prices";
-                    FieldError::new("previous_prices", "null", rule)
-                })?;
-                read("prices", prices, &|field, asset, price| {
-                    between(field, price, (&format!("previous_{field}"), before[asset]))
-                })
-            }
-            (None, None, None, true) => Ok(None),
-            (None, None, None, false) => {
-                let rule = "must be given, or simple_returns, prices or missing instead of it";
-                Err(FieldError::new("log_returns", "null", rule))
-            }
-            (.., true) => Err(FieldError::new("missing", true, RETURNS_ONCE)),
-            (Some(_), ..) => Err(FieldError::new("log_returns", "an object", RETURNS_ONCE)),
-            (None, ..) => Err(FieldError::new("simple_returns", "an object", RETURNS_ONCE)),
         }
     }
 
@@ -282,7 +251,7 @@ impl Report {
         let given = ways.into_iter().find_map(|(field, values)| values.as_ref().map(|values| (field, values)));
         let (field, values) =
             given.map_or(("log_returns", self.log_returns.as_ref()), |(field, all)| (field, Some(all)));
-        (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied()))
+        (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied().flatten()))
     }
 
     /// Returns the field that gave the return, and its value.
@@ -294,8 +263,17 @@ impl Report {
         }
     }
 
+    /// Checks a log-return that was given as one.
+    pub(super) fn given_log_return(&self, field: &str, value: f64) -> Result<f64, FieldError> {
+        if self.is_recorded {
+            return Ok(value);
+        }
+        rules::log_return(field, value).map(|()| value)
+    }
+
     fn between_prices(&self, price: f64, known: Option<f64>) -> Result<f64, FieldError> {
-        let before = self.previous_price.or(known).ok_or_else(|| {
+        // After a total loss the price is 0, which no return follows.
+        let before = self.previous_price.or(known.filter(|price| *price > 0.0)).ok_or_else(|| {
             FieldError::new(
                 "previous_price",
                 "null",
@@ -316,14 +294,14 @@ pub(in crate::service) fn none_of(fields: &[(&'static str, bool)], rule: &str) -
 }
 
 /// Returns the values in the order of the assets, each of which must have one.
-pub(in crate::service) fn by_name(
+pub(in crate::service) fn by_name<T: Copy + Serialize>(
     field: &str,
-    values: &BTreeMap<String, f64>,
+    values: &BTreeMap<String, T>,
     names: &[String],
-) -> Result<Vec<f64>, FieldError> {
+) -> Result<Vec<T>, FieldError> {
     if let Some((other, value)) = values.iter().find(|(name, _)| !names.contains(name)) {
         let rule = format!("must name one of the assets: {}", names.join(", "));
-        return Err(FieldError::new(format!("{field}.{other}"), *value, rule));
+        return Err(FieldError::new(format!("{field}.{other}"), serde_json::json!(value), rule));
     }
     let of = |name: &String| {
         let value = values.get(name).copied();
@@ -334,12 +312,14 @@ pub(in crate::service) fn by_name(
     names.iter().map(of).collect()
 }
 
-/// Returns the log-return between two prices; messages use the names of their fields.
-fn between(field: &str, price: f64, (named, before): (&str, f64)) -> Result<f64, FieldError> {
-    rules::within(field, price, PRICE.0, PRICE.1)?;
+/// Returns the log-return between two prices, minus infinity down to 0; messages use the names of their fields.
+pub(super) fn between(field: &str, price: f64, (named, before): (&str, f64)) -> Result<f64, FieldError> {
+    rules::within(field, price, END_PRICE.0, END_PRICE.1)?;
     rules::within(named, before, PRICE.0, PRICE.1)?;
     let log_return = (price / before).ln();
-    let rule = format!("must give a log-return in [-{0}, {0}] from {before}", rules::LOG_RETURN);
-    rules::log_return(field, log_return).map_err(|_| FieldError::new(field, price, rule))?;
-    Ok(log_return)
+    if log_return <= rules::LOG_RETURN {
+        return Ok(log_return);
+    }
+    let rule = format!("must give a log-return of at most {} from {before}", rules::LOG_RETURN);
+    Err(FieldError::new(field, price, rule))
 }

@@ -15,6 +15,7 @@ use crate::control::request::fund::CompositionRule;
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::service::entries::record::PeriodReturns;
 use crate::service::entries::report::{Report, by_name};
 
 /// The largest sum of shares of wealth, with room for rounding.
@@ -28,8 +29,10 @@ pub struct Assets {
     pub fund: Fund,
     /// The one-step problem behind the composition, as answers show it.
     pub one_step: Option<OneStep>,
-    /// The prices reported for the last period, if any were.
-    pub prices: Option<Vec<f64>>,
+    /// The prices reported for the last period, or the last that came for an asset that waits for one.
+    pub prices: Vec<Option<f64>>,
+    /// True for an asset whose price did not come in the last period.
+    pub waiting: Vec<bool>,
 }
 
 /// Several assets before the coming period, by their names.
@@ -54,8 +57,9 @@ pub struct PlannedAssets {
 /// A period of several assets, by their names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ObservedAssets {
-    /// Null if they are missing.
-    pub log_returns: Option<BTreeMap<String, f64>>,
+    /// Null if they are missing. Null for an asset whose price did not come, or that lost everything, which `notes`
+    /// says.
+    pub log_returns: Option<BTreeMap<String, Option<f64>>>,
     /// Advised share of wealth in each asset.
     pub advised_allocations: BTreeMap<String, f64>,
     /// Executed share of wealth in each asset.
@@ -79,7 +83,8 @@ impl Assets {
             Some(holdings) => shares("holdings", holdings, names)?,
             None => vec![0.0; names.len()],
         };
-        Ok(Assets { names: names.into(), fund: Fund::at(rows, holdings), one_step: None, prices: None })
+        let (prices, waiting) = (vec![None; names.len()], vec![false; names.len()]);
+        Ok(Assets { names: names.into(), fund: Fund::at(rows, holdings), one_step: None, prices, waiting })
     }
 
     /// Builds the assets as an answer showed them before the coming period.
@@ -157,12 +162,42 @@ impl Assets {
         }
     }
 
-    /// Returns the log-returns of all assets, or `None` if they are missing.
+    /// Reads the log-returns of a period.
     ///
     /// # Errors
     /// They are not given in exactly one way, are not of these assets, or one breaks a rule.
-    pub(in crate::service) fn log_returns(&self, report: &Report) -> Result<Option<Vec<f64>>, FieldError> {
-        report.log_returns(&self.names, self.prices.as_deref())
+    pub(in crate::service) fn read(&self, report: &Report) -> Result<PeriodReturns, FieldError> {
+        let log_returns = report.log_returns(&self.names, &self.prices)?;
+        let came = |asset: &usize| self.waiting[*asset] && log_returns[*asset].is_some();
+        let late = (0..log_returns.len()).filter(came).collect();
+        Ok(PeriodReturns { log_returns, late })
+    }
+
+    /// Returns the log-returns of a period by name, `None` if they are missing.
+    pub(in crate::service) fn shown(&self, seen: &PeriodReturns) -> Option<BTreeMap<String, Option<f64>>> {
+        (!seen.is_missing()).then(|| named(&self.names, &seen.log_returns))
+    }
+
+    /// Updates record and holdings after a period in which `executed` was held and that left the share `holding` in all
+    /// assets.
+    pub(in crate::service) fn passed(&mut self, executed: &[f64], seen: &PeriodReturns, holding: f64) {
+        let dates = self.fund.rows.len();
+        self.fund.passed(executed, Some(&seen.moves()), holding);
+        self.fund.rows.truncate(dates);
+        self.fund.rows.extend(seen.learned());
+        if !seen.is_missing() {
+            self.waiting = seen.log_returns.iter().map(Option::is_none).collect();
+        }
+    }
+
+    /// Takes over the prices reported with the last period. An asset that waits for its price keeps the last one.
+    pub(in crate::service) fn price_as(&mut self, report: &Report) {
+        let prices = report.prices.as_ref().and_then(|prices| by_name("prices", prices, &self.names).ok());
+        for (asset, known) in self.prices.iter_mut().enumerate() {
+            if !self.waiting[asset] {
+                *known = prices.as_ref().and_then(|prices| prices[asset]);
+            }
+        }
     }
 
     /// Returns the mean and standard deviation of an asset's log-returns.

@@ -12,6 +12,7 @@ use crate::service::callers::allowance::HeavyPermit;
 use crate::service::callers::fair_queue::FairQueue;
 use crate::service::entries::answer::Observed;
 use crate::service::entries::doubts::{self, Doubt, Doubts};
+use crate::service::entries::notes;
 use crate::service::entries::periods::Periods;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::error::ServiceError;
@@ -233,13 +234,14 @@ impl LiveSession {
             session: observe.session.clone(),
             period: observe.period,
             log_return,
+            notes: notes::of(&seen, standing.names()),
             band,
             advised_allocation: allocation,
             executed_allocation,
             wealth: standing.state.wealth,
             holding: standing.state.holding,
             assets: standing.assets.as_ref().map(|assets| ObservedAssets {
-                log_returns: seen.row().map(|row| named(&assets.names, row)),
+                log_returns: assets.shown(&seen),
                 advised_allocations: named(&assets.names, &advised.unwrap_or_default()),
                 executed_allocations: named(&assets.names, &executed),
                 composed: assets.composed(),

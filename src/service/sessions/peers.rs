@@ -10,7 +10,7 @@ use jiff::civil::Date;
 
 use crate::service::callers::keys::Caller;
 use crate::service::entries::doubts::{Doubt, DoubtReason, ROUNDING};
-use crate::service::entries::record::PeriodReturns;
+use crate::service::entries::record::LEAST_LEARNED;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::sessions::Sessions;
 
@@ -66,15 +66,16 @@ impl Sessions {
             None => {
                 let log_return = report.log_return(live.standing.price.filter(|_| is_coming)).ok()??;
                 let (field, value) = report.given();
-                Some(vec![(group(0), (field.to_owned(), value), log_return)])
+                Some(vec![(group(0), (field.to_owned(), value), log_return.max(LEAST_LEARNED))])
             }
             Some(assets) => {
-                let row = PeriodReturns::Several(assets.log_returns(&report).ok()?);
-                let of_asset = |(asset, log_return): (usize, &f64)| {
+                let seen = assets.read(&report).ok()?;
+                let of_asset = |(asset, log_return): (usize, &Option<f64>)| {
                     let (field, value) = report.given_of(&assets.names[asset]);
-                    (group(asset), (field, value.unwrap_or(*log_return)), *log_return)
+                    let log_return = (*log_return)?.max(LEAST_LEARNED);
+                    Some((group(asset), (field, value.unwrap_or(log_return)), log_return))
                 };
-                Some(row.row()?.iter().enumerate().map(of_asset).collect())
+                Some(seen.log_returns.iter().enumerate().filter_map(of_asset).collect())
             }
         }
     }

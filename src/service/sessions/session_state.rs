@@ -15,8 +15,8 @@ use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
 use crate::service::entries::doubts::{self, Doubt};
 use crate::service::entries::drift::DriftTest;
-use crate::service::entries::record::{PeriodReturns, SessionRecord};
-use crate::service::entries::report::{Report, by_name};
+use crate::service::entries::record::{LEAST_LEARNED, PeriodReturns, SessionRecord};
+use crate::service::entries::report::Report;
 use crate::service::sessions::assets::{Assets, Composition, mean};
 
 /// The state of a session between two periods.
@@ -42,7 +42,7 @@ pub struct SessionState {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     pub seen: PeriodReturns,
-    /// For several assets, the log-return of the holdings.
+    /// For several assets, the log-return of the holdings; minus infinity if they lost everything.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
     /// Shares of wealth held in several assets; empty for one asset.
@@ -114,8 +114,8 @@ impl SessionState {
             ));
         }
         match &self.assets {
-            Some(assets) => assets.log_returns(report).map(PeriodReturns::Several),
-            None => report.log_return(self.price).map(PeriodReturns::One),
+            Some(assets) => assets.read(report),
+            None => Ok(PeriodReturns { log_returns: vec![report.log_return(self.price)?], late: Vec::new() }),
         }
     }
 
@@ -133,18 +133,32 @@ impl SessionState {
     ) -> Result<Transition, FieldError> {
         let seen = self.read(report)?;
         let Report { rate, flow, .. } = *report;
+        let moves = (!seen.is_missing()).then(|| seen.moves());
         let (executed, realised) = match &self.assets {
             Some(assets) => {
                 let executed = assets.executed(report, advised)?;
-                let realised = assets.fund.outcome(&executed, seen.row(), rate, flow);
+                let realised = assets.fund.outcome(&executed, moves.as_deref(), rate, flow);
                 (executed, realised)
             }
             None => {
                 let action = report.executed_allocation.unwrap_or(advised);
-                (Vec::new(), PeriodOutcome { action, log_return: seen.one(), rate, flow, traded: None })
+                let log_return = moves.map(|moves| moves[0]);
+                (Vec::new(), PeriodOutcome { action, log_return, rate, flow, traded: None })
             }
         };
-        let mut state = self.state.next_state(dynamics, &realised);
+        let log_return = realised.log_return.map(|log_return| log_return.max(LEAST_LEARNED));
+        let learned = PeriodOutcome { log_return, ..realised };
+        let mut state = self.state.next_state(dynamics, &learned);
+        if learned != realised {
+            // Wealth bears the whole loss.
+            let exact = learned.dynamics(dynamics).next_after(
+                self.state.wealth,
+                learned.turnover(self.state.holding),
+                learned.action,
+                realised.log_return.unwrap_or(0.0),
+            );
+            (state.wealth, state.holding) = exact;
+        }
         state.wealth = match report.wealth {
             Some(reported) => reported,
             None => check_wealth_range(state.wealth, report)?,
@@ -170,14 +184,10 @@ impl SessionState {
 
     /// Updates the record, the drift test and the holdings after a period.
     fn learn(&mut self, seen: &PeriodReturns, executed: &[f64], period: usize) {
-        let row = seen.row();
         if let Some(assets) = &mut self.assets {
-            assets.fund.passed(executed, row, self.state.holding);
+            assets.passed(executed, seen, self.state.holding);
         }
-        let log_return = match seen {
-            PeriodReturns::One(log_return) => *log_return,
-            PeriodReturns::Several(_) => row.map(mean),
-        };
+        let log_return = seen.learned().as_deref().map(mean);
         self.seen.iter_mut().zip(log_return).for_each(|(seen, log_return)| seen.push(log_return));
         self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), log_return, &self.session, period);
     }
@@ -186,7 +196,7 @@ impl SessionState {
     pub(in crate::service) fn price_as(&mut self, report: &Report) {
         self.price = report.price;
         if let Some(assets) = &mut self.assets {
-            assets.prices = report.prices.as_ref().and_then(|prices| by_name("prices", prices, &assets.names).ok());
+            assets.price_as(report);
         }
     }
 
@@ -239,23 +249,22 @@ impl SessionState {
 
     /// Returns doubts about the returns of a report, each against the record of its asset.
     pub(in crate::service) fn return_doubts(&self, report: &Report, seen: &PeriodReturns) -> Vec<Doubt> {
-        match (seen, &self.assets) {
-            (PeriodReturns::One(Some(log_return)), _) => {
-                let (field, value) = report.given();
-                let record = CentralMoments::of(&self.state.law);
-                let moments = (record.mean(), record.variance().sqrt());
-                doubts::of_return(field, value, moments, *log_return).into_iter().collect()
-            }
-            (PeriodReturns::Several(Some(row)), Some(assets)) => {
-                let of_asset = |(asset, (name, log_return)): (usize, (&String, &f64))| {
-                    let (field, value) = report.given_of(name);
-                    let moments = assets.moments(asset);
-                    doubts::of_return(&field, value.unwrap_or(*log_return), moments, *log_return)
-                };
-                assets.names.iter().zip(row).enumerate().filter_map(of_asset).collect()
-            }
-            _ => Vec::new(),
-        }
+        let of_asset = |(asset, log_return): (usize, &Option<f64>)| {
+            let log_return = (*log_return)?;
+            let (field, value, moments) = match &self.assets {
+                Some(assets) => {
+                    let (field, value) = report.given_of(&assets.names[asset]);
+                    (field, value.unwrap_or(log_return), assets.moments(asset))
+                }
+                None => {
+                    let (field, value) = report.given();
+                    let record = CentralMoments::of(&self.state.law);
+                    (field.to_owned(), value, (record.mean(), record.variance().sqrt()))
+                }
+            };
+            doubts::of_return(&field, value, moments, log_return)
+        };
+        seen.log_returns.iter().enumerate().filter_map(of_asset).collect()
     }
 }
 
