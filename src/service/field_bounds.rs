@@ -1,6 +1,7 @@
 //! The bounds of the fields of requests about sessions and of advice without one. Their checkers use the same constants.
 
 use super::sessions::SessionStart;
+use crate::control::request::assets::{MOST_ASSETS, NAME_LENGTH};
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::radius_rules::{FIXED_RADIUS, RADIUS_SCALE};
 use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURNS, RATE, SHARES, SIMPLE_RETURNS, WEALTH};
@@ -13,6 +14,7 @@ use crate::service::entries::report::{
     Correct, END_PRICE, LONGEST_REASON, MOST_CORRECTIONS, Observe, PRICE, REPORTED_RETURN, Report,
 };
 use crate::service::entries::reports::REPORTS;
+use crate::service::sessions::asset_change::LENGTH;
 use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewing};
 
 /// The bounds of a list of reports.
@@ -67,6 +69,8 @@ impl Bounded for Renew {
         ("renewal", ValueBounds::Count(1, MOST_RENEWALS)),
         ("policy", GIVEN),
         ("window", ValueBounds::count(&HISTORY_LENGTH)),
+        ("records", ValueBounds::ByAsset(&ValueBounds::list(&LENGTH, &LOG_RETURNS))),
+        ("leaving", ValueBounds::List(0, MOST_ASSETS, &ValueBounds::text(&NAME_LENGTH))),
     ];
 }
 

@@ -11,6 +11,7 @@
 //! Its modules hold the state of one session in memory, its rows, its slots and its sequence of policies. What is
 //! recorded of a session is decided in [`crate::service::entries`].
 
+pub(super) mod asset_change;
 pub mod assets;
 pub(super) mod content;
 pub mod fund_advice;
@@ -48,6 +49,7 @@ use crate::service::process::clock::Clock;
 use crate::service::process::config::Config;
 use crate::service::process::memory::Memory;
 use crate::service::process::spans;
+use crate::service::sessions::asset_change::AssetNames;
 use crate::service::sessions::assets::Assets;
 use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::live::{AdviceContext, LiveSession, SESSION_BYTES};
@@ -220,14 +222,14 @@ impl Sessions {
             CreateSession::NoPolicy => return Err(ServiceError::unknown("policy", &row.policy)),
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
-        let current = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         let live = LiveSession {
+            current: Arc::new(plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None)),
             standing: SessionState::at(&row.session, state, assets),
             row: Arc::new(row),
+            names: AssetNames::from(plan.names()),
             observed: 0,
             corrections: 0,
             renewals: 0,
-            current: Arc::new(current),
             renew,
             seen,
             radius: None,

@@ -362,3 +362,54 @@ async fn what_is_wrong_with_several_assets_is_named() {
         assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(named.as_str())), "{refused}");
     }
 }
+
+/// Returns the log certainty equivalent of power utility 5 over equally likely rows, less the cost of the trade.
+fn worth_after_trade(rows: &[[f64; 3]], shares: [f64; 3], held: [f64; 3], cost: f64) -> f64 {
+    let bank = 1.002 * (1.0 - shares.iter().sum::<f64>());
+    let growth = |row: &[f64; 3]| bank + row.iter().zip(shares).map(|(z, share)| share * z.exp()).sum::<f64>();
+    let mean = rows.iter().map(|row| growth(row).powi(-4)).sum::<f64>() / rows.len() as f64;
+    let traded: f64 = shares.iter().zip(held).map(|(share, held)| (share - held).abs()).sum();
+    -0.25 * mean.ln() + (1.0 - cost * traded).ln()
+}
+
+/// Without an adversary the value of every allocation has a formula. No point of a grid over three assets is worth more than
+/// what is advised, from holdings that are best kept, partly traded, and traded all the way.
+#[tokio::test(flavor = "multi_thread")]
+async fn no_allocation_on_a_grid_is_worth_more_after_its_trade_than_the_advice() {
+    const POINTS: usize = 50;
+    let app = App::start().await;
+    let row = |month: u32| [0.9, 1.7, 2.3].map(|pace| 0.008 + 0.05 * (pace * f64::from(month)).sin());
+    let rows: Vec<[f64; 3]> = (0..48).map(row).collect();
+    let mut turnovers = Vec::new();
+    for cost in [0.0005, 0.005, 0.03] {
+        let problem = json!({ "assets": ["a", "b", "c"], "history": rows, "rate_per_step": 0.002, "trading_cost": cost,
+            "risk_aversion": 5.0, "radius": { "rule": "fixed", "radius": 0.0 } });
+        for held in [[0.0, 0.0, 0.0], [0.5, 0.2, 0.1], [0.1, 0.1, 0.8], [0.3, 0.3, 0.3]] {
+            let holdings = json!({ "a": held[0], "b": held[1], "c": held[2] });
+            let (status, advised) = app.post("/advise", &json!({ "problem": problem, "holdings": holdings })).await;
+            assert_eq!(status, 200, "{advised}");
+            let shares = ["a", "b", "c"].map(|name| advised["allocation"][name].as_f64().unwrap());
+            let best = worth_after_trade(&rows, shares, held, cost);
+            let certain = advised["certainty_equivalent"].as_f64().unwrap() / 100.2;
+            assert!((certain.ln() + 1.002_f64.ln() - best).abs() < 1e-8, "{advised}: {best}");
+            let part = |points: usize| points as f64 / POINTS as f64;
+            for a in 0..=POINTS {
+                for b in 0..=POINTS - a {
+                    for c in 0..=POINTS - a - b {
+                        let other = [part(a), part(b), part(c)];
+                        let worth = worth_after_trade(&rows, other, held, cost);
+                        assert!(
+                            worth < best + 1e-7,
+                            "{cost} {held:?}: {other:?} is worth {worth}, not {best}: {advised}"
+                        );
+                    }
+                }
+            }
+            turnovers.push(shares.iter().zip(held).map(|(share, held)| (share - held).abs()).sum::<f64>());
+        }
+    }
+    assert!(
+        turnovers.iter().any(|turnover| *turnover == 0.0) && turnovers.iter().any(|turnover| *turnover > 0.3),
+        "{turnovers:?}"
+    );
+}

@@ -315,7 +315,7 @@ async fn what_is_wrong_of_several_assets_is_named() {
         (json!({ "log_returns": { "stocks": 0.01, "bonds": 0.0 } }), "log_returns.gold"),
         (json!({ "log_returns": { "stocks": 0.01, "bonds": 0.0, "gold": 0.0, "oil": 0.1 } }), "log_returns.oil"),
         (json!({ "log_returns": all(9.0) }), "log_returns.stocks"),
-        (json!({ "simple_returns": all(-1.0) }), "simple_returns.stocks"),
+        (json!({ "simple_returns": all(-1.1) }), "simple_returns.stocks"),
         (json!({ "prices": { "stocks": 1.0, "bonds": 1.0, "gold": 1.0 } }), "previous_prices"),
         (json!({ "previous_prices": all(1.0), "log_returns": all(0.0) }), "previous_prices"),
         (json!({ "log_returns": all(0.0), "simple_returns": all(0.0) }), "log_returns"),

@@ -5,6 +5,8 @@ extern crate ballast_test_support as support;
 
 mod account;
 mod advise;
+mod asset_changes;
+mod asset_periods;
 mod audit;
 mod backtest;
 mod backup;

@@ -11,6 +11,7 @@ use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::AdviceMode;
 use crate::control::request::terms::Terms;
 use crate::service::callers::allowance::HeavyPermit;
+use crate::service::entries::account::{self, Accounts, PeriodAccount};
 use crate::service::entries::answer::{Corrected, Observed};
 use crate::service::entries::notes::{self, PeriodNote};
 use crate::service::entries::periods::{Periods, Replay, ReplayedPeriod, SessionPeriod};
@@ -38,7 +39,7 @@ pub struct History {
     pub initial_holding: f64,
     /// Radius of the uncertainty set before the first period, in the unit of an advice's radius.
     pub initial_radius: f64,
-    /// Names of the assets, if there are several.
+    /// Names of the assets at the start, if there are several. A renewal that changes them has the new `names`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<Vec<String>>,
     /// Figures of the assets at the start.
@@ -46,6 +47,9 @@ pub struct History {
     pub composed: Option<Composition>,
     /// Log-returns known at the start.
     pub history: InitialHistory,
+    /// Log-returns that the law is made of, oldest first and with all corrections: of the present assets, and without
+    /// periods in which one has none. A renewal may use the last ones only.
+    pub record: InitialHistory,
     pub observations: Vec<Observation>,
     pub corrections: Vec<Correction>,
     /// The policies that followed the first.
@@ -61,6 +65,8 @@ pub struct Observation {
     /// The first report of it.
     pub reported: Report,
     pub observed_ms: i64,
+    /// Money of the period after all corrections, beside what simple rules would have made.
+    pub account: PeriodAccount,
     /// Numbers of the corrections that inserted it or reported it again.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub corrections: Vec<usize>,
@@ -123,6 +129,12 @@ pub struct Renewal {
     pub answered: Renewed,
     /// Number of last returns that the law was made of; null if it used all.
     pub window: Option<usize>,
+    /// The record that each asset entered with, by name.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub records: BTreeMap<String, Vec<Option<f64>>>,
+    /// Names of the assets that left.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub leaving: Vec<String>,
     pub renewed_ms: i64,
 }
 
@@ -157,8 +169,11 @@ impl Sessions {
         };
         let SessionPlan { terms, assets, .. } = SessionPlan::of(&facts.row)?;
         let start = periods.at_start(terms.learning);
-        let listing = move || Ok::<_, ServiceError>((observations(&facts, &periods, first, changed)?, facts.row));
-        let (observations, row) = self.apart(tenant, is_large, listing).await??;
+        let listing = move || {
+            let Accounts { accounts, record } = account::of(&periods)?;
+            Ok::<_, ServiceError>((observations(&facts, &periods, (first, changed), accounts)?, record, facts.row))
+        };
+        let (observations, record, row) = self.apart(tenant, is_large, listing).await??;
         let first = self.policies.advisor(tenant, &row.policy).await?;
         let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
@@ -171,6 +186,7 @@ impl Sessions {
             initial_holding,
             initial_radius,
             history: InitialHistory::of(history, assets.as_ref().map(Vec::len)),
+            record: InitialHistory::of(record.all().to_vec(), assets.as_ref().map(|_| record.assets())),
             assets,
             composed,
             observations,
@@ -226,15 +242,16 @@ fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction
         match entry.kind {
             EntryKind::Observation => {}
             EntryKind::Correction => corrections.push(Correction {
-                correction: content(entry, periods.names())?,
-                answer: answer(entry, periods.names())?,
+                correction: content(entry, periods.names.at(entry.entry))?,
+                answer: answer(entry, periods.names.at(entry.entry))?,
                 corrected_ms: entry.created_ms,
             }),
-            EntryKind::Renewal => renewals.push(Renewal {
-                answered: answer(entry, periods.names())?,
-                window: content::<Renew>(entry, periods.names())?.window,
-                renewed_ms: entry.created_ms,
-            }),
+            EntryKind::Renewal => {
+                let names = periods.names.at(entry.entry);
+                let Renew { window, records, leaving, .. } = content(entry, names)?;
+                let answered = answer(entry, names)?;
+                renewals.push(Renewal { answered, window, records, leaving, renewed_ms: entry.created_ms });
+            }
         }
     }
     Ok((corrections, renewals))
@@ -247,21 +264,22 @@ type Changed = (Now, Option<Observed>);
 fn observations(
     facts: &SessionFacts,
     periods: &Periods,
-    first: usize,
-    changed: Vec<Changed>,
+    (first, changed): (usize, Vec<Changed>),
+    accounts: Vec<PeriodAccount>,
 ) -> Result<Vec<Observation>, ServiceError> {
     let mut changed = changed.into_iter();
-    let row = |(index, period): (usize, &SessionPeriod)| {
+    let row = |((index, period), account): ((usize, &SessionPeriod), PeriodAccount)| {
         let entry = &facts.entries[period.entry];
+        let names = periods.names.at(entry.entry);
         let (now, inserted) = if index >= first { changed.next() } else { None }.unzip();
         let (acknowledged, reported) = match inserted.flatten() {
-            Some(observed) => (observed, content::<Correct>(entry, periods.names())?.report()),
-            None => (answer::<Observed>(entry, periods.names())?, content(entry, periods.names())?),
+            Some(observed) => (observed, content::<Correct>(entry, names)?.report()),
+            None => (answer::<Observed>(entry, names)?, content(entry, names)?),
         };
         let (answered, corrections) = (Observed { period: index + 1, ..acknowledged }, period.corrections.clone());
-        Ok(Observation { answered, reported, observed_ms: entry.created_ms, corrections, now })
+        Ok(Observation { answered, reported, observed_ms: entry.created_ms, account, corrections, now })
     };
-    periods.all.iter().enumerate().map(row).collect()
+    periods.all.iter().enumerate().zip(accounts).map(row).collect()
 }
 
 /// Builds the period that leaves the session in the state `after`.

@@ -1,6 +1,7 @@
 //! The entries of a session: reports, corrections and renewals, how each is decided, recorded, replayed and shown.
 //! Nothing here answers a question that records nothing; those live in [`crate::service::advice`].
 
+pub mod account;
 pub(super) mod acknowledged;
 pub mod answer;
 pub(super) mod assets_report;

@@ -15,8 +15,9 @@ use crate::service::entries::change::Change;
 use crate::service::entries::record::{PeriodReturns, SessionRecord};
 use crate::service::entries::report::{Correct, Report};
 use crate::service::error::ServiceError;
+use crate::service::sessions::asset_change::{AssetChange, AssetNames};
 use crate::service::sessions::assets::{Assets, Composition, PlannedAssets};
-use crate::service::sessions::content::{answer, content};
+use crate::service::sessions::content::{answer, content, names_after};
 use crate::service::sessions::plan::{PolicyTenure, Renew, Renewed, SessionPlan};
 use crate::service::sessions::session_state::{SessionState, Transition};
 use crate::store::{EntryKind, SessionFacts};
@@ -46,9 +47,20 @@ pub struct Periods {
     pub stretches: Vec<PolicyTenure>,
     start: SessionState,
     history: SessionRecord,
-    /// Compositions of several assets that corrections and renewals reported, in order, by the number of periods before
-    /// them.
-    composed: BTreeMap<usize, Vec<Composition>>,
+    /// The names of several assets, entry by entry.
+    pub names: AssetNames,
+    /// Renewals, and compositions of several assets that corrections and renewals reported, in order, by the number of
+    /// periods before them.
+    events: BTreeMap<usize, Vec<BetweenPeriods>>,
+}
+
+/// Something recorded between two periods.
+#[derive(Debug, Clone)]
+enum BetweenPeriods {
+    /// The composition of several assets that an answer reported.
+    Composed(Box<Composition>),
+    /// The next policy began, perhaps with other assets.
+    Renewed(Option<Box<AssetChange>>),
 }
 
 /// A replay of a session up to some period.
@@ -74,6 +86,8 @@ pub struct ReplayedPeriod {
     pub executed_allocation: f64,
     /// Shares of wealth held in several assets; empty for one asset.
     pub executed: Vec<f64>,
+    /// Share of wealth bought and sold for them.
+    pub turnover: f64,
 }
 
 impl SessionPeriod {
@@ -113,10 +127,15 @@ impl Periods {
             stretches: vec![first],
             start: SessionState::at(&row.session, state, assets),
             history,
-            composed: BTreeMap::new(),
+            names: AssetNames::from(plan.names()),
+            events: BTreeMap::new(),
         };
-        let names = plan.names();
         for (index, entry) in entries.iter().enumerate() {
+            let own = periods.names.last().to_vec();
+            if let Some(changed) = names_after(entry)? {
+                periods.names.change(entry.entry, changed.into());
+            }
+            let names = &periods.names.last().to_vec();
             match entry.kind {
                 EntryKind::Observation => periods.all.push(SessionPeriod {
                     report: content(entry, names)?,
@@ -128,12 +147,14 @@ impl Periods {
                 EntryKind::Correction => {
                     periods.correct(&content(entry, names)?, index)?;
                     let composition = answer::<Corrected>(entry, names)?.assets;
-                    periods.tell(composition);
+                    periods.add(composition.map(composed));
                 }
                 EntryKind::Renewal => {
                     let renew: Renew = content(entry, names)?;
                     let Renewed { terms, assets, .. } = answer(entry, names)?;
-                    periods.tell(assets);
+                    let change = AssetChange::new((&own, names), &renew, periods.all.len())?;
+                    periods
+                        .add([BetweenPeriods::Renewed(change.map(Box::new))].into_iter().chain(assets.map(composed)));
                     periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
@@ -141,14 +162,9 @@ impl Periods {
         Ok(periods)
     }
 
-    /// Returns the names of the assets if there are several; empty for one asset.
-    pub(in crate::service) fn names(&self) -> &[String] {
-        self.start.names()
-    }
-
-    /// Records the composition of several assets that a correction or a renewal reported.
-    fn tell(&mut self, reported: Option<Composition>) {
-        self.composed.entry(self.all.len()).or_default().extend(reported);
+    /// Records what came after the periods so far.
+    fn add(&mut self, events: impl IntoIterator<Item = BetweenPeriods>) {
+        self.events.entry(self.all.len()).or_default().extend(events);
     }
 
     /// Returns the policy that advises the coming period.
@@ -186,14 +202,14 @@ impl Periods {
             Change::Insert => {
                 let (report, corrections) = (correction.report(), vec![self.corrections]);
                 self.all.insert(index, SessionPeriod { report, acknowledged: None, stands: false, entry, corrections });
-                for (after, composed) in self.composed.split_off(&(index + 1)) {
-                    self.composed.insert(after + 1, composed);
+                for (after, events) in self.events.split_off(&(index + 1)) {
+                    self.events.insert(after + 1, events);
                 }
             }
             Change::Remove => {
                 self.all.remove(index);
-                // Later compositions depend on the period, so they are removed with it.
-                self.composed.split_off(&(index + 1));
+                // Later compositions depend on the period, so they are removed with it. No renewal is as late.
+                self.events.split_off(&(index + 1));
             }
         }
         self.all.iter_mut().skip(index).for_each(|period| period.stands = false);
@@ -252,14 +268,14 @@ impl<'a> Replay<'a> {
         let passed =
             self.standing.after(dynamics, period, &completed, (advised, self.stretch().terms.periods_per_year));
         let passed = passed.map_err(|error| (period, error))?;
-        let Transition { seen, log_return, executed_allocation, executed, mut standing } = passed;
+        let Transition { seen, log_return, executed_allocation, executed, turnover, mut standing } = passed;
         standing.price_as(report);
         let before = std::mem::replace(&mut self.standing, standing);
-        self.record.learn(&seen);
+        self.record.learn(period, &seen);
         self.step = period;
         let composed = acknowledged.as_ref().and_then(|acknowledged| acknowledged.composed());
         self.renew(composed).map_err(|error| (period, error))?;
-        Ok(Some(ReplayedPeriod { before, seen, log_return, executed_allocation, executed }))
+        Ok(Some(ReplayedPeriod { before, seen, log_return, executed_allocation, executed, turnover }))
     }
 
     /// Returns the state with the law of the fund of several assets, which a replay does not keep up to date.
@@ -276,14 +292,24 @@ impl<'a> Replay<'a> {
     /// `reported`, which came with the period, unless a correction or a renewal came later.
     fn renew(&mut self, reported: Option<&Composition>) -> Result<(), FieldError> {
         reported.map_or(Ok(()), |reported| self.standing.take(reported))?;
-        let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
-        // The last one builds its law from the same returns, whatever its predecessors did.
-        self.stretch += begin.count();
-        let PolicyTenure { after, window, terms, .. } = self.stretch();
-        if self.stretch > 0 && *after == self.step {
-            self.standing = self.standing.renewed(&self.record, *window, terms.learning)?;
+        for event in self.periods.events.get(&self.step).into_iter().flatten() {
+            match event {
+                BetweenPeriods::Composed(reported) => self.standing.take(reported)?,
+                BetweenPeriods::Renewed(change) => {
+                    self.stretch += 1;
+                    let change = change.as_deref();
+                    if let Some(change) = change {
+                        self.record = change.record(&self.record);
+                    }
+                    let PolicyTenure { window, terms, .. } = self.stretch();
+                    self.standing = self.standing.renewed(&self.record, *window, terms.learning, change)?;
+                }
+            }
         }
-        let reported_later = self.periods.composed.get(&self.step);
-        reported_later.into_iter().flatten().try_for_each(|reported| self.standing.take(reported))
+        Ok(())
     }
+}
+
+fn composed(reported: Composition) -> BetweenPeriods {
+    BetweenPeriods::Composed(Box::new(reported))
 }

@@ -38,17 +38,33 @@ impl PeriodReturns {
 pub struct SessionRecord {
     assets: usize,
     values: Vec<f64>,
+    /// The period of each date; 0 for the last date of the initial history, -1 for the one before, and so on.
+    dates: Vec<i64>,
 }
 
 impl SessionRecord {
-    /// Builds the record of so many assets, at least one.
+    /// Builds the record of so many assets, at least one, from an initial history.
     pub(in crate::service) fn new(assets: usize, values: Vec<f64>) -> Self {
-        SessionRecord { assets, values }
+        let dates = values.len() / assets;
+        SessionRecord { assets, values, dates: (1 - dates as i64..=0).collect() }
     }
 
     /// Appends the returns of a period, if there is one of every asset.
-    pub(in crate::service) fn learn(&mut self, seen: &PeriodReturns) {
-        self.values.extend(seen.learned().into_iter().flatten());
+    pub(in crate::service) fn learn(&mut self, period: usize, seen: &PeriodReturns) {
+        if let Some(row) = seen.learned() {
+            self.add(period as i64, &row);
+        }
+    }
+
+    /// Appends the row of a date.
+    pub(in crate::service) fn add(&mut self, date: i64, row: &[f64]) {
+        self.values.extend(row);
+        self.dates.push(date);
+    }
+
+    /// Returns each date with its row.
+    pub(in crate::service) fn dated(&self) -> impl Iterator<Item = (i64, &[f64])> {
+        self.dates.iter().copied().zip(self.values.chunks_exact(self.assets))
     }
 
     /// Returns the number of assets.

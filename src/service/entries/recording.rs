@@ -8,6 +8,7 @@ use serde::Serialize;
 use tracing::Instrument;
 
 use crate::control::error::FieldError;
+use crate::control::policy::advice::Uncertainty;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::callers::keys::Caller;
 use crate::service::entries::answer::{Corrected, Observed};
@@ -18,9 +19,11 @@ use crate::service::entries::report::{Correct, Observe};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::process::spans;
+use crate::service::sessions::asset_change::AssetNames;
 use crate::service::sessions::content::{self, Packed, json};
 use crate::service::sessions::live::{LiveSession, with_uncertainty};
 use crate::service::sessions::plan::{Renewed, SessionPlan};
+use crate::service::sessions::session_state::SessionState;
 use crate::service::sessions::slots::SlotGuard;
 use crate::service::sessions::{Name, Sessions};
 use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
@@ -44,8 +47,8 @@ impl Sessions {
         loop {
             let live = held.current(&self.rows(tenant, session)).await?;
             if period <= live.observed {
-                let names = live.standing.names();
-                return self.repeat(session, (EntryKind::Observation, period), &report, names).await;
+                let names = live.names.clone();
+                return self.repeat(session, (EntryKind::Observation, period), &report, &names).await;
             }
             live.check_next_period(period)?;
             let means = self.means(tenant, live, turn).await?;
@@ -66,6 +69,7 @@ impl Sessions {
             let levels = (live.standing.bet.level(), answer.drift.level);
             let next = LiveSession {
                 row: live.row.clone(),
+                names: live.names.clone(),
                 standing,
                 observed: period,
                 corrections: live.corrections,
@@ -102,32 +106,21 @@ impl Sessions {
             let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
             let mut periods = Periods::of(&facts)?;
             if is_repeat(EntryKind::Correction, number, periods.corrections)? {
-                return self.repeat(session, (EntryKind::Correction, number), correct, periods.names()).await;
+                return self.repeat(session, (EntryKind::Correction, number), correct, &periods.names).await;
             }
-            let (renewals, current) = (periods.renewals(), periods.current().clone());
+            let (renewals, current, names) = (periods.renewals(), periods.current().clone(), periods.names.clone());
             let advisor = self.policies.advisor(tenant, &current.policy).await?;
             current.follows(correct.period, advisor.specification().problem.framework)?;
             current.check_change(correct, periods.all.len())?;
             let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
+            let renew = SessionPlan::of(&facts.row)?.renew;
             let AppliedCorrection { before, standing, observed, log_return, wealth_change } =
                 self.advising.run(tenant, move || periods.apply_correction(&putting, entry, today)).await??;
-            let step = current.step_from(observed, SessionPlan::of(&facts.row)?.renew, renewals);
-            let means = self.means_of(advisor, Some(turn));
-            let (standing, uncertainty) = with_uncertainty(&means, tenant, step, standing).await?;
-            let answer = Corrected {
-                session: session.to_owned(),
-                correction: number,
-                period: correct.period,
-                log_return,
-                observed,
-                wealth: standing.state.wealth,
-                holding: standing.state.holding,
-                assets: standing.assets.as_ref().map(|assets| assets.composed()),
-                wealth_change,
-                date: standing.days.last,
-                drift: standing.bet.drift(),
-                uncertainty,
-            };
+            let step = current.step_from(observed, renew, renewals);
+            let (standing, uncertainty) =
+                with_uncertainty(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
+            let moved = (observed, log_return, wealth_change);
+            let answer = corrected(session, correct, moved, &standing, uncertainty);
             let levels = (before.bet.level(), answer.drift.level);
             let Packed { content_json, answer_json, numbers, sent } = Packed::of(correct, &answer, standing.names())?;
             let new = EntryRow {
@@ -142,8 +135,9 @@ impl Sessions {
                 key: caller.key().to_string(),
             };
             let next = LiveSession {
-                renew: SessionPlan::of(&facts.row)?.renew,
+                renew,
                 row: facts.row.into(),
+                names,
                 standing,
                 observed,
                 corrections: number,
@@ -159,16 +153,19 @@ impl Sessions {
         }
     }
 
-    /// Returns the first answer to an entry that is already recorded, for a session with the assets `names`.
+    /// Returns the first answer to an entry that is already recorded, for a session with these names of assets.
     pub(in crate::service) async fn repeat(
         &self,
         session: &str,
         (kind, number): (EntryKind, usize),
         content: &(impl Serialize + Sync),
-        names: &[String],
+        names: &AssetNames,
     ) -> Result<String, ServiceError> {
         match self.store.entry(session, kind, number).await? {
-            Some(row) if content::records(&row, content, names)? => sent(row, names),
+            Some(row) if content::records(&row, content, names.at(row.entry))? => {
+                let entry = row.entry;
+                sent(row, names.at(entry))
+            }
             Some(row) if kind == EntryKind::Renewal => Err(ServiceError::RenewedAlready {
                 number,
                 by: if row.key.is_empty() { "the service".to_owned() } else { format!("the key {}", row.key) },
@@ -219,6 +216,31 @@ impl Sessions {
             Append::NoSession => Err(ServiceError::unknown("session", &next.row.session)),
             Append::NoPolicy => Err(ServiceError::unknown("policy", &next.current.policy)),
         }
+    }
+}
+
+/// Returns the answer to a correction: the periods observed after it, the log-return of its period, and the change of
+/// wealth over the last one.
+fn corrected(
+    session: &str,
+    correct: &Correct,
+    (observed, log_return, wealth_change): (usize, Option<f64>, f64),
+    standing: &SessionState,
+    uncertainty: Uncertainty,
+) -> Corrected {
+    Corrected {
+        session: session.to_owned(),
+        correction: correct.correction,
+        period: correct.period,
+        log_return,
+        observed,
+        wealth: standing.state.wealth,
+        holding: standing.state.holding,
+        assets: standing.assets.as_ref().map(|assets| assets.composed()),
+        wealth_change,
+        date: standing.days.last,
+        drift: standing.bet.drift(),
+        uncertainty,
     }
 }
 

@@ -10,13 +10,15 @@ use tracing::Instrument;
 
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
+use crate::control::request::terms::Terms;
 use crate::service::callers::allowance::HeavyPermit;
-use crate::service::entries::periods::Periods;
+use crate::service::entries::periods::{Periods, Replay};
 use crate::service::entries::recording::{is_repeat, numbered};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::process::spans;
 use crate::service::sessions::Sessions;
+use crate::service::sessions::asset_change::AssetChange;
 use crate::service::sessions::content::Packed;
 use crate::service::sessions::live::{LiveSession, with_uncertainty};
 use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewed, SessionPlan, check_window};
@@ -45,7 +47,7 @@ impl Sessions {
             let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
             let periods = Periods::of(&facts)?;
             if is_repeat(EntryKind::Renewal, number, periods.renewals())? {
-                return self.repeat(session, (EntryKind::Renewal, number), renew, periods.names()).await;
+                return self.repeat(session, (EntryKind::Renewal, number), renew, &periods.names).await;
             }
             if number > MOST_RENEWALS {
                 let rule = format!("must be at most {MOST_RENEWALS}: open a new session with the present history");
@@ -79,17 +81,11 @@ impl Sessions {
         let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
         let (plan, problem) = (SessionPlan::of(&facts.row)?, &advisor.specification().problem);
         plan.renew.map_or(Ok(()), |renew| renew.check(problem))?;
-        let (onto, planned, Renew { policy, window, .. }) = (advisor.clone(), plan.clone(), renew.clone());
-        let go_on = move || {
-            let passage = periods.replay()?;
-            let dates = passage.record.last(window).len() / passage.record.assets();
-            let terms = planned.terms(&onto, dates, observed);
-            let terms = terms.map_err(|rule| FieldError::new("policy", policy, rule))?;
-            let standing = passage.standing.renewed(&passage.record, window, terms.learning)?;
-            accepts(&onto, passage.record.last(window), &standing)?;
-            Ok::<_, ServiceError>((standing, terms))
-        };
-        let (standing, terms) = self.advising.run(tenant, go_on).await??;
+        let (onto, planned, renewal) = (advisor.clone(), plan.clone(), renew.clone());
+        let (mut names, entry) = (periods.names.clone(), facts.seen.entries() + 1);
+        let go_on = move || go_on(&periods, &planned, &onto, &renewal);
+        let (standing, terms, changed) = self.advising.run(tenant, go_on).await??;
+        changed.iter().for_each(|changed| names.change(entry, changed.clone()));
         self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
         let (standing, uncertainty) = with_uncertainty(&self.means_of(advisor, turn), tenant, 0, standing).await?;
         let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
@@ -101,13 +97,14 @@ impl Sessions {
             period: observed + 1,
             horizon,
             terms: current.terms.clone(),
+            names: changed.map(|names| names.to_vec()),
             assets: standing.assets.as_ref().map(|assets| assets.composed()),
             uncertainty,
         };
         let Packed { content_json, answer_json, numbers, sent } = Packed::of(renew, &answer, standing.names())?;
         let new = EntryRow {
             session: facts.row.session.clone(),
-            entry: facts.seen.entries() + 1,
+            entry,
             kind: EntryKind::Renewal,
             number: renew.renewal,
             content_json,
@@ -122,6 +119,7 @@ impl Sessions {
         let next = LiveSession {
             seen: facts.seen.followed_by(&new),
             row: facts.row.into(),
+            names,
             standing,
             observed,
             corrections,
@@ -135,6 +133,27 @@ impl Sessions {
     }
 }
 
+/// Returns the state and the terms that a renewal leads to, and the names of the assets if it changes them.
+fn go_on(
+    periods: &Periods,
+    plan: &SessionPlan,
+    onto: &Advisor,
+    renew: &Renew,
+) -> Result<(SessionState, Terms, Option<Arc<[String]>>), ServiceError> {
+    let (observed, window) = (periods.all.len(), renew.window);
+    let Replay { standing, mut record, .. } = periods.replay()?;
+    let change = AssetChange::new((standing.names(), assets_of(onto)), renew, observed)?;
+    if let Some(change) = &change {
+        record = change.record(&record);
+    }
+    let dates = record.last(window).len() / record.assets();
+    let terms = plan.terms(onto, dates, observed);
+    let terms = terms.map_err(|rule| FieldError::new("policy", &renew.policy, rule))?;
+    let standing = standing.renewed(&record, window, terms.learning, change.as_ref())?;
+    accepts(onto, record.last(window), &standing)?;
+    Ok((standing, terms, change.map(|change| change.names)))
+}
+
 /// A renewal to append, and the state it leads to.
 struct DecidedRenewal {
     new: EntryRow,
@@ -144,16 +163,14 @@ struct DecidedRenewal {
     next: LiveSession,
 }
 
-/// Checks that a session with this record and state can use the policy.
+/// Checks that a session with this record and state can use the policy, whose assets it has.
 fn accepts(advisor: &Advisor, record: &[f64], standing: &SessionState) -> Result<(), FieldError> {
-    let (own, fund) = (standing.assets.as_deref(), advisor.specification().fund.as_deref());
-    let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));
-    if own != of_policy {
-        let listed = |names: &[String]| if names.is_empty() { "one asset".to_owned() } else { names.join(", ") };
-        let rule = format!("must have the assets of the session, in the same order: {}", listed(own));
-        return Err(FieldError::new("policy", format!("a policy of {}", listed(of_policy)), rule));
-    }
     let returns = standing.assets.as_ref().map(|assets| assets.fund.returns());
     let state = advisor.initial_state(Some(returns.as_deref().unwrap_or(record)), Some(standing.state.wealth))?;
     advisor.check_withdrawals(&state)
+}
+
+/// Returns the names of the assets of a policy; empty for one asset.
+fn assets_of(advisor: &Advisor) -> &[String] {
+    advisor.specification().fund.as_deref().map_or(&[][..], |fund| &fund.assets)
 }

@@ -7,6 +7,7 @@
 //!
 //! A failed attempt leaves the session as it is. The delay before the next attempt doubles each time.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use futures_util::StreamExt;
@@ -210,7 +211,8 @@ impl Renewer {
     /// Switches the session to the trained policy.
     async fn onto(&self, live: &LiveSession, policy: &str, renew: Renewing, number: usize) -> Result<(), ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
-        let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window };
+        let (records, leaving) = (BTreeMap::new(), Vec::new());
+        let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window, records, leaving };
         let by = Actor::service(self.clock.now_milliseconds());
         match self.sessions.renew(tenant, by, session, &renewal, None).await {
             Ok(_) => {

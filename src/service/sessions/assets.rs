@@ -33,6 +33,8 @@ pub struct Assets {
     pub prices: Vec<Option<f64>>,
     /// True for an asset whose price did not come in the last period.
     pub waiting: Vec<bool>,
+    /// Share of wealth in each asset that left the session, to be sold before the coming period.
+    pub leaving: BTreeMap<String, f64>,
 }
 
 /// Several assets before the coming period, by their names.
@@ -42,6 +44,9 @@ pub struct Composition {
     pub composition: BTreeMap<String, f64>,
     /// Share of wealth in each asset, before trading.
     pub holdings: BTreeMap<String, f64>,
+    /// Share of wealth in assets that left the session, to be sold before the coming period.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub leaving: BTreeMap<String, f64>,
     /// The optimum one period ahead, if the composition is chosen by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub one_step: Option<OneStep>,
@@ -84,7 +89,8 @@ impl Assets {
             None => vec![0.0; names.len()],
         };
         let (prices, waiting) = (vec![None; names.len()], vec![false; names.len()]);
-        Ok(Assets { names: names.into(), fund: Fund::at(rows, holdings), one_step: None, prices, waiting })
+        let (fund, leaving) = (Fund::at(rows, holdings), BTreeMap::new());
+        Ok(Assets { names: names.into(), fund, one_step: None, prices, waiting, leaving })
     }
 
     /// Builds the assets as an answer showed them before the coming period.
@@ -121,6 +127,7 @@ impl Assets {
         Composition {
             composition: named(&self.names, &self.fund.composition),
             holdings: named(&self.names, &self.fund.holdings),
+            leaving: self.leaving.clone(),
             one_step: self.one_step.clone(),
         }
     }
@@ -178,6 +185,11 @@ impl Assets {
         (!seen.is_missing()).then(|| named(&self.names, &seen.log_returns))
     }
 
+    /// Returns the share of wealth that is traded to reach `executed`, with all that is sold of assets that left.
+    pub(in crate::service) fn traded(&self, executed: &[f64]) -> f64 {
+        self.fund.traded(executed) + self.leaving.values().sum::<f64>()
+    }
+
     /// Updates record and holdings after a period in which `executed` was held and that left the share `holding` in all
     /// assets.
     pub(in crate::service) fn passed(&mut self, executed: &[f64], seen: &PeriodReturns, holding: f64) {
@@ -185,6 +197,7 @@ impl Assets {
         self.fund.passed(executed, Some(&seen.moves()), holding);
         self.fund.rows.truncate(dates);
         self.fund.rows.extend(seen.learned());
+        self.leaving.clear();
         if !seen.is_missing() {
             self.waiting = seen.log_returns.iter().map(Option::is_none).collect();
         }

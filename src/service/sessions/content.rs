@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json as object};
 
 use crate::service::error::ServiceError;
-use crate::store::EntryRow;
+use crate::store::{EntryKind, EntryRow};
 
 /// The only key of an object that stands for a map from names; no field has this name, and no lone asset.
 const LIST: &str = "$";
@@ -64,6 +64,19 @@ pub(in crate::service) fn content<T: DeserializeOwned>(row: &EntryRow, names: &[
 /// Reads the answer of an entry of a session with these assets.
 pub(in crate::service) fn answer<T: DeserializeOwned>(row: &EntryRow, names: &[String]) -> Result<T, ServiceError> {
     unpacked(&row.answer_json, row, names)
+}
+
+/// Reads the names of several assets from the answer of a renewal that changed them.
+pub(in crate::service) fn names_after(row: &EntryRow) -> Result<Option<Vec<String>>, ServiceError> {
+    #[derive(Deserialize)]
+    struct WithNames {
+        #[serde(default)]
+        names: Option<Vec<String>>,
+    }
+    match row.kind {
+        EntryKind::Renewal => Ok(read::<WithNames>(&row.answer_json)?.names),
+        EntryKind::Observation | EntryKind::Correction => Ok(None),
+    }
 }
 
 fn unpacked<T: DeserializeOwned>(text: &str, row: &EntryRow, names: &[String]) -> Result<T, ServiceError> {
@@ -170,7 +183,6 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::store::EntryKind;
 
     fn recorded(packed: &Packed) -> EntryRow {
         EntryRow {

@@ -16,6 +16,7 @@ use crate::service::entries::notes;
 use crate::service::entries::periods::Periods;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::error::ServiceError;
+use crate::service::sessions::asset_change::AssetNames;
 use crate::service::sessions::assets::{Assets, ObservedAssets};
 use crate::service::sessions::plan::{PolicyTenure, Renewing, SessionPlan};
 use crate::service::sessions::session_state::{SessionState, Transition};
@@ -45,6 +46,8 @@ impl AdviceContext<'_> {
 #[derive(Clone)]
 pub struct LiveSession {
     pub row: Arc<SessionRow>,
+    /// The names of several assets, entry by entry.
+    pub(in crate::service) names: AssetNames,
     pub standing: SessionState,
     /// Periods observed.
     pub observed: usize,
@@ -79,6 +82,7 @@ impl LiveSession {
         Ok(LiveSession {
             renew: SessionPlan::of(&row)?.renew,
             row: Arc::new(row),
+            names: periods.names.clone(),
             standing,
             observed: periods.all.len(),
             corrections: periods.corrections,
@@ -225,7 +229,7 @@ impl LiveSession {
         let dynamics = self.current.dynamics(self.observed);
         let periods_per_year = self.current.terms.periods_per_year;
         let passed = self.standing.after(dynamics, observe.period, report, (allocation, periods_per_year))?;
-        let Transition { seen, log_return, executed_allocation, executed, standing } = passed;
+        let Transition { seen, log_return, executed_allocation, executed, standing, .. } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
         let check_active = self.goes_on_after(observe.period);
         let next = self.current.step_from(observe.period, self.renew, self.renewals);

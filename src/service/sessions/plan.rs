@@ -1,5 +1,7 @@
 //! The sequence of policies of a session, and its automatic renewal.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -72,6 +74,16 @@ pub struct Renew {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = 240)]
     pub window: Option<usize>,
+    /// Log-returns of each asset that enters the session, by name, oldest first. The last one is that of the last
+    /// observed period, and null stands for a period without one. The law keeps the periods with a return of every
+    /// asset.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(example = json!({}))]
+    pub records: BTreeMap<String, Vec<Option<f64>>>,
+    /// Names of the assets that leave the session. What is held of them is sold before the coming period.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(example = json!([]))]
+    pub leaving: Vec<String>,
 }
 
 /// The session after a renewal.
@@ -86,6 +98,9 @@ pub struct Renewed {
     pub horizon: usize,
     /// Rate, cost and flows of its periods, unless a report gives others.
     pub terms: Terms,
+    /// Names of the assets from here on, in the order of the policy, if they changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub names: Option<Vec<String>>,
     /// Figures of several assets before the coming period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assets: Option<Composition>,

@@ -17,6 +17,7 @@ use crate::service::entries::doubts::{self, Doubt};
 use crate::service::entries::drift::DriftTest;
 use crate::service::entries::record::{LEAST_LEARNED, PeriodReturns, SessionRecord};
 use crate::service::entries::report::Report;
+use crate::service::sessions::asset_change::AssetChange;
 use crate::service::sessions::assets::{Assets, Composition, mean};
 
 /// The state of a session between two periods.
@@ -47,6 +48,8 @@ pub struct Transition {
     pub executed_allocation: f64,
     /// Shares of wealth held in several assets; empty for one asset.
     pub executed: Vec<f64>,
+    /// Share of wealth bought and sold for them.
+    pub turnover: f64,
     pub standing: SessionState,
 }
 
@@ -65,7 +68,8 @@ impl SessionState {
         }
     }
 
-    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns.
+    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns, and with
+    /// changed assets if there is a change.
     ///
     /// # Errors
     /// They are not a valid history.
@@ -74,14 +78,27 @@ impl SessionState {
         record: &SessionRecord,
         window: Option<usize>,
         learning: Learning,
+        change: Option<&AssetChange>,
     ) -> Result<Self, FieldError> {
         let last = record.last(window);
         let mut assets = self.assets.clone();
         let state = match &mut assets {
             Some(assets) => {
                 let rows = record.rows_of(last);
-                check_rows("history", &rows, &assets.names, None)?;
-                assets.fund.renew(rows, learning, &self.state)
+                check_rows(
+                    change.map_or("history", |_| "records"),
+                    &rows,
+                    change.map_or(&assets.names, |change| &change.names),
+                    None,
+                )?;
+                match change {
+                    Some(change) => {
+                        **assets = change.assets(assets, rows);
+                        let holding = assets.fund.holdings.iter().sum::<f64>().min(1.0);
+                        State { law: learning.law(&assets.fund.returns()), wealth: self.state.wealth, holding }
+                    }
+                    None => assets.fund.renew(rows, learning, &self.state),
+                }
             }
             None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
         };
@@ -137,8 +154,9 @@ impl SessionState {
         let (executed, realised) = match &self.assets {
             Some(assets) => {
                 let executed = assets.executed(report, advised)?;
+                let traded = Some(assets.traded(&executed));
                 let realised = assets.fund.outcome(&executed, moves.as_deref(), rate, flow);
-                (executed, realised)
+                (executed, PeriodOutcome { traded, ..realised })
             }
             None => {
                 let action = report.executed_allocation.unwrap_or(advised);
@@ -148,12 +166,13 @@ impl SessionState {
         };
         let log_return = realised.log_return.map(|log_return| log_return.max(LEAST_LEARNED));
         let learned = PeriodOutcome { log_return, ..realised };
+        let turnover = learned.turnover(self.state.holding);
         let mut state = self.state.next_state(dynamics, &learned);
         if learned != realised {
             // Wealth bears the whole loss.
             let exact = learned.dynamics(dynamics).next_after(
                 self.state.wealth,
-                learned.turnover(self.state.holding),
+                turnover,
                 learned.action,
                 realised.log_return.unwrap_or(0.0),
             );
@@ -170,7 +189,7 @@ impl SessionState {
         standing.learn(&seen, &executed, period);
         standing.price_as(report);
         let PeriodOutcome { action: executed_allocation, log_return, .. } = realised;
-        Ok(Transition { seen, log_return, executed_allocation, executed, standing })
+        Ok(Transition { seen, log_return, executed_allocation, executed, turnover, standing })
     }
 
     /// Returns the report of a period without trades unless it gives holdings.

@@ -33,8 +33,12 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
     if the return is missing. ``advised_allocation``, ``executed_allocation`` and ``holding`` are shares of wealth.
     ``wealth`` is an amount of money, and ``radius`` is a log-return. ``wealth``, ``holding`` and ``radius`` are values
     after the period. With ``as_of="now"`` all columns include every correction; with ``"then"`` they are what the
-    service answered at the time. ``corrected`` marks the rows where the two may differ. Raises ``ImportError`` without
-    pandas.
+    service answered at the time. ``corrected`` marks the rows where the two may differ.
+
+    ``rate`` is what the bank paid and ``flow`` the money added. ``turnover`` is the share of wealth that was traded, and
+    ``cost`` the money that it cost. ``equal_weights``, ``initial_composition`` and ``bank`` are the wealth of somebody
+    who began with the same wealth and holdings and held equal shares of all assets, the first composition of the fund,
+    or nothing. These columns always include every correction. Raises ``ImportError`` without pandas.
     """
     pd = require_pandas()
     rows = []
@@ -42,18 +46,22 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
         changed = observation.get("now")
         row: Mapping[str, Any] = observation if as_of == "then" or changed is None else changed
         reported = row.get("reported") or observation["reported"]
-        log_return = row.get("log_return")
+        account = observation["account"]
+        log_return = _log_return(row, None if history.get("assets") is None else _ALL)
+        benchmarks = {name: math.nan if value is None else value for name, value in account["benchmarks"].items()}
         rows.append(
             {
                 "period": observation["period"],
                 "date": reported.get("date"),
-                "log_return": math.nan if log_return is None else log_return,
-                "simple_return": math.nan if log_return is None else math.expm1(log_return),
+                "log_return": log_return,
+                "simple_return": math.expm1(log_return),
                 **{name: row[name] for name in _STANDING},
+                **{name: account[name] for name in _ACCOUNT},
+                **benchmarks,
                 "corrected": changed is not None,
             }
         )
-    columns = ["period", "date", "log_return", "simple_return", *_STANDING, "corrected"]
+    columns = ["period", "date", "log_return", "simple_return", *_STANDING, *_ACCOUNT, *_BENCHMARKS, "corrected"]
     frame = pd.DataFrame(rows, columns=columns).set_index("period")
     return frame.assign(date=pd.to_datetime(frame["date"]))
 
@@ -62,10 +70,10 @@ def assets_history(
     history: wire.History, figure: AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
 ) -> pd.DataFrame:
     """Returns one figure of a session of several assets, with a row for each observed period and a column for each
-    asset.
+    asset that the session has or had.
 
     ``simple_return`` and ``log_return`` include every correction unless ``as_of`` is ``"then"``, and are NaN if they
-    are missing. ``advised_allocation``, ``executed_allocation`` and ``holding`` (after the period) are shares of wealth
+    are missing: a total loss is a simple return of -1. ``advised_allocation``, ``executed_allocation`` and ``holding`` (after the period) are shares of wealth
     as the service answered at the time. Raises ``ValueError`` for another figure and for a session of one asset, and
     ``ImportError`` without pandas.
     """
@@ -74,12 +82,17 @@ def assets_history(
         raise ValueError("history is of one asset: use frames.history")
     if figure not in _ASSETS_FIGURES:
         raise ValueError(f"figure is {figure!r}: must be one of {', '.join(_ASSETS_FIGURES)}")
+    for renewal in history["renewals"]:
+        assets = [*assets, *(name for name in renewal.get("names") or [] if name not in assets)]
     rows = []
     for observation in history["observations"]:
         row = cast(dict[str, Any], observation)
         if as_of == "now" and figure.endswith("return") and row.get("now") is not None:
             row = row["now"]
-        rows.append(row["assets"].get(_ASSETS_FIGURES[figure]) or {})
+        values = row["assets"].get(_ASSETS_FIGURES[figure]) or {}
+        if figure.endswith("return"):
+            values = {name: _log_return({**row, "log_return": value}, name) for name, value in values.items()}
+        rows.append(values)
     pd = require_pandas()
     index = pd.Index([observation["period"] for observation in history["observations"]], name="period")
     frame = pd.DataFrame(rows, index=index, columns=assets, dtype=float)
@@ -94,6 +107,23 @@ _ASSETS_FIGURES = {
     "holding": "holdings",
 }
 _STANDING = ("advised_allocation", "executed_allocation", "wealth", "holding", "radius")
+_ACCOUNT = ("rate", "flow", "turnover", "cost")
+_BENCHMARKS = ("equal_weights", "initial_composition", "bank")
+#: Stands for all assets that are held.
+_ALL = "*"
+
+
+def _log_return(row: Mapping[str, Any], asset: str | None) -> float:
+    """Returns the log-return of a row: NaN if it is missing, and minus infinity after a total loss, which JSON writes as
+    null. Of all assets together a null is a loss only if some return is known."""
+    value = row.get("log_return")
+    if value is not None:
+        return float(value)
+    if asset == _ALL:
+        return -math.inf if (row.get("assets") or {}).get("log_returns") else math.nan
+    notes = row.get("notes") or []
+    lost = any(note["reason"] == "total_loss" and note.get("asset") == asset for note in notes)
+    return -math.inf if lost else math.nan
 
 
 def worst_case(advice: Explained) -> pd.DataFrame:

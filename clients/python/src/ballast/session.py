@@ -105,7 +105,7 @@ class _Session(Labelled):
         really held, by default the advised one. ``rate`` is what the bank paid and ``flow`` what was added, by default
         those of the policy. ``wealth`` is the wealth really reached, and ``date`` is the last day. For several assets
         ``log_returns``, ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by the names
-        of the assets. ``period`` is by default the coming one. An earlier period with the content first reported for it
+        of the assets. A return or price that is ``None`` or NaN did not come in the period. ``period`` is by default the coming one. An earlier period with the content first reported for it
         gets its first answer again. Raises :class:`Unconfirmed` for a report that is probably a mistake, unless
         ``confirm`` is true, and :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
@@ -204,14 +204,28 @@ class _Session(Labelled):
             self.period = corrected["observed"] + 1
         return corrected
 
-    async def _renew(self, policy: str, *, window: int | None = None, renewal: int | None = None) -> wire.Renewed:
+    async def _renew(
+        self,
+        policy: str,
+        *,
+        window: int | None = None,
+        records: Mapping[str, Iterable[float | None]] | None = None,
+        leaving: Iterable[str] = (),
+        renewal: int | None = None,
+    ) -> wire.Renewed:
         """Switches to another policy from the coming period on.
 
-        The new law is that of the last ``window`` observed returns, by default of all. Like :meth:`observe`, a renewal
-        counts exactly once. ``renewal`` is its number, by default the one after the last.
+        The new law is that of the last ``window`` observed returns, by default of all. If the policy has other assets,
+        ``records`` has the log-returns of each that enters, by name: the last one is that of the last observed period,
+        and ``None`` or NaN stands for a period without one. ``leaving`` names those that leave. Like :meth:`observe`, a
+        renewal counts exactly once. ``renewal`` is its number, by default the one after the last.
         """
         number = self.renewals + 1 if renewal is None else renewal
         body: wire.Renew = {"renewal": number, "policy": policy, "window": window}
+        if records:
+            body["records"] = {name: [_number(value) for value in record] for name, record in records.items()}
+        if leaving := list(leaving):
+            body["leaving"] = leaving
         counted: _Counted | None = "renewal" if renewal is None else None
         renewed: wire.Renewed = await self._counted(f"{self._path}/renewals", body, counted, number)
         if number > self.renewals:

@@ -7,10 +7,17 @@ import { belowHighest } from "./track.js";
 /** Returns the name of what is held besides the bank. */
 export const risky = ({ assets }) => (assets ? "the assets" : "stocks");
 
+/** Returns the log-return of an observed period, with corrections applied: minus infinity if everything held was lost, and null if it is missing. */
+function returnOf(row) {
+  const { log_return, notes = [] } = row.now ?? row;
+  const isLost = log_return === null && notes.some(({ reason }) => reason === "total_loss");
+  return isLost ? Number.NEGATIVE_INFINITY : log_return;
+}
+
 /** Returns the growth of the asset, the bank's rate and the money added in each observed period, with corrections applied. */
 const lived = (history) =>
   history.observations.map((row, index) => ({
-    growth: Math.exp((row.now ?? row).log_return ?? 0),
+    growth: Math.exp(returnOf(row) ?? 0),
     rate: rateIn(history, index + 1),
     cost: termsOf(history, index + 1).terms.trading_cost,
     added: addedIn(history, index + 1),

@@ -15,14 +15,19 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const periods = history.observations.map(({ period }) => [period, calendar.name(period)]);
   const fill = (chosen) => {
     const row = history.observations[chosen - 1];
-    if (history.assets) fields.fill(history, chosen - 1);
-    else fields.fill(standing(row), (row.now ?? row).log_return);
+    if (history.assets) {
+      fields = severalFields(Object.keys(row.assets.advised_allocations), blank);
+      place.replaceChildren(fields.element);
+      fields.fill(history, chosen - 1);
+    } else fields.fill(standing(row), (row.now ?? row).log_return);
   };
   const period = select({ within, name: "period", label: "Period", choices: periods.reverse(), changed: (value) => fill(Number(value)) });
   const { rate_per_step, contributions } = policy.specification.problem;
   const contribution = Array.isArray(contributions) ? null : contributions;
   const blank = { within, advised: null, rate: rate_per_step, contribution };
-  const fields = history.assets ? severalFields(history.assets, blank) : reportFields({ ...blank, label: "Return, %" });
+  // The assets may differ from period to period.
+  let fields = history.assets ? null : reportFields({ ...blank, label: "Return, %" });
+  const place = h("div", {}, fields?.element ?? "");
   fill(history.observations.length);
   const change = select({
     within,
@@ -30,7 +35,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     label: "What is wrong",
     choices: CHANGES,
     changed: (value) => {
-      fields.element.hidden = value !== "replace";
+      place.hidden = value !== "replace";
       skipped.hidden = value !== "insert";
     },
   });
@@ -52,7 +57,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     h("p", { class: "note" }, "The fields show the current values. The original report stays on record."),
     h("div", { class: "fields" }, period.element, change.element, reason.element),
     skipped,
-    fields.element,
+    place,
     message,
     h("p", { class: "send" }, button),
   );

@@ -15,6 +15,15 @@ export const besides = (history) => [
   { name: "60/40", share: 0.6, colour: colourOf("sixty_forty") },
   { name: `All in ${risky(history)}`, share: 1, colour: colourOf("all_stock") },
 ];
+/** Returns the benchmarks that the service keeps for several assets: `{name, colour, wealths}`, wealth at the start and after each period. */
+export const benchmarks = (history) =>
+  history.assets
+    ? [
+        ["Equal weights", "equal_weights"],
+        ["First composition", "initial_composition"],
+      ].map(([name, rule]) => ({ name, colour: colourOf(rule), wealths: [history.initial_wealth, ...history.observations.map(({ account }) => account.benchmarks[rule])] }))
+    : [];
+
 /** The common left margin of charts above each other, in pixels. */
 const GUTTER = 64;
 
@@ -40,6 +49,7 @@ export function wealthCourse(shown) {
   const series = [
     { name: "This session", kind: "line", values: along(own) },
     ...besides(history).map(({ name, share, colour }) => ({ name, colour, kind: "line", bare: true, values: along(share === 0 ? bank : mixed(history, share)) })),
+    ...benchmarks(history).map(({ name, colour, wealths }) => ({ name, colour, kind: "line", bare: true, values: along(wealths) })),
   ];
   const deep = falls(history);
   const stocks = falls(history, mixed(history, 1));

@@ -2,10 +2,11 @@
 
 import { h } from "./dom.js";
 import { foretold, reportFields, sendReports } from "./report_fields.js";
-import { severalFields } from "./several_fields.js";
+import { presentAssets, severalFields } from "./several_fields.js";
 
 /** Returns the form; a blank share held means the advised one. */
-export function observeForm(action, { id, session, history: { assets }, policy, calendar, refresh }) {
+export function observeForm(action, { id, session, history, policy, calendar, refresh }) {
+  const assets = presentAssets(history);
   const { rate_per_step, trading_cost } = policy.specification.problem;
   const preview = h("output", { class: "note" });
   const before = assets ? assets.map((name) => action.holdings[name]) : [session.holding];

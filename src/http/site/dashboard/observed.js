@@ -3,7 +3,7 @@
 import { post } from "./api.js";
 import { falls, mixed, wealths } from "./comparators.js";
 import { correctionForm } from "./correction.js";
-import { besides } from "./course.js";
+import { benchmarks, besides } from "./course.js";
 import { csvText, hundred } from "./csv.js";
 import { disclosure, h, reveal, section, table } from "./dom.js";
 import { addedIn, rateIn, standing } from "./flows.js";
@@ -13,11 +13,17 @@ import { policyLink } from "./naming.js";
 import { firstOf } from "./pages.js";
 import { day } from "./periods.js";
 import { save } from "./picture.js";
-import { assetReturns, assetsHeld } from "./several_fields.js";
+import { assetReturns, assetsHeld, everyAsset, simpleReturn } from "./several_fields.js";
 import { isCautious } from "./specification.js";
 
 /** Periods shown at first; a button shows all. */
 const NEWEST = 24;
+
+/** Tells whether trading costs something. */
+const isCostly = ({ policy }) => policy.specification.problem.trading_cost > 0;
+
+/** Formats the return of an asset; blank if there is none. */
+const returned = (log_return) => ((log_return ?? null) === null ? "" : percent(simpleReturn(log_return), 2));
 
 export function observed(shown) {
   const { history, calendar } = shown;
@@ -37,9 +43,10 @@ export function observed(shown) {
         period,
         ...(calendar.dated ? [{ name: "Last day", cell: (row) => (standing(row).date ? day(standing(row).date) : "") }] : []),
         number("Return", now("log_return", (value) => percent(Math.expm1(value), 2))),
-        ...(history.assets ?? []).map((name) => number(name, ({ period }) => percent(Math.expm1(assetReturns(history, period - 1)?.[name] ?? Number.NaN), 2))),
+        ...everyAsset(history).map((name) => number(name, ({ period }) => returned(assetReturns(history, period - 1)?.[name]))),
         number("Advised", now("advised_allocation", allocation)),
         number("Held", now("executed_allocation", allocation)),
+        ...(isCostly(shown) ? [number("Traded", ({ account }) => percent(account.turnover)), number("Cost", ({ account }) => wealth(account.cost))] : []),
         number("Wealth", now("wealth", wealth)),
         number("Reported", ({ observed_ms }) => moment(observed_ms)),
       ],
@@ -67,6 +74,7 @@ export function observed(shown) {
       all,
       h("button", { class: "quiet", onclick: () => save(csv(shown), file, "text/csv") }, "Save as CSV"),
     ),
+    noted(shown),
     corrections(shown),
     renewals(shown),
     shown.right,
@@ -77,12 +85,13 @@ export function observed(shown) {
 /** Returns the CSV of the periods, one row each: plain numbers, shares and returns in percent. A corrected period has its current values and
  * the first reported ones. */
 export function csv({ history, calendar, policy, cautionScale }) {
-  const { observations, corrections, assets = [] } = history;
+  const { observations, corrections } = history;
+  const assets = everyAsset(history);
   const own = wealths(history);
   const deep = falls(history);
   const isCorrected = corrections.length > 0;
-  const isCostly = policy.specification.problem.trading_cost > 0;
-  const simple = (log_return) => hundred(Number.isFinite(log_return ?? Number.NaN) ? Math.expm1(log_return) : null);
+  const costly = isCostly({ policy });
+  const simple = (log_return) => ((log_return ?? null) === null ? null : hundred(simpleReturn(log_return)));
   const at = (milliseconds) => (milliseconds === undefined ? null : new Date(milliseconds).toISOString());
   const madeIn = (row) => corrections.filter(({ correction }) => row.corrections?.includes(correction));
   /** Returns the column of a current value, and that of the first reported one if the session has corrections. */
@@ -96,14 +105,17 @@ export function csv({ history, calendar, policy, cautionScale }) {
     ["The bank paid, %", ({ period }) => hundred(rateIn(history, period))],
     ["Money added", ({ period }) => addedIn(history, period)],
     ...both("Advised", ", %", ({ advised_allocation }) => hundred(advised_allocation)),
-    ...["from", "to"].map((end, index) => isCostly && [`Best kept ${end}, %`, ({ band }) => hundred(band?.[index])]),
+    ...["from", "to"].map((end, index) => costly && [`Best kept ${end}, %`, ({ band }) => hundred(band?.[index])]),
     ...both("Held", ", %", ({ executed_allocation }) => hundred(executed_allocation)),
+    ["Traded, %", ({ account }) => hundred(account.turnover)],
+    costly && ["Trading cost", ({ account }) => account.cost],
     ...assets.flatMap((name) => [
       [`${name} returned, %`, ({ period }) => simple(assetReturns(history, period - 1)?.[name])],
       [`${name} held, %`, (row) => hundred(assetsHeld(row)[name])],
     ]),
     ...both("Wealth", "", ({ wealth }) => wealth).map((column) => column && [...column, own[0]]),
     ...besides(history).map(({ name, share }) => [name, mixed(history, share)]).map(([name, wealths]) => [name, ({ period }) => wealths[period], own[0]]),
+    ...benchmarks(history).map(({ name, wealths }) => [name, ({ period }) => wealths[period], own[0]]),
     ["Below the highest, %", ({ period }) => hundred(deep[period]), 0],
     isCautious(policy.specification.problem) && [`Caution, % a ${calendar.unit}`, (row) => hundred((row.now ?? row).radius * cautionScale)],
     ["Returns seen", ({ sample_size }) => sample_size],
@@ -164,6 +176,13 @@ export function righting(shown) {
   return fold;
 }
 
+/** Lists what is noted on the periods: total losses, and prices that did not come. */
+function noted({ history, calendar }) {
+  const rows = [...history.observations].reverse();
+  const notes = rows.flatMap((row) => ((row.now ?? row).notes ?? []).map(({ sentence }) => `${calendar.name(row.period)}: ${sentence}.`));
+  return notes.length === 0 ? "" : h("ul", { class: "corrections notes" }, notes.map((words) => h("li", {}, words)));
+}
+
 /** Lists the corrections, newest first; the newest can be undone. */
 function corrections(shown) {
   const { history, calendar } = shown;
@@ -195,10 +214,10 @@ function corrections(shown) {
 /** Lists the policies that followed the first, newest first. */
 function renewals({ history: { renewals }, calendar }) {
   if (renewals.length === 0) return "";
-  const words = ({ period, policy, renewed_ms }, index) => [
+  const words = ({ period, policy, names, renewed_ms }, index) => [
     `From ${calendar.inText(period)} on with `,
     policyLink(policy, index < NEWEST),
-    `, since ${moment(renewed_ms)}`,
+    `${names ? `, in ${names.join(", ")}` : ""}, since ${moment(renewed_ms)}`,
   ];
   return h("ul", { class: "renewals" }, [...renewals].reverse().map((made, index) => h("li", {}, ...words(made, index))));
 }

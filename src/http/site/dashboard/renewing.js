@@ -26,13 +26,6 @@ export async function view(query, leaving) {
   return { title, trail, body: renewing(sessions, policies, leaving) };
 }
 
-/** Returns all returns that a session has seen, its record's first; for several assets date by date. */
-export function recordOf({ history, observations, assets }) {
-  const stands = (row) => row.now ?? row;
-  const returns = (row) => (assets ? assets.map((name) => stands(row).assets.log_returns?.[name] ?? null) : stands(row).log_return);
-  return [...history, ...observations.map(returns).filter((one) => ![one].flat().includes(null))];
-}
-
 /** Returns the name of a policy that is retrained from another. */
 function renewedName(name, now) {
   const month = now.toLocaleDateString("en-GB", { month: "short", year: "numeric" });
@@ -45,7 +38,7 @@ function renewedName(name, now) {
 export function anew(session, history, { specification, name }, now) {
   const request = requestOf(specification);
   const { problem, design } = request;
-  problem.history = recordOf(history);
+  problem.history = history.record;
   const rates = history.observations.map((row) => standing(row).rate).filter((rate) => rate !== null && rate !== undefined);
   problem.rate_per_step = rates.at(-1) ?? problem.rate_per_step;
   const flows = [problem.contributions ?? 0].flat();

@@ -13,7 +13,7 @@ import { problemWords } from "./problem_words.js";
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "Not known" };
 
 /** The bounds that the service accepts. */
-export const LIMITS = { log_return: [-5, 5], simple_return: [-5, 5].map(Math.expm1), share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
+export const LIMITS = { log_return: [-5, 5], simple_return: [-1, Math.expm1(5)], share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
 
 /** Returns the fields for a period. Blank fields mean the `advised` share and the policy's rate and contribution; the last day is filled in as
  * expected. `advised` is null if it is the advice of that time. */
@@ -203,7 +203,7 @@ export function sendReports(form, { button, message, fields, path, compose, once
 /** Says the return of a report. */
 function returnWords({ simple_return, log_return, simple_returns, missing }) {
   if (missing) return "a missing period";
-  if (simple_returns) return Object.entries(simple_returns).map(([name, back]) => `${name} ${percent(back, 2)}`).join(", ");
+  if (simple_returns) return Object.entries(simple_returns).map(([name, back]) => `${name} ${back === null ? "without a price" : percent(back, 2)}`).join(", ");
   return percent(simple_return ?? Math.expm1(log_return), 2);
 }
 

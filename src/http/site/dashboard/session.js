@@ -14,8 +14,8 @@ import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
 import { calendar, day, isoDay } from "./periods.js";
 import { nearness } from "./sensitivity.js";
-import { recordOf } from "./renewing.js";
 import { severalAdvice, severalHeld, severalWorst } from "./several.js";
+import { presentAssets } from "./several_fields.js";
 import { hasBall, isCautious, isParametric, moments, utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
 import { worstMarket } from "./worst_market.js";
@@ -105,7 +105,7 @@ function ofOne(shown, action, rest) {
 
 /** Returns the same for several assets, without advice for other amounts of caution. */
 function ofSeveral(shown, action, rest) {
-  const { assets } = shown.history;
+  const assets = presentAssets(shown.history);
   return { advice: severalAdvice(action, place(shown, action), assets, rest), found: [severalWorst(action, assets, shown.calendar), severalHeld(shown)] };
 }
 
@@ -210,7 +210,7 @@ function frontier({ session, policy, history, canTry }) {
       { class: "note" },
       "What other amounts of caution would lose on many records drawn like this one. Each period counts alone, without trading costs, without discounting older returns, and without money added or withdrawn.",
     ),
-    h("p", {}, asking(policy.specification, recordOf(history), session.wealth)),
+    h("p", {}, asking(policy.specification, history.record, session.wealth)),
   );
   element.classList.add("asked-for");
   element.dataset.needs = "train";

@@ -4,7 +4,7 @@ import { SOURCES, why } from "./advice.js";
 import { disclosure, h, section, table } from "./dom.js";
 import { endWords } from "./flows.js";
 import { allocation, figures, minus, percent, points, wealth } from "./format.js";
-import { assetsHeld } from "./several_fields.js";
+import { assetsHeld, everyAsset } from "./several_fields.js";
 import { priceFields, shareCount } from "./share_prices.js";
 import { stackedChart } from "./stacked.js";
 
@@ -96,7 +96,8 @@ export function severalWorst(action, assets, { unit }) {
 
 /** Draws what was held of each asset, period by period. */
 export function severalHeld({ history, calendar }) {
-  const shares = history.observations.map(assetsHeld);
+  const none = Object.fromEntries(everyAsset(history).map((name) => [name, 0]));
+  const shares = history.observations.map((row) => ({ ...none, ...assetsHeld(row) }));
   if (shares.length === 0) return "";
-  return section("What it held", stackedChart({ title: "Share of wealth in each asset", assets: history.assets, shares, x: { name: calendar.name, tick: calendar.brief } }));
+  return section("What it held", stackedChart({ title: "Share of wealth in each asset", assets: everyAsset(history), shares, x: { name: calendar.name, tick: calendar.brief } }));
 }

@@ -9,18 +9,25 @@ import { fraction, typed } from "./number_text.js";
 import { dayOf } from "./periods.js";
 import { inPercent, LIMITS } from "./report_fields.js";
 
-const KINDS = { simple: "Gains or losses", missing: "Not known" };
+const KINDS = { simple: "Gains or losses", partly: "Blank where no price came", missing: "Not known" };
 
-/** Returns the log-return of each asset in an observed period, counted from 0, with corrections applied; null if it is missing. */
-export function assetReturns({ assets, observations }, index) {
-  const said = standing(observations[index]);
-  const before = (name) => said.previous_prices?.[name] ?? standing(observations[index - 1]).prices?.[name];
-  const one = (name) => {
-    if (said.simple_returns) return Math.log1p(said.simple_returns[name]);
-    return said.log_returns ? said.log_returns[name] : Math.log(said.prices[name] / before(name));
-  };
-  return said.missing ? null : Object.fromEntries(assets.map((name) => [name, one(name)]));
+/** Returns the names of a session's present assets; undefined for one asset. */
+export const presentAssets = ({ assets, renewals }) => renewals.findLast(({ names }) => names)?.names ?? assets;
+
+/** Returns the names of all assets that a session has or had, the first ones first. */
+export const everyAsset = ({ assets = [], renewals }) => [...new Set([...assets, ...renewals.flatMap(({ names }) => names ?? [])])];
+
+/** Returns the log-return of each asset in an observed period, counted from 0, with corrections applied: null for an asset whose price did not
+ * come, and for all if they are missing. */
+export function assetReturns({ observations }, index) {
+  const row = observations[index].now ?? observations[index];
+  const lost = (row.notes ?? []).filter(({ reason }) => reason === "total_loss").map(({ asset }) => asset);
+  const back = row.assets.log_returns;
+  return back && Object.fromEntries(Object.entries(back).map(([name, value]) => [name, lost.includes(name) ? Number.NEGATIVE_INFINITY : value]));
 }
+
+/** Returns the simple return of a log-return, NaN if there is none. */
+export const simpleReturn = (log_return) => Math.expm1(log_return ?? Number.NaN);
 
 /** Returns the share held of each asset in an observed period, with corrections applied; by default the share advised then. */
 export const assetsHeld = (row) => standing(row).executed_allocations ?? row.assets.advised_allocations;
@@ -40,6 +47,7 @@ export function severalFields(assets, { within = "", advised, rate, contribution
   const flow = field("flow", "Money added at the end", `Blank: ${contribution === null ? "the policy\u2019s amount" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`);
   const reached = field("wealth", "Wealth reached", "Blank: computed from the other fields.");
   const isMissing = () => kind.control.value === "missing";
+  const isPartly = () => kind.control.value === "partly";
   const silenced = () => returns.forEach(({ control }) => (control.disabled = isMissing()));
   const kind = select({
     within,
@@ -62,15 +70,18 @@ export function severalFields(assets, { within = "", advised, rate, contribution
     fill(history, index) {
       const [said, back] = [standing(history.observations[index]), assetReturns(history, index)];
       assets.forEach((name, at) => {
-        returns[at].control.value = back ? inPercent(said.simple_returns?.[name] ?? Math.expm1(back[name])) : "";
+        const known = (back?.[name] ?? null) !== null;
+        returns[at].control.value = known ? inPercent(said.simple_returns?.[name] ?? Math.expm1(back[name])) : "";
         held[at].control.value = inPercent(said.executed_allocations?.[name]);
       });
       for (const [{ control }, value] of [[paid, inPercent(said.rate)], [flow, said.flow], [reached, said.wealth], [day, said.date]]) control.value = value ?? "";
-      kind.control.value = back ? "simple" : "missing";
+      const isPartly = back && assets.some((name) => (back[name] ?? null) === null);
+      kind.control.value = !back ? "missing" : isPartly ? "partly" : "simple";
       silenced();
     },
     trouble() {
-      const wrong = isMissing() ? null : returns.find((field) => fraction(text(field)) === null);
+      const allowed = (field) => fraction(text(field)) !== null || (isPartly() && text(field) === "");
+      const wrong = isMissing() ? null : returns.find((field) => !allowed(field));
       if (wrong) return { field: wrong.name, message: text(wrong) === "" ? "The return is blank." : `\u201c${text(wrong)}\u201d is not a percentage.` };
       const bare = isHeldSaid() && !advised ? held.find((field) => text(field) === "") : null;
       return bare ? { field: bare.name, message: "Give the share of every asset, or of none." } : null;
@@ -84,7 +95,8 @@ export function severalFields(assets, { within = "", advised, rate, contribution
     /** Returns the values for `foretold`, or null if a field cannot be read; a missing return counts as 0. */
     read() {
       const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
-      const back = returns.map((field) => (isMissing() ? 0 : fraction(text(field))));
+      const unmoved = (field) => isMissing() || (isPartly() && text(field) === "");
+      const back = returns.map((field) => (unmoved(field) ? 0 : fraction(text(field))));
       const shares = held.map((field, index) => blank(field, advised[assets[index]], fraction));
       const [paying, added, ended] = [blank(paid, rate, fraction), blank(flow, contribution, typed), blank(reached, Number.NaN, typed)];
       if ([...back, ...shares, paying, added, ended].some((number) => typeof number !== "number")) return null;

@@ -9,8 +9,8 @@ const TOKENS = [
   ["static", "robust_static"],
   ["plug_in"],
   ["known_law", "cost_blind", "inverse_volatility"],
-  ["parametric_adaptive", "robust_sup"],
-  ["parametric_static", "minimum_variance"],
+  ["parametric_adaptive", "robust_sup", "equal_weights"],
+  ["parametric_static", "minimum_variance", "initial_composition"],
   ["own_mix", "policy"],
 ];
 
