@@ -165,20 +165,20 @@ test("the periods are saved as a file of numbers", async () => {
   const { csvRows } = await dashboardModule("csv.js");
   const rows = csvRows(bytes.toString(), ",").map(({ cells }) => cells);
   const [head, start, ...lines] = rows;
-  assert.deepEqual(head, ["Period", "Name", "Last day", "Return, %", "The bank paid, %", "Money added", "Advised, %", "Held, %", "Wealth", "All in the bank", "60/40", "All in stocks", "Below the highest, %", "Caution, % a month", "Returns seen", "Reported"]);
-  assert.deepEqual([start[1], start[8], start.length, lines.length], ["Start", "100", head.length, 3]);
+  assert.deepEqual(head, ["Period", "Name", "Last day", "Return, %", "The bank paid, %", "Money added", "Advised, %", "Held, %", "Traded, %", "Wealth", "All in the bank", "60/40", "All in stocks", "Below the highest, %", "Caution, % a month", "Returns seen", "Reported"]);
+  assert.deepEqual([start[1], start[9], start.length, lines.length], ["Start", "100", head.length, 3]);
   assert.deepEqual(lines[1].slice(0, 3), ["2", "February 2008", "2008-02-29"]);
   assert.deepEqual([Number(lines[1][3]).toFixed(9), ...[4, 5, 7].map((column) => lines[1][column])], ["-10.000000000", "0.2", "0", "50"]);
   const { observations } = await call(ballast.url, `/sessions/${session}/history`);
   const [last, { wealth, radius, sample_size, observed_ms }] = [lines[2], observations[2]];
-  for (const [column, value] of [[8, wealth], [13, 100 * radius]]) assert.ok(Math.abs(Number(last[column]) - value) < 1e-9, `${last[column]} is not ${value}`);
+  for (const [column, value] of [[9, wealth], [14, 100 * radius]]) assert.ok(Math.abs(Number(last[column]) - value) < 1e-9, `${last[column]} is not ${value}`);
   assert.deepEqual(last.slice(-2), [String(sample_size), new Date(observed_ms).toISOString()]);
 });
 
 test("money, the bank's rate, the band and what was put right stand in the file too", async () => {
   const { csv } = await dashboardModule("observed.js");
   const { calendar } = await dashboardModule("periods.js");
-  const row = { period: 1, log_return: 0, band: [0.2, 0.4], advised_allocation: 0.2, executed_allocation: 0.2, wealth: 90, radius: 0.01, sample_size: 11, observed_ms: 0, reported: { date: "2008-01-31" } };
+  const row = { period: 1, log_return: 0, band: [0.2, 0.4], advised_allocation: 0.2, executed_allocation: 0.2, wealth: 90, radius: 0.01, sample_size: 11, observed_ms: 0, reported: { date: "2008-01-31" }, account: { turnover: 0.25, cost: 0.25 } };
   const now = { reported: { date: "2008-01-31", rate: 0.004, flow: -5 }, log_return: Math.log(1.5), advised_allocation: 0.3, executed_allocation: 0.25, wealth: 105, radius: 0.02 };
   const made = (correction, reason) => ({ correction, period: 1, reason, corrected_ms: 1000 * correction });
   const terms = { rate_per_step: 0.002, trading_cost: 0.01, contributions: 3 };
@@ -189,8 +189,8 @@ test("money, the bank's rate, the band and what was put right stand in the file 
   const [heads, , told] = csvRows(text, ",").map(({ cells }) => cells);
   const of = Object.fromEntries(heads.map((name, index) => [name, told[index]]));
   assert.deepEqual(
-    ["Return, %", "Return told first, %", "The bank paid, %", "Money added", "Advised, %", "Best kept from, %", "Best kept to, %", "Held, %", "Held told first, %", "Wealth", "Wealth told first", "Caution, % a month", "Reported", "Put right", "Put right because"].map((name) => of[name]),
-    ["50", "0", "0.4", "-5", "30", "20", "40", "25", "20", "105", "90", "1", "1970-01-01T00:00:00.000Z", "1970-01-01T00:00:02.000Z", "'=a slip; the index, revised"],
+    ["Return, %", "Return told first, %", "The bank paid, %", "Money added", "Advised, %", "Best kept from, %", "Best kept to, %", "Held, %", "Held told first, %", "Traded, %", "Trading cost", "Wealth", "Wealth told first", "Caution, % a month", "Reported", "Put right", "Put right because"].map((name) => of[name]),
+    ["50", "0", "0.4", "-5", "30", "20", "40", "25", "20", "25", "0.25", "105", "90", "1", "1970-01-01T00:00:00.000Z", "1970-01-01T00:00:02.000Z", "'=a slip; the index, revised"],
   );
 });
 

@@ -183,12 +183,11 @@ test("the last report of several is taken back, and returns by price are told by
   await page.getByRole("button", { name: "Undo", exact: true }).click();
   await page.getByText(/: Correction 3 was undone/).waitFor();
   const { assetReturns } = await dashboardModule("several_fields.js");
-  const reported = [{ prices: { a: 10, b: 4 }, previous_prices: { a: 8, b: 4 } }, { prices: { a: 11, b: 2 } }, { missing: true }, { log_returns: { a: 0.1, b: 0 } }];
-  const history = { assets: ["a", "b"], observations: reported.map((reported) => ({ reported })) };
-  const told = reported.map((_, index) => assetReturns(history, index));
-  near(told[0].a, Math.log(1.25), 1e-12);
-  near(told[1].b, -Math.log(2), 1e-12);
-  assert.deepEqual(told.slice(2), [null, { a: 0.1, b: 0 }]);
+  const notes = [{ reason: "total_loss", asset: "b", sentence: "b lost everything" }];
+  const row = (log_returns, more = {}) => ({ assets: { log_returns }, ...more });
+  const observations = [row({ a: 0.1, b: null }), row({ a: 0.1, b: null }, { notes }), row({ a: 0.1, b: 0 }, { now: row({ a: 0.2, b: 0 }) }), row(null)];
+  const told = observations.map((_, index) => assetReturns({ observations }, index));
+  assert.deepEqual(told, [{ a: 0.1, b: null }, { a: 0.1, b: Number.NEGATIVE_INFINITY }, { a: 0.2, b: 0 }, null]);
 });
 
 test("it stands beside another session by what it holds in all", async () => {
@@ -206,8 +205,12 @@ test("it stands beside another session by what it holds in all", async () => {
 });
 
 test("a session of several that has ended says so, and what it held", async () => {
-  for (const period of [3, 4]) await call(ballast.url, "/observe", { session, period, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
+  // No price of gold comes in the third period, and in the last one its return covers both.
+  await call(ballast.url, "/observe", { session, period: 3, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: null } });
+  await call(ballast.url, "/observe", { session, period: 4, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
   await go();
+  await page.getByText("the price of Gold did not come: its holding counts as unmoved until it does", { exact: false }).waitFor();
+  await page.getByText("the return of Gold covers every period since its last price", { exact: false }).waitFor();
   await page.getByRole("heading", { name: "Completed" }).waitFor();
   await page.getByRole("slider", { name: "Share of wealth in each asset" }).waitFor();
 });

@@ -125,3 +125,58 @@ def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Balla
     action = session.assets_action()
     pd.testing.assert_series_equal(frames.allocation(supposed), frames.allocation(action))
     assert (supposed["wealth"], supposed["period"]) == (session.wealth, action["period"])
+
+
+def test_losses_gaps_and_other_assets_are_in_the_frames(ballast: Ballast) -> None:
+    design: wire.DesignSpecification = {"count": 20}
+    training = ballast.train_assets(
+        TABLE,
+        kind="simple",
+        rate_per_step=0.002,
+        horizon=3,
+        trading_cost=0.001,
+        radius={"rule": "bridge", "scale": 0.1},
+        design=design,
+        idempotency_key="a policy of two",
+    )
+    session = training.session(holdings={"energy": 0.2, "health": 0.3})
+    held = {"energy": 0.5, "health": 0.25}
+    session.observe(simple_returns=pd.Series({"energy": 0.03, "health": math.nan}), executed_allocations=held, flow=1.0)
+    assert session.observed is not None
+    assert session.observed["notes"][0]["reason"] == "price_missing"
+    session.observe(simple_returns={"energy": -1.0, "health": 0.02}, executed_allocations=held, confirm=True)
+
+    frame = session.frame()
+    assert list(frame["flow"]) == [1.0, 0.0] and list(frame["rate"]) == [0.002, 0.002]
+    assert frame["turnover"].iloc[0] == pytest.approx(0.3 + 0.05)
+    assert frame["cost"].iloc[0] == pytest.approx(100.0 * 0.001 * 0.35)
+    left = 100.0 * (1.0 - 0.001 * 0.35)
+    assert frame["wealth"].iloc[0] == pytest.approx(left * (0.25 * 1.002 + 0.5 * 1.03 + 0.25) + 1.0)
+    assert frame["bank"].iloc[0] == pytest.approx(100.0 * (1.0 - 0.001 * 0.5) * 1.002 + 1.0)
+    assert (frame[["equal_weights", "initial_composition"]] > 0.0).all(axis=None)
+    returns = session.assets_frame()
+    assert math.isnan(returns["health"].iloc[0]) and returns["energy"].iloc[1] == -1.0
+    assert session.assets_frame("log_return")["energy"].iloc[1] == -math.inf
+    assert returns["health"].iloc[1] == pytest.approx(0.02)
+
+    # Energy is gone, and technology comes for it.
+    technology = [0.01 + 0.04 * math.sin(0.7 * quarter) for quarter in range(18)]
+    table = TABLE[["health"]].assign(technology=technology[:16])
+    next_policy = ballast.train_assets(
+        table,
+        kind="simple",
+        rate_per_step=0.002,
+        horizon=2,
+        radius={"rule": "bridge", "scale": 0.1},
+        design=design,
+        idempotency_key="another policy of two",
+    )
+    record = np.log1p(technology).tolist()
+    record[16] = math.nan
+    renewed = session.renew(next_policy.policy(), records={"technology": record}, leaving=["energy"])
+    assert renewed.get("names") == ["health", "technology"]
+    session.observe(simple_returns={"health": 0.01, "technology": 0.02})
+    returns = session.assets_frame()
+    assert list(returns.columns) == ["energy", "health", "technology"]
+    assert returns["technology"].iloc[2] == pytest.approx(0.02) and math.isnan(returns["energy"].iloc[2])
+    assert len(session.history()["record"]) == 17

@@ -131,11 +131,11 @@ impl Periods {
             events: BTreeMap::new(),
         };
         for (index, entry) in entries.iter().enumerate() {
-            let own = periods.names.last().to_vec();
+            let own = periods.names.last().clone();
             if let Some(changed) = names_after(entry)? {
                 periods.names.change(entry.entry, changed.into());
             }
-            let names = &periods.names.last().to_vec();
+            let names = &periods.names.last().clone();
             match entry.kind {
                 EntryKind::Observation => periods.all.push(SessionPeriod {
                     report: content(entry, names)?,

@@ -200,12 +200,12 @@ impl AssetNames {
     }
 
     /// Returns the names behind the entry with this number.
-    pub(in crate::service) fn at(&self, entry: usize) -> &[String] {
+    pub(in crate::service) fn at(&self, entry: usize) -> &Arc<[String]> {
         self.changed.range(..=entry).next_back().map_or(&self.first, |(_, names)| names)
     }
 
     /// Returns the present names.
-    pub(in crate::service) fn last(&self) -> &[String] {
+    pub(in crate::service) fn last(&self) -> &Arc<[String]> {
         self.at(usize::MAX)
     }
 }

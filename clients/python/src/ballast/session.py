@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
@@ -380,9 +381,17 @@ class _Session(Labelled):
 
 
 def _by_name(report: wire.Report) -> wire.Report:
-    """Returns the report with dicts instead of Series."""
+    """Returns the report with dicts instead of Series, and None instead of NaN."""
     plain = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in report.items()}
+    for name, value in plain.items():
+        if isinstance(value, dict):
+            plain[name] = {asset: _number(number) for asset, number in value.items()}
     return cast(wire.Report, plain)
+
+
+def _number(value: Any) -> Any:
+    """Returns a number as it is sent: None instead of NaN."""
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 class Session(_Session):

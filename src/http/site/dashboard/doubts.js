@@ -14,7 +14,7 @@ export const doubtWords = ({ doubts }) => doubts.map(inWords);
 function inWords({ reason, field, value, sentence, missing = [] }) {
   if (missing.length === 1) return `The period that ends on ${day(missing[0])} is missing before ${day(value)}.`;
   if (missing.length > 1) return `${missing.length} periods are missing before ${day(value)}: the first ends on ${day(missing[0])}, the last on ${day(missing.at(-1))}.`;
-  const asset = reason === "unusual_return" || reason === "differs_from_peers" ? field.slice(field.indexOf(".") + 1) : field;
+  const asset = ["total_loss", "unusual_return", "differs_from_peers"].includes(reason) ? field.slice(field.indexOf(".") + 1) : field;
   return asset === field ? `${sentence[0].toUpperCase()}${sentence.slice(1)}.` : `${asset}: ${sentence}.`;
 }
 
