@@ -1,5 +1,6 @@
 //! Assets that enter and leave a session at a renewal.
 
+use crate::asset_periods::{assert_replayed, correct, known, report};
 use crate::support::values::number;
 use crate::support::{App, ROWS, several_assets};
 use serde_json::{Value, json};
@@ -26,36 +27,9 @@ fn changed() -> Value {
     request
 }
 
-async fn report(app: &App, period: usize, report: Value) -> Value {
-    let (status, observed) = app.report(period, report).await;
-    assert_eq!(status, 200, "{observed}");
-    observed
-}
-
 async fn renew(app: &App, renewal: &Value) -> (u16, Value) {
     let (status, renewed) = app.post(&format!("/sessions/{}/renewals", app.session), renewal).await;
     (status.as_u16(), renewed)
-}
-
-async fn correct(app: &App, number: usize, period: usize, mut report: Value) -> Value {
-    report["correction"] = json!(number);
-    report["period"] = json!(period);
-    report["reason"] = json!("a slip");
-    let (status, corrected) = app.post(&format!("/sessions/{}/corrections", app.session), &report).await;
-    assert_eq!(status, 200, "{corrected}");
-    corrected
-}
-
-async fn known(app: &App) -> Value {
-    let (_, mut session) = app.get(&format!("/sessions/{}", app.session)).await;
-    session["corrections"] = Value::Null;
-    json!([session, app.action().await.1])
-}
-
-async fn assert_replayed(app: &mut App) {
-    let before = known(app).await;
-    app.restart().await;
-    assert_eq!(known(app).await, before);
 }
 
 async fn assets_enter_and_leave_at_a_renewal(mut app: App) {
@@ -141,7 +115,8 @@ async fn assets_enter_and_leave_at_a_renewal(mut app: App) {
     // Equal weights: a third each, the third of gold is sold and all is restored to thirds.
     let [before, after] = [1, 2].map(|period| number(&accounts[period]["benchmarks"]["equal_weights"]));
     let grown = [1.01, 1.002, 1.0].map(|growth| growth / (1.01 + 1.002 + 1.0));
-    let traded: f64 = grown[2] + 1.0 / 3.0 + (grown[0] - 1.0 / 3.0).abs() + (grown[1] - 1.0 / 3.0).abs();
+    let third = 1.0 / 3.0;
+    let traded: f64 = grown[2] + third + f64::abs(grown[0] - third) + f64::abs(grown[1] - third);
     let expected = before * (1.0 - COST * traded) * (1.01 + 1.003 + 0.98) / 3.0;
     assert!((after / expected - 1.0).abs() < 1e-12, "{after} {expected}");
 

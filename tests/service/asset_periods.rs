@@ -20,7 +20,7 @@ fn listed(value: &Value) -> Vec<f64> {
     NAMES.map(|name| number(&value[name])).to_vec()
 }
 
-async fn report(app: &App, period: usize, report: Value) -> Value {
+pub async fn report(app: &App, period: usize, report: Value) -> Value {
     let (status, observed) = app.report(period, report).await;
     assert_eq!(status, 200, "{observed}");
     observed
@@ -32,7 +32,7 @@ async fn history(app: &App) -> Value {
     history
 }
 
-async fn correct(app: &App, number: usize, period: usize, mut report: Value) -> Value {
+pub async fn correct(app: &App, number: usize, period: usize, mut report: Value) -> Value {
     report["correction"] = json!(number);
     report["period"] = json!(period);
     report["reason"] = json!("a slip");
@@ -41,15 +41,15 @@ async fn correct(app: &App, number: usize, period: usize, mut report: Value) -> 
     corrected
 }
 
-/// What the service knows of a session, as far as it does not depend on the number of corrections.
-async fn known(app: &App) -> Value {
+/// Returns the state and the advice of a session without its corrections.
+pub async fn known(app: &App) -> Value {
     let (_, mut session) = app.get(&format!("/sessions/{}", app.session)).await;
     session["corrections"] = Value::Null;
     json!([session, app.action().await.1])
 }
 
 /// Asserts that a replay of the entries leads to the same bits.
-async fn assert_replayed(app: &mut App) {
+pub async fn assert_replayed(app: &mut App) {
     let before = known(app).await;
     app.restart().await;
     assert_eq!(known(app).await, before);

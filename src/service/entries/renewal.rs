@@ -84,7 +84,7 @@ impl Sessions {
         let (onto, planned, renewal) = (advisor.clone(), plan.clone(), renew.clone());
         let (mut names, entry) = (periods.names.clone(), facts.seen.entries() + 1);
         let go_on = move || go_on(&periods, &planned, &onto, &renewal);
-        let (standing, terms, changed) = self.advising.run(tenant, go_on).await??;
+        let Continuation { standing, terms, names: changed } = self.advising.run(tenant, go_on).await??;
         changed.iter().for_each(|changed| names.change(entry, changed.clone()));
         self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
         let (standing, uncertainty) = with_uncertainty(&self.means_of(advisor, turn), tenant, 0, standing).await?;
@@ -133,13 +133,16 @@ impl Sessions {
     }
 }
 
-/// Returns the state and the terms that a renewal leads to, and the names of the assets if it changes them.
-fn go_on(
-    periods: &Periods,
-    plan: &SessionPlan,
-    onto: &Advisor,
-    renew: &Renew,
-) -> Result<(SessionState, Terms, Option<Arc<[String]>>), ServiceError> {
+/// The state and the terms that a renewal leads to.
+struct Continuation {
+    standing: SessionState,
+    terms: Terms,
+    /// The names of the assets, if it changes them.
+    names: Option<Arc<[String]>>,
+}
+
+/// Returns the state and the terms that a renewal leads to.
+fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -> Result<Continuation, ServiceError> {
     let (observed, window) = (periods.all.len(), renew.window);
     let Replay { standing, mut record, .. } = periods.replay()?;
     let change = AssetChange::new((standing.names(), assets_of(onto)), renew, observed)?;
@@ -151,7 +154,7 @@ fn go_on(
     let terms = terms.map_err(|rule| FieldError::new("policy", &renew.policy, rule))?;
     let standing = standing.renewed(&record, window, terms.learning, change.as_ref())?;
     accepts(onto, record.last(window), &standing)?;
-    Ok((standing, terms, change.map(|change| change.names)))
+    Ok(Continuation { standing, terms, names: change.map(|change| change.names) })
 }
 
 /// A renewal to append, and the state it leads to.

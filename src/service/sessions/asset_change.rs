@@ -20,14 +20,14 @@ use crate::service::sessions::plan::Renew;
 pub struct AssetChange {
     /// The names, in the order of the next policy.
     pub names: Arc<[String]>,
-    columns: Vec<Column>,
+    columns: Vec<ReturnSource>,
     /// Periods observed before it.
     observed: usize,
 }
 
 /// The source of an asset's returns up to the change.
 #[derive(Debug, Clone, PartialEq)]
-enum Column {
+enum ReturnSource {
     /// The asset with this index before the change.
     Kept(usize),
     /// The record that it enters with: the last value is of the last observed period.
@@ -80,8 +80,8 @@ impl AssetChange {
             }
         }
         let column = |name: &String| match (own.iter().position(|own| own == name), renew.records.get(name)) {
-            (Some(index), _) => Ok(Column::Kept(index)),
-            (None, Some(record)) => Ok(Column::Entering(record.clone())),
+            (Some(index), _) => Ok(ReturnSource::Kept(index)),
+            (None, Some(record)) => Ok(ReturnSource::Entering(record.clone())),
             (None, None) => {
                 let rule = "must be given: the policy has the asset, and the session does not yet";
                 Err(FieldError::new(format!("records.{name}"), "null", rule))
@@ -97,9 +97,9 @@ impl AssetChange {
         for (date, row) in record.dated() {
             // Dates are numbers of periods, and 0 or less for the history.
             let ago = usize::try_from(self.observed as i64 - date).unwrap_or(usize::MAX);
-            let of = |column: &Column| match column {
-                Column::Kept(index) => Some(row[*index]),
-                Column::Entering(values) => *values.get(values.len().checked_sub(ago.checked_add(1)?)?)?,
+            let of = |column: &ReturnSource| match column {
+                ReturnSource::Kept(index) => Some(row[*index]),
+                ReturnSource::Entering(values) => *values.get(values.len().checked_sub(ago.checked_add(1)?)?)?,
             };
             let joint: Option<Vec<f64>> = self.columns.iter().map(of).collect();
             joint.into_iter().for_each(|row| changed.add(date, &row));
@@ -109,9 +109,9 @@ impl AssetChange {
 
     /// Returns `assets` after the change, with the returns `rows` of the changed record.
     pub(in crate::service) fn assets(&self, assets: &Assets, rows: Vec<Vec<f64>>) -> Assets {
-        let index = |column: &Column| match column {
-            Column::Kept(index) => Some(*index),
-            Column::Entering(_) => None,
+        let index = |column: &ReturnSource| match column {
+            ReturnSource::Kept(index) => Some(*index),
+            ReturnSource::Entering(_) => None,
         };
         let mut changed = assets.clone();
         changed.names = self.names.clone();
@@ -141,9 +141,9 @@ impl AssetChange {
 
     /// Returns the values of the assets from before the change, 0 for those that enter.
     pub(in crate::service) fn kept(&self, values: &[f64]) -> Vec<f64> {
-        let of = |column: &Column| match column {
-            Column::Kept(index) => values[*index],
-            Column::Entering(_) => 0.0,
+        let of = |column: &ReturnSource| match column {
+            ReturnSource::Kept(index) => values[*index],
+            ReturnSource::Entering(_) => 0.0,
         };
         self.columns.iter().map(of).collect()
     }

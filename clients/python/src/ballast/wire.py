@@ -48,8 +48,11 @@ Window: TypeAlias = int | None
 class AssetsNow(TypedDict):
     """A period of several assets after all corrections."""
 
-    log_returns: NotRequired[dict[str, float]]
-    """Log-returns by asset name; null if they are missing."""
+    log_returns: NotRequired[dict[str, float | None]]
+    """
+    Log-returns by asset name; null if they are missing. Null for an asset whose price did not come, or that lost
+    everything, which `notes` says.
+    """
 
 
 class AssetsPeriods(TypedDict):
@@ -170,6 +173,23 @@ class BankRate(TypedDict):
     """The name of the column."""
     rates: list[float]
     """Rates in the order of the returns."""
+
+
+class Benchmarks(TypedDict):
+    """
+    Wealth at the end of a period, had a simple rule been followed from the start of the session: with the same wealth,
+    holdings, rates, flows and trading cost. Null once a rule cannot pay a withdrawal.
+    """
+
+    equal_weights: NotRequired[float | None]
+    """Equal shares of all wealth in every asset, restored at the start of each period."""
+    initial_composition: NotRequired[float | None]
+    """
+    All wealth in the fund's first composition, restored at the start of each period. The share of an asset that
+    leaves is spread over those that stay, in proportion.
+    """
+    bank: NotRequired[float | None]
+    """All wealth in the bank."""
 
 
 class Bootstrap1(TypedDict):
@@ -329,19 +349,25 @@ class Correct(TypedDict):
     """Confirms the correction despite any doubts."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
-    """`price / previous price - 1`."""
+    """`price / previous price - 1`; -1 is a total loss."""
     price: NotRequired[float | None]
-    """Price at the end of the period."""
+    """Price at the end of the period; 0 is a total loss."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
-    log_returns: NotRequired[dict[str, float]]
-    """Log-returns of several assets by name; each has one."""
-    simple_returns: NotRequired[dict[str, float]]
-    """`price / previous price - 1` of several assets by name."""
-    prices: NotRequired[dict[str, float]]
-    """Prices of several assets at the end of the period."""
-    previous_prices: NotRequired[dict[str, float]]
-    """Prices of several assets at the start of the period. Default: those reported for the period before."""
+    log_returns: NotRequired[dict[str, float | None]]
+    """Log-returns of several assets by name. Each has one, or null if its price did not come."""
+    simple_returns: NotRequired[dict[str, float | None]]
+    """
+    `price / previous price - 1` of several assets by name; -1 is a total loss. The return after a null
+    covers every period since the last price.
+    """
+    prices: NotRequired[dict[str, float | None]]
+    """Prices of several assets at the end of the period; 0 is a total loss."""
+    previous_prices: NotRequired[dict[str, float | None]]
+    """
+    Prices of several assets at the start of the period, or the last one that came. Default: those reported
+    before.
+    """
     missing: NotRequired[bool]
     """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
     date: NotRequired[str | None]
@@ -369,7 +395,7 @@ class Costs(TypedDict):
     """Mean seconds of one re-solved step; null if there was none."""
 
 
-DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "differs_from_peers"]
+DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "total_loss", "differs_from_peers"]
 """Why a report is doubted."""
 
 
@@ -663,6 +689,10 @@ class NextAdvice(TypedDict):
     """The share of wealth that would be advised."""
 
 
+NoteReason: TypeAlias = Literal["total_loss", "learned_in_part", "price_missing", "price_late"]
+"""The reason for a note."""
+
+
 class Observe(TypedDict):
     """The return of one period, given in exactly one of three ways or as missing, and the trades in it."""
 
@@ -673,19 +703,25 @@ class Observe(TypedDict):
     """Confirms the report despite any doubts."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
-    """`price / previous price - 1`."""
+    """`price / previous price - 1`; -1 is a total loss."""
     price: NotRequired[float | None]
-    """Price at the end of the period."""
+    """Price at the end of the period; 0 is a total loss."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
-    log_returns: NotRequired[dict[str, float]]
-    """Log-returns of several assets by name; each has one."""
-    simple_returns: NotRequired[dict[str, float]]
-    """`price / previous price - 1` of several assets by name."""
-    prices: NotRequired[dict[str, float]]
-    """Prices of several assets at the end of the period."""
-    previous_prices: NotRequired[dict[str, float]]
-    """Prices of several assets at the start of the period. Default: those reported for the period before."""
+    log_returns: NotRequired[dict[str, float | None]]
+    """Log-returns of several assets by name. Each has one, or null if its price did not come."""
+    simple_returns: NotRequired[dict[str, float | None]]
+    """
+    `price / previous price - 1` of several assets by name; -1 is a total loss. The return after a null
+    covers every period since the last price.
+    """
+    prices: NotRequired[dict[str, float | None]]
+    """Prices of several assets at the end of the period; 0 is a total loss."""
+    previous_prices: NotRequired[dict[str, float | None]]
+    """
+    Prices of several assets at the start of the period, or the last one that came. Default: those reported
+    before.
+    """
     missing: NotRequired[bool]
     """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
     date: NotRequired[str | None]
@@ -744,6 +780,30 @@ class Performance(TypedDict):
     """Terminal wealth, from 100."""
     mean_allocation: float
     """Mean share of wealth in the risky asset, or in all assets together."""
+
+
+class PeriodAccount(TypedDict):
+    """Money of a period, after all corrections."""
+
+    rate: float
+    """Rate that the bank paid."""
+    flow: float
+    """Money added at the end; negative if withdrawn."""
+    turnover: float
+    """Share of wealth bought and sold at the start, in all assets together."""
+    cost: float
+    """Money that these trades cost."""
+    benchmarks: Benchmarks
+
+
+class PeriodNote(TypedDict):
+    """A note on a recorded period."""
+
+    reason: NoteReason
+    asset: NotRequired[str | None]
+    """The asset, if there are several."""
+    sentence: str
+    """The note, in one sentence."""
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
@@ -907,6 +967,12 @@ class Relabel(TypedDict):
     """At most 20 distinct tags, each of 1 to 50 letters without control characters."""
 
 
+Record1: TypeAlias = float | None
+
+
+LeavingItem: TypeAlias = str
+
+
 class Renew(TypedDict):
     """A request to continue a session with another policy."""
 
@@ -916,6 +982,14 @@ class Renew(TypedDict):
     """The next policy."""
     window: NotRequired[int | None]
     """Number of last returns that the law is made of. Default: all observed returns."""
+    records: NotRequired[dict[str, list[Record1]]]
+    """
+    Log-returns of each asset that enters the session, by name, oldest first. The last one is that of the last
+    observed period, and null stands for a period without one. The law keeps the periods with a return of every
+    asset.
+    """
+    leaving: NotRequired[list[LeavingItem]]
+    """Names of the assets that leave the session. What is held of them is sold before the coming period."""
 
 
 RenewalState: TypeAlias = Literal["due", "training", "failed", "trained"]
@@ -935,19 +1009,25 @@ class Report(TypedDict):
 
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
-    """`price / previous price - 1`."""
+    """`price / previous price - 1`; -1 is a total loss."""
     price: NotRequired[float | None]
-    """Price at the end of the period."""
+    """Price at the end of the period; 0 is a total loss."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
-    log_returns: NotRequired[dict[str, float]]
-    """Log-returns of several assets by name; each has one."""
-    simple_returns: NotRequired[dict[str, float]]
-    """`price / previous price - 1` of several assets by name."""
-    prices: NotRequired[dict[str, float]]
-    """Prices of several assets at the end of the period."""
-    previous_prices: NotRequired[dict[str, float]]
-    """Prices of several assets at the start of the period. Default: those reported for the period before."""
+    log_returns: NotRequired[dict[str, float | None]]
+    """Log-returns of several assets by name. Each has one, or null if its price did not come."""
+    simple_returns: NotRequired[dict[str, float | None]]
+    """
+    `price / previous price - 1` of several assets by name; -1 is a total loss. The return after a null
+    covers every period since the last price.
+    """
+    prices: NotRequired[dict[str, float | None]]
+    """Prices of several assets at the end of the period; 0 is a total loss."""
+    previous_prices: NotRequired[dict[str, float | None]]
+    """
+    Prices of several assets at the start of the period, or the last one that came. Default: those reported
+    before.
+    """
     missing: NotRequired[bool]
     """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
     date: NotRequired[str | None]
@@ -1745,7 +1825,9 @@ class Now(TypedDict):
 
     reported: NotRequired[Report | None]
     log_return: NotRequired[float | None]
-    """Null if it is missing."""
+    """Null if it is missing, or after a total loss, which `notes` says."""
+    notes: NotRequired[list[PeriodNote]]
+    """Notes on the period: losses that the law does not learn in full, and prices that did not come."""
     assets: NotRequired[AssetsNow | None]
     advised_allocation: float
     """The allocation that would have been advised for it."""
@@ -2123,13 +2205,13 @@ class WhatIf(TypedDict):
     """The return as `price / previous price - 1` instead."""
     holdings: NotRequired[dict[str, float]]
     """Share of wealth in each of several assets now, before trading, by name; each has one."""
-    log_returns: NotRequired[dict[str, float]]
+    log_returns: NotRequired[dict[str, float | None]]
     """Returns of several assets in the coming period, in one of three ways; the advice is for the period after."""
-    simple_returns: NotRequired[dict[str, float]]
+    simple_returns: NotRequired[dict[str, float | None]]
     """The returns as `price / previous price - 1` instead."""
-    prices: NotRequired[dict[str, float]]
+    prices: NotRequired[dict[str, float | None]]
     """Prices of several assets at the end of the coming period."""
-    previous_prices: NotRequired[dict[str, float]]
+    previous_prices: NotRequired[dict[str, float | None]]
     """Prices of several assets at its start. Default: those reported for the period before."""
     explain: NotRequired[Explain | None]
     sweep: NotRequired[Sweep | None]
@@ -2429,6 +2511,8 @@ class Composition(TypedDict):
     """Share of each asset in the advised holdings; they sum to 1."""
     holdings: dict[str, float]
     """Share of wealth in each asset, before trading."""
+    leaving: NotRequired[dict[str, float]]
+    """Share of wealth in assets that left the session, to be sold before the coming period."""
     one_step: NotRequired[OneStep | None]
 
 
@@ -2440,7 +2524,7 @@ class Corrected(Uncertainty):
     period: int
     """The period corrected, inserted or removed."""
     log_return: NotRequired[float | None]
-    """Its log-return now; null if it is missing or removed."""
+    """Its log-return now; null if it is missing, removed or a total loss."""
     observed: int
     """Periods observed now."""
     wealth: float
@@ -2594,8 +2678,11 @@ class JobPage(TypedDict):
 class ObservedAssets(Composition):
     """A period of several assets, by their names."""
 
-    log_returns: NotRequired[dict[str, float]]
-    """Null if they are missing."""
+    log_returns: NotRequired[dict[str, float | None]]
+    """
+    Null if they are missing. Null for an asset whose price did not come, or that lost everything, which `notes`
+    says.
+    """
     advised_allocations: dict[str, float]
     """Advised share of wealth in each asset."""
     executed_allocations: dict[str, float]
@@ -2662,6 +2749,8 @@ class Renewed(Uncertainty):
     """The last period that the policy advises."""
     terms: Terms
     """Rate, cost and flows of its periods, unless a report gives others."""
+    names: NotRequired[list[str] | None]
+    """Names of the assets from here on, in the order of the policy, if they changed."""
     assets: NotRequired[Composition | None]
 
 
@@ -2793,7 +2882,7 @@ class AssetsWhatIfPoint(FundAdvice):
     """The period advised."""
     wealth: float
     """Wealth at its start."""
-    log_returns: NotRequired[dict[str, float]]
+    log_returns: NotRequired[dict[str, float | None]]
     """The returns of the hypothesis by asset, if it has any."""
     radius_scale: NotRequired[float | None]
     """The factor on the radius in the hypothesis, if it has one."""
@@ -2874,7 +2963,9 @@ class Observed(Uncertainty):
     session: str
     period: int
     log_return: NotRequired[float | None]
-    """Null if it is missing."""
+    """Null if it is missing, or after a total loss, which `notes` says."""
+    notes: NotRequired[list[PeriodNote]]
+    """Notes on the period: losses that the law does not learn in full, and prices that did not come."""
     band: list[float]
     """
     The holdings that are best kept at the start of the period. If trading costs nothing, both ends are the advised
@@ -2929,6 +3020,10 @@ class Renewal(Renewed):
 
     window: NotRequired[int | None]
     """Number of last returns that the law was made of; null if it used all."""
+    records: NotRequired[dict[str, list[float | None]]]
+    """The record that each asset entered with, by name."""
+    leaving: NotRequired[list[str]]
+    """Names of the assets that left."""
     renewed_ms: int
 
 
@@ -2983,6 +3078,8 @@ class Observation(Observed):
     reported: Report
     """The first report of it."""
     observed_ms: int
+    account: PeriodAccount
+    """Money of the period after all corrections, beside what simple rules would have made."""
     corrections: NotRequired[list[int]]
     """Numbers of the corrections that inserted it or reported it again."""
     now: NotRequired[Now | None]
@@ -3006,10 +3103,15 @@ class History(TypedDict):
     initial_radius: float
     """Radius of the uncertainty set before the first period, in the unit of an advice's radius."""
     assets: NotRequired[list[str] | None]
-    """Names of the assets, if there are several."""
+    """Names of the assets at the start, if there are several. A renewal that changes them has the new `names`."""
     composed: NotRequired[Composition | None]
     history: InitialHistory
     """Log-returns known at the start."""
+    record: InitialHistory
+    """
+    Log-returns that the law is made of, oldest first and with all corrections: of the present assets, and without
+    periods in which one has none. A renewal may use the last ones only.
+    """
     observations: list[Observation]
     corrections: list[Correction]
     renewals: list[Renewal]
