@@ -1,5 +1,10 @@
-//! `ballast-lab bench assets`: the robust step of several assets on windows of twelve US industries, from a cold start and
-//! from a warm start at the solution of the month before.
+//! `ballast-lab bench assets`: the robust step of several assets, from a cold start and from a warm start at the solution
+//! of the month before: on windows of twelve US industries, on random tables, and on steps drawn from all that may be
+//! asked.
+
+mod hostile;
+mod random;
+mod tables;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -31,6 +36,15 @@ pub struct AssetsBench {
     /// Print a line of JSON for each row, with the last window's answer
     #[arg(long)]
     json: bool,
+    /// Time random tables of several sizes instead, so many of each size
+    #[arg(long, value_name = "TABLES", num_args = 0..=1, default_missing_value = "50", conflicts_with = "hostile")]
+    random: Option<usize>,
+    /// Solve so many steps drawn from all that may be asked instead, and print those that are not certified
+    #[arg(long, value_name = "STEPS", num_args = 0..=1, default_missing_value = "10000")]
+    hostile: Option<usize>,
+    /// Number of the first hostile step
+    #[arg(long, default_value_t = 0, requires = "hostile")]
+    first: usize,
 }
 
 /// Risk aversion in wealth.
@@ -63,6 +77,12 @@ struct WindowFindings {
 }
 
 pub fn run(bench: &AssetsBench) -> Result<(), Box<dyn Error>> {
+    if let Some(tables) = bench.random {
+        return random::run(tables);
+    }
+    if let Some(steps) = bench.hostile {
+        return hostile::run(bench.first..bench.first + steps);
+    }
     let rows = read(&bench.file)?;
     if !bench.json {
         println!(

@@ -1,0 +1,46 @@
+//! Time of the robust step on random tables of several sizes: normal months, correlations up to 0.9.
+
+use std::error::Error;
+use std::hint::black_box;
+use std::time::Instant;
+
+use super::super::summary::median;
+use super::tables::{ordinary, ordinary_step};
+
+/// Assets and dates.
+const SIZES: [(usize, usize); 7] = [(5, 240), (20, 120), (10, 500), (12, 1000), (30, 500), (30, 2000), (20, 8312)];
+/// Radius in units of the deviation over the root of the dates: about that of the levels of caution, and the whole one.
+const SCALES: [f64; 2] = [0.15, 1.0];
+
+pub fn run(tables: usize) -> Result<(), Box<dyn Error>> {
+    if tables == 0 {
+        return Err("at least one table".into());
+    }
+    let [assets, dates, scale, cold, worst, warm] =
+        ["assets", "dates", "radius", "median, ms", "worst", "a date later"];
+    println!("{assets:>8}{dates:>8}{scale:>8}{cold:>12}{worst:>10}{warm:>14}{:>18}", "widest gap, bp");
+    for (assets, dates) in SIZES {
+        for scale in SCALES {
+            let (mut cold, mut warm, mut gap): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
+            for number in 0..tables {
+                let rows = ordinary(number, assets, dates);
+                let step = ordinary_step(&rows[..dates], scale);
+                let started = Instant::now();
+                let found = black_box(step.solve(None));
+                cold.push(1e3 * started.elapsed().as_secs_f64());
+                let later = ordinary_step(&rows[1..], scale);
+                let started = Instant::now();
+                let next = black_box(later.solve(Some(&found)));
+                warm.push(1e3 * started.elapsed().as_secs_f64());
+                gap = [found, next].iter().map(|found| 1e4 * (found.bound - found.value)).fold(gap, f64::max);
+            }
+            let worst = cold.iter().copied().fold(0.0, f64::max);
+            println!(
+                "{assets:>8}{dates:>8}{scale:>8}{:>12.1}{worst:>10.1}{:>14.1}{gap:>18.4}",
+                median(&cold),
+                median(&warm)
+            );
+        }
+    }
+    Ok(())
+}
