@@ -82,7 +82,7 @@ const ROWS: &[Row] = &[
     row!("queues filled by another", 1, neighbours::crowds),
     row!("answers that nobody reads", 1, unread::unread),
     row!("replays after a kill", 1, unread::replayed),
-    row!("batches of 1,000 reports", 1, work::batches),
+    row!("batches of reports", 1, work::batches),
     row!("searches of another", 1, work::searches),
     row!("largest question of twenty", 1, work::questions),
     row!("database moved or replaced", 6, moved::moved),

@@ -77,12 +77,15 @@ async fn questions(caller: &Caller) -> Result<Vec<LargeQuestion>, String> {
     ])
 }
 
-fn made_of(answer: Option<Answer>, name: &str) -> Result<String, String> {
+pub fn made_of(answer: Option<Answer>, name: &str) -> Result<String, String> {
     match answer {
         Some((201, made)) => made[name].as_str().map(str::to_owned).ok_or(format!("no {name} in {made}")),
         other => Err(format!("no {name}: {other:?}")),
     }
 }
+
+/// Bridge paths of a small training.
+const PATHS: usize = 200;
 
 /// Sessions that are replayed after a restart.
 const REPLAYED: usize = 20;
@@ -92,7 +95,7 @@ pub async fn replayed(trials: usize) -> Outcome {
     let (site, mut tally) = (Site::limited(&["--memory-limit", "1GB"]), Tally::default());
     let mut server = site.start().await?;
     let mut caller = Caller::new(&[&server.url]);
-    let opening = json!({ "policy": imported(&caller, &trained(&unending())).await?, "rolling": true });
+    let opening = json!({ "policy": imported(&caller, &trained(&unending(PATHS))).await?, "rolling": true });
     let mut sessions = Vec::new();
     for _ in 0..REPLAYED {
         sessions.push(made_of(caller.post("/sessions", &opening).await, "session")?);
@@ -158,18 +161,19 @@ async fn advice(caller: &Caller, session: &str) -> Result<Value, String> {
 }
 
 /// Imports a policy; returns its name.
-async fn imported(caller: &Caller, policy: &[u8]) -> Result<String, String> {
+pub async fn imported(caller: &Caller, policy: &[u8]) -> Result<String, String> {
     let policy: Value = serde_json::from_slice(policy).map_err(|error| error.to_string())?;
     made_of(caller.post("/policies/import", &policy).await, "policy")
 }
 
-fn log_return(number: usize) -> f64 {
+pub fn log_return(number: usize) -> f64 {
     0.004 + 0.02 * (1.7 * number as f64).sin()
 }
 
-/// A training whose sessions may go on without an end.
-fn unending() -> Value {
+/// A training whose sessions may go on without an end, with so many bridge paths.
+pub fn unending(paths: usize) -> Value {
     let mut training = specification(2);
+    training["problem"]["radius"]["paths"] = json!(paths);
     training["problem"]["learning"] = json!({ "kind": "decay", "half_life": 1 });
     training["problem"]["utility"] = json!({ "kind": "power", "risk_aversion": 3 });
     training["design"]["initial_laws"] = json!("resampled");
@@ -178,7 +182,7 @@ fn unending() -> Value {
 
 /// Opens a rolling session and reports periods in proportion to the length of the attack.
 async fn long(caller: &Caller) -> Result<String, String> {
-    let policy = imported(caller, &trained(&unending())).await?;
+    let policy = imported(caller, &trained(&unending(PATHS))).await?;
     let opened = caller.post("/sessions", &json!({ "policy": policy, "rolling": true })).await;
     let session = made_of(opened, "session")?;
     for period in 1..=MOST_PERIODS.min(PERIODS * attack_time().as_secs() as usize) {

@@ -10,7 +10,9 @@ use crate::neighbours::{ANSWERED, Attack, attack_time, until};
 use crate::scene::{Outcome, Tally, import};
 use crate::server::Site;
 use crate::support::patience::{patience, within};
+use crate::support::trained;
 use crate::tenants::{Pulse, Tenants};
+use crate::unread::{imported, log_return, made_of, unending};
 
 pub async fn batches(trials: usize) -> Outcome {
     Tenants::attacked(Site::limited(&["--memory-limit", "256MB"]), trials, Attack::Batch).await
@@ -19,13 +21,17 @@ pub async fn batches(trials: usize) -> Outcome {
 /// Clients with batches of as many reports as one may have: threads and memory stay within what they may be.
 pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     const CLIENTS: usize = 4;
-    const SESSIONS: usize = 1000;
+    const SESSIONS: usize = 250;
+    const RETURNS: usize = 600;
+    const PATHS: usize = 2000;
     const MOST_THREADS: usize = 64;
     const MOST_MB: usize = 300;
     let caller = &tenants.neighbour;
-    let policy = import(caller).await;
-    // Each client reports to sessions of its own, so that every report is recorded.
-    let opening = (0..CLIENTS).map(|_| open(caller, &policy, SESSIONS));
+    // Each client reports to sessions of its own, so that every report is recorded, and their records are so long that
+    // the radius after a report is work for another thread.
+    let opening = json!({ "policy": imported(caller, &trained(&unending(PATHS))).await?, "rolling": true,
+        "history": (0..RETURNS).map(log_return).collect::<Vec<_>>() });
+    let opening = (0..CLIENTS).map(|_| open(caller, &opening, SESSIONS));
     let sessions = join_all(opening).await;
     let pulse = tenants.pulse("").await?;
     let (end, mut threads) = (Instant::now() + attack_time(), 0);
@@ -59,11 +65,11 @@ pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
     Ok(calls)
 }
 
-/// Opens so many sessions of a policy, one after the other.
-async fn open(caller: &Caller, policy: &str, count: usize) -> Vec<String> {
+/// Opens so many sessions, one after the other.
+async fn open(caller: &Caller, opening: &Value, count: usize) -> Vec<String> {
     let (caller, mut sessions) = (caller.another(), Vec::new());
     for _ in 0..count {
-        sessions.extend(caller.open(policy).await);
+        sessions.extend(made_of(caller.post("/sessions", opening).await, "session").ok());
     }
     sessions
 }
@@ -76,8 +82,8 @@ pub async fn searches(trials: usize) -> Outcome {
 pub async fn search(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     const OPENING: usize = 8;
     const SESSIONS: usize = 500;
-    let policy = import(&tenants.neighbour).await;
-    join_all((0..OPENING).map(|_| open(&tenants.neighbour, &policy, SESSIONS))).await;
+    let opening = json!({ "policy": import(&tenants.neighbour).await });
+    join_all((0..OPENING).map(|_| open(&tenants.neighbour, &opening, SESSIONS))).await;
     let pulse = Pulse::of(tenants.owner.another(), "/sessions".to_owned());
     let end = Instant::now() + attack_time();
     let paths = ["/sessions?search=zz", "/sessions?sort=-wealth&count=care"];
