@@ -193,10 +193,12 @@ async fn heavy_calls_past_the_bound_come_back_later_and_starve_nobody() {
     let heavy = join_all((0..24).map(|_| app.client.post(format!("{}/what-if", app.url)).json(&sweep).send()));
     let live = async {
         let mut slowest = Duration::ZERO;
-        for period in 1..=20 {
+        // Returns like those of the record: advice outside the design would need a solve, which is heavy.
+        for (period, log_return) in (1..=20).zip([0.031, -0.024, 0.012, -0.039, 0.04].into_iter().cycle()) {
             let started = Instant::now();
-            assert_eq!(app.action().await.0, 200);
-            assert_eq!(app.observe(period, 0.001).await.0, 200);
+            let (status, advice) = app.action().await;
+            assert_eq!(status, 200, "{advice}");
+            assert_eq!(app.observe(period, log_return).await.0, 200);
             slowest = slowest.max(started.elapsed());
         }
         slowest

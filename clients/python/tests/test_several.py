@@ -33,7 +33,7 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
         TABLE, kind="simple", rate=0.002, strategies=["policy"], windows=[8], every=4, horizon=5, count=10, alpha=0.9
     )
     choices = trained.report()["choices"]
-    assert [choices[name] for name in ("strategies", "horizon", "count")] == [["policy"], 5, 10]
+    assert (choices["strategies"], choices["horizon"], choices["count"]) == (["policy"], 5, 10)
 
     strategies = job.frame()
     assert list(strategies.index) == [figures["strategy"] for figures in report["strategies"]]
@@ -173,7 +173,7 @@ def test_losses_gaps_and_other_assets_are_in_the_frames(ballast: Ballast) -> Non
     )
     record = np.log1p(technology).tolist()
     record[16] = math.nan
-    renewed = session.renew(next_policy.policy(), records={"technology": record}, leaving=["energy"])
+    renewed = session.renew(next_policy.policy().id, records={"technology": record}, leaving=["energy"])
     assert renewed.get("names") == ["health", "technology"]
     session.observe(simple_returns={"health": 0.01, "technology": 0.02})
     returns = session.assets_frame()

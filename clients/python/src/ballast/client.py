@@ -346,10 +346,11 @@ class _Ballast:
         it.
 
         ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``. ``rate`` and ``dates`` are as in
-        ``backtest``, but dates are required. ``strategies`` has ``"policy"``, the trained policy that a session follows,
-        ``"one_step"``, the one-step rule, or both; ``horizon`` and ``count`` are those of a policy. ``windows`` says how
-        many of the last periods each strategy learns from, with ``None`` for all. The service chooses what you leave out, and the report shows what it chose. Raises
-        ``ValueError`` before anything is queued if ``returns``, ``rate`` or ``dates`` cannot be correct.
+        ``backtest``, but dates are required. ``strategies`` has ``"policy"``, the trained policy that a session
+        follows, ``"one_step"``, the one-step rule, or both; ``horizon`` and ``count`` are those of a policy.
+        ``windows`` says how many of the last periods each strategy learns from, with ``None`` for all. The service
+        chooses what you leave out, and the report shows what it chose. Raises ``ValueError`` before anything is queued
+        if ``returns``, ``rate`` or ``dates`` cannot be correct.
         """
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
         beside = _beside(found, returns, rate, dates)

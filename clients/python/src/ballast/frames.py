@@ -35,10 +35,10 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
     after the period. With ``as_of="now"`` all columns include every correction; with ``"then"`` they are what the
     service answered at the time. ``corrected`` marks the rows where the two may differ.
 
-    ``rate`` is what the bank paid and ``flow`` the money added. ``turnover`` is the share of wealth that was traded, and
-    ``cost`` the money that it cost. ``equal_weights``, ``initial_composition`` and ``bank`` are the wealth of somebody
-    who began with the same wealth and holdings and held equal shares of all assets, the first composition of the fund,
-    or nothing. These columns always include every correction. Raises ``ImportError`` without pandas.
+    ``rate`` is what the bank paid and ``flow`` the money added. ``turnover`` is the share of wealth that was traded,
+    and ``cost`` the money that it cost. ``equal_weights``, ``initial_composition`` and ``bank`` are the wealth of
+    somebody who began with the same wealth and holdings and held equal shares of all assets, the first composition of
+    the fund, or nothing. These columns always include every correction. Raises ``ImportError`` without pandas.
     """
     pd = require_pandas()
     rows = []
@@ -46,7 +46,7 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
         changed = observation.get("now")
         row: Mapping[str, Any] = observation if as_of == "then" or changed is None else changed
         reported = row.get("reported") or observation["reported"]
-        account = observation["account"]
+        account: Mapping[str, Any] = observation["account"]
         log_return = _log_return(row, None if history.get("assets") is None else _ALL)
         benchmarks = {name: math.nan if value is None else value for name, value in account["benchmarks"].items()}
         rows.append(
@@ -73,9 +73,9 @@ def assets_history(
     asset that the session has or had.
 
     ``simple_return`` and ``log_return`` include every correction unless ``as_of`` is ``"then"``, and are NaN if they
-    are missing: a total loss is a simple return of -1. ``advised_allocation``, ``executed_allocation`` and ``holding`` (after the period) are shares of wealth
-    as the service answered at the time. Raises ``ValueError`` for another figure and for a session of one asset, and
-    ``ImportError`` without pandas.
+    are missing: a total loss is a simple return of -1. ``advised_allocation``, ``executed_allocation`` and ``holding``
+    (after the period) are shares of wealth as the service answered at the time. Raises ``ValueError`` for another
+    figure and for a session of one asset, and ``ImportError`` without pandas.
     """
     assets = history.get("assets")
     if not assets:
@@ -114,8 +114,8 @@ _ALL = "*"
 
 
 def _log_return(row: Mapping[str, Any], asset: str | None) -> float:
-    """Returns the log-return of a row: NaN if it is missing, and minus infinity after a total loss, which JSON writes as
-    null. Of all assets together a null is a loss only if some return is known."""
+    """Returns the log-return of a row: NaN if it is missing, and minus infinity after a total loss, which JSON writes
+    as null. Of all assets together a null is a loss only if some return is known."""
     value = row.get("log_return")
     if value is not None:
         return float(value)

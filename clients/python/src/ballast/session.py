@@ -106,9 +106,10 @@ class _Session(Labelled):
         really held, by default the advised one. ``rate`` is what the bank paid and ``flow`` what was added, by default
         those of the policy. ``wealth`` is the wealth really reached, and ``date`` is the last day. For several assets
         ``log_returns``, ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by the names
-        of the assets. A return or price that is ``None`` or NaN did not come in the period. ``period`` is by default the coming one. An earlier period with the content first reported for it
-        gets its first answer again. Raises :class:`Unconfirmed` for a report that is probably a mistake, unless
-        ``confirm`` is true, and :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
+        of the assets. A return or price that is ``None`` or NaN did not come in the period. ``period`` is by default
+        the coming one. An earlier period with the content first reported for it gets its first answer again. Raises
+        :class:`Unconfirmed` for a report that is probably a mistake, unless ``confirm`` is true, and
+        :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
         number = self.period if period is None else period
         body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **_by_name(report)}
