@@ -71,7 +71,7 @@ const PAGE_BESIDE_A_DATABASE: Duration = Duration::from_millis(400);
 /// The time limit of another tenant's list while eight lists at a time read all the sessions.
 const OTHER_LIST: Duration = Duration::from_millis(400);
 /// Sessions that are opened at the same time.
-const AT_ONCE: usize = 400;
+const AT_ONCE: usize = 24;
 
 fn sessions() -> usize {
     std::env::var("BALLAST_LISTED_SESSIONS").map_or(SESSIONS, |count| count.parse().expect("a number"))

@@ -153,7 +153,10 @@ def test_losses_gaps_and_other_assets_are_in_the_frames(ballast: Ballast) -> Non
     left = 100.0 * (1.0 - 0.001 * 0.35)
     assert frame["wealth"].iloc[0] == pytest.approx(left * (0.25 * 1.002 + 0.5 * 1.03 + 0.25) + 1.0)
     assert frame["bank"].iloc[0] == pytest.approx(100.0 * (1.0 - 0.001 * 0.5) * 1.002 + 1.0)
-    assert (frame[["equal_weights", "initial_composition"]] > 0.0).all(axis=None)
+    assert frame["equal_weights"].iloc[0] == pytest.approx(100.0 * (1.0 - 0.001 * 0.5) * (0.5 * 1.03 + 0.5) + 1.0)
+    # The first composition is energy alone, which loses everything.
+    assert frame["initial_composition"].iloc[0] == pytest.approx(100.0 * (1.0 - 0.001 * 1.1) * 1.03 + 1.0)
+    assert frame["equal_weights"].iloc[1] > 0.0 and math.isnan(frame["initial_composition"].iloc[1])
     returns = session.assets_frame()
     assert math.isnan(returns["health"].iloc[0]) and returns["energy"].iloc[1] == -1.0
     assert session.assets_frame("log_return")["energy"].iloc[1] == -math.inf
