@@ -16,8 +16,11 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const fill = (chosen) => {
     const row = history.observations[chosen - 1];
     if (history.assets) {
-      fields = severalFields(Object.keys(row.assets.advised_allocations), blank);
-      place.replaceChildren(fields.element);
+      const names = Object.keys(row.assets.advised_allocations);
+      if (`${names}` !== `${shown}`) {
+        [shown, fields] = [names, severalFields(names, blank)];
+        place.replaceChildren(fields.element);
+      }
       fields.fill(history, chosen - 1);
     } else fields.fill(standing(row), (row.now ?? row).log_return);
   };
@@ -25,7 +28,8 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const { rate_per_step, contributions } = policy.specification.problem;
   const contribution = Array.isArray(contributions) ? null : contributions;
   const blank = { within, advised: null, rate: rate_per_step, contribution };
-  // The assets may differ from period to period.
+  // The assets may differ from period to period; fields of the same assets keep what is open.
+  let shown = null;
   let fields = history.assets ? null : reportFields({ ...blank, label: "Return, %" });
   const place = h("div", {}, fields?.element ?? "");
   fill(history.observations.length);
