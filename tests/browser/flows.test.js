@@ -64,7 +64,7 @@ test("what the form says will be refused is refused in the same words", async ()
     ["Share held, %", "150", "Share held is 150 %; it must be from 0 % to 100 %."],
     ["The bank paid, %", "-60", "The bank paid is -60 %; it must be from -50 % to 50 %."],
     ["Wealth reached", "0", "Wealth reached is 0; it must be from 0.000001 to"],
-    ["Return in period 1", "-99.9", "Return in period 1 is -99.9 %; it must be from -99.32 % to"],
+    ["Return in period 1", "-100.1", "Return in period 1 is -100.1 %; it must be from -100"],
   ]) {
     const field = page.getByLabel(label);
     const before = await field.inputValue();
