@@ -69,7 +69,7 @@ export async function browser() {
     });
     await context.route(/\/docs(\/(page\.css|start\.js))?$/, (route) => {
       const name = basename(new URL(route.request().url()).pathname);
-      return route.fulfill({ path: join(FILES, "../documentation", name === "docs" ? "index.html" : name) });
+      return route.fulfill({ path: join(FILES, "../../description/documentation", name === "docs" ? "index.html" : name) });
     });
     return context;
   };
