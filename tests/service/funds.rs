@@ -484,7 +484,7 @@ fn mean_power(
         let realised = PeriodOutcome::of(advice.allocation, fund.log_return(&executed, &row));
         let next = state.next_state(Dynamics::plain(problem.rate_per_step, 0.0), &realised);
         let mut learned = fund.clone();
-        learned.passed(&executed, Some(&row), next.holding);
+        learned.passed(&executed, &row, Some(row.clone()), next.holding);
         mean_power((advisor, of, adversary), choose, step + 1, &learned, &next)
     };
     (0..returns.len()).map(after).sum::<f64>() / returns.len() as f64

@@ -168,13 +168,13 @@ impl Fund {
         self.holdings.iter().zip(executed).map(|(held, share)| f64::abs(share - held)).sum()
     }
 
-    /// Updates the fund after a period in which `executed` was held and that left the share `holding` in all assets.
-    pub fn passed(&mut self, executed: &[f64], log_returns: Option<&[f64]>, holding: f64) {
-        let grown = |(asset, share): (usize, &f64)| share * log_returns.map_or(1.0, |all| all[asset].exp());
-        let grown: Vec<f64> = executed.iter().enumerate().map(grown).collect();
+    /// Updates the fund after a period in which `executed` was held, the assets moved by `log_returns` and the share
+    /// `holding` was left in all of them. `learned` is the row that the law learns of it, if it learns one.
+    pub fn passed(&mut self, executed: &[f64], log_returns: &[f64], learned: Option<Vec<f64>>, holding: f64) {
+        let grown: Vec<f64> = executed.iter().zip(log_returns).map(|(share, z)| share * z.exp()).collect();
         let whole: f64 = grown.iter().sum();
         self.holdings = grown.iter().map(|share| if whole > 0.0 { share / whole * holding } else { 0.0 }).collect();
-        self.rows.extend(log_returns.map(<[f64]>::to_vec));
+        self.rows.extend(learned);
     }
 
     /// Returns the state of a fund with another composition.

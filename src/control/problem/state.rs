@@ -6,12 +6,15 @@ use crate::control::request::learning::Learning;
 use crate::control::request::rules;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 
+/// The lowest log-return that a law learns; a total loss counts as this much.
+pub const LEAST_LEARNED: f64 = -rules::LOG_RETURN;
+
 /// The realised values of a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeriodOutcome {
     /// Share of wealth held in the risky asset through the period.
     pub action: f64,
-    /// z; if it is not known the asset counts as unmoved, and nothing is learned.
+    /// z, minus infinity after a total loss; if it is not known the asset counts as unmoved, and nothing is learned.
     pub log_return: Option<f64>,
     /// The rate that the bank paid, if it was not the rate of the problem.
     pub rate: Option<f64>,
@@ -73,13 +76,13 @@ impl State {
     }
 
     /// Returns G(y, a, z): next wealth and holding after a period of `dynamics` with the values `realised`, and the law
-    /// with the return learned.
+    /// with the return learned. Wealth bears all of a loss, also one that is lower than any the law learns.
     pub fn next_state(&self, dynamics: Dynamics, realised: &PeriodOutcome) -> State {
         let PeriodOutcome { action, log_return, .. } = *realised;
         let (dynamics, traded) = (realised.dynamics(dynamics), realised.turnover(self.holding));
         let (wealth, holding) = dynamics.next_after(self.wealth, traded, action, log_return.unwrap_or(0.0));
         let mut law = self.law.clone();
-        log_return.into_iter().for_each(|seen| law.push(seen));
+        log_return.into_iter().for_each(|seen| law.push(seen.max(LEAST_LEARNED)));
         State { wealth, holding, law }
     }
 }

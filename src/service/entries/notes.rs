@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::service::entries::record::{LEAST_LEARNED, PeriodReturns};
+use crate::control::problem::state::LEAST_LEARNED;
+use crate::service::entries::record::PeriodReturns;
 
 /// A note on a recorded period.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

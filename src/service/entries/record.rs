@@ -1,10 +1,8 @@
 //! All observed returns of a session, date by date.
 
+use crate::control::problem::state::LEAST_LEARNED;
 use crate::control::request::assets::DATES;
 use crate::control::request::rules;
-
-/// The lowest log-return that a law learns; a total loss counts as this much.
-pub(in crate::service) const LEAST_LEARNED: f64 = -rules::LOG_RETURN;
 
 /// The log-returns of a period, one for each asset of the session.
 #[derive(Debug, Clone, PartialEq)]

@@ -193,10 +193,7 @@ impl Assets {
     /// Updates record and holdings after a period in which `executed` was held and that left the share `holding` in all
     /// assets.
     pub(in crate::service) fn passed(&mut self, executed: &[f64], seen: &PeriodReturns, holding: f64) {
-        let dates = self.fund.rows.len();
-        self.fund.passed(executed, Some(&seen.moves()), holding);
-        self.fund.rows.truncate(dates);
-        self.fund.rows.extend(seen.learned());
+        self.fund.passed(executed, &seen.moves(), seen.learned(), holding);
         self.leaving.clear();
         if !seen.is_missing() {
             self.waiting = seen.log_returns.iter().map(Option::is_none).collect();

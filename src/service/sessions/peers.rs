@@ -8,9 +8,9 @@ use std::collections::HashMap;
 use futures_util::{StreamExt, stream};
 use jiff::civil::Date;
 
+use crate::control::problem::state::LEAST_LEARNED;
 use crate::service::callers::keys::Caller;
 use crate::service::entries::doubts::{Doubt, DoubtReason, ROUNDING};
-use crate::service::entries::record::LEAST_LEARNED;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::sessions::Sessions;
 

@@ -15,7 +15,7 @@ use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
 use crate::service::entries::doubts::{self, Doubt};
 use crate::service::entries::drift::DriftTest;
-use crate::service::entries::record::{LEAST_LEARNED, PeriodReturns, SessionRecord};
+use crate::service::entries::record::{PeriodReturns, SessionRecord};
 use crate::service::entries::report::Report;
 use crate::service::sessions::asset_change::AssetChange;
 use crate::service::sessions::assets::{Assets, Composition, mean};
@@ -164,20 +164,8 @@ impl SessionState {
                 (Vec::new(), PeriodOutcome { action, log_return, rate, flow, traded: None })
             }
         };
-        let log_return = realised.log_return.map(|log_return| log_return.max(LEAST_LEARNED));
-        let learned = PeriodOutcome { log_return, ..realised };
-        let turnover = learned.turnover(self.state.holding);
-        let mut state = self.state.next_state(dynamics, &learned);
-        if learned != realised {
-            // Wealth bears the whole loss.
-            let exact = learned.dynamics(dynamics).next_after(
-                self.state.wealth,
-                turnover,
-                learned.action,
-                realised.log_return.unwrap_or(0.0),
-            );
-            (state.wealth, state.holding) = exact;
-        }
+        let turnover = realised.turnover(self.state.holding);
+        let mut state = self.state.next_state(dynamics, &realised);
         state.wealth = match report.wealth {
             Some(reported) => reported,
             None => check_wealth_range(state.wealth, report)?,

@@ -167,10 +167,10 @@ impl FundWalk<'_> {
             watch.go_on()?;
             let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
             let shares = fund.shares(advice.allocation);
-            let row = Some(self.record.rows[period].as_slice());
-            let outcome = fund.outcome(&shares, row, Some(self.record.bank[period]), None);
+            let row = &self.record.rows[period];
+            let outcome = fund.outcome(&shares, Some(row), Some(self.record.bank[period]), None);
             state = state.next_state(terms.period(step), &outcome);
-            fund.passed(&shares, row, state.holding);
+            fund.passed(&shares, row, Some(row.clone()), state.holding);
             (state, _) = fund.enter(&advisor, step + 1, &state);
             let traded = outcome.traded.unwrap_or_default();
             periods.push(HeldPeriod { shares, radius: advice.radius, traded, wealth: state.wealth });
