@@ -3,6 +3,7 @@
 use crate::support::App;
 use crate::support::patience::until;
 use crate::support::values::number;
+use ballast::control::cache::Cache;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::assets::policy::{FundWalk, HeldPeriod};
 use ballast::control::pool::TrainingPool;
@@ -56,7 +57,10 @@ fn walked(record: &AssetsRecord) -> Vec<HeldPeriod> {
     let problem: AssetsProblem = serde_json::from_value(training["problem"].clone()).unwrap();
     let design: DesignSpecification = serde_json::from_value(training["design"].clone()).unwrap();
     let walk = FundWalk { record, first: WINDOW, window: Some(WINDOW), every: EVERY, problem, design, seed: 5 };
-    TrainingPool::new(2).unwrap().install(|| walk.run(&Watch::unwatched(), &|| {})).unwrap()
+    TrainingPool::new(2)
+        .unwrap()
+        .install(|| walk.run(&Watch::unwatched(), &Cache::default(), |_, tenure| tenure()))
+        .unwrap()
 }
 
 async fn session(app: &App) -> Value {

@@ -112,13 +112,18 @@ impl Fund {
     /// # Errors
     /// The wealth breaks a rule, or the returns of the fund are not a valid history.
     pub fn begin(&self, advisor: &Advisor, wealth: Option<f64>) -> Result<State, FieldError> {
-        advisor.initial_state(Some(&self.returns()), wealth)?.with_holding(total(&self.holdings))
+        advisor.initial_state(Some(&self.returns()), wealth)?.with_holding(self.holding())
     }
 
     /// Makes `rows` the returns of the law, as a renewal does, and returns the state with the law of the fund.
-    pub fn renew(&mut self, rows: Vec<Vec<f64>>, learning: Learning, state: &State) -> State {
+    pub fn renew(&mut self, rows: Vec<Vec<f64>>, learning: Learning, wealth: f64, holding: f64) -> State {
         self.rows = rows;
-        State { law: learning.law(&self.returns()), ..*state }
+        State { law: learning.law(&self.returns()), wealth, holding }
+    }
+
+    /// Returns the share of wealth held in all assets together.
+    pub fn holding(&self) -> f64 {
+        total(&self.holdings)
     }
 
     /// Replaces the composition by this one.

@@ -107,8 +107,8 @@ impl AssetChange {
         changed
     }
 
-    /// Returns `assets` after the change, with the returns `rows` of the changed record.
-    pub(in crate::service) fn assets(&self, assets: &Assets, rows: Vec<Vec<f64>>) -> Assets {
+    /// Returns `assets` after the change, to be renewed with the returns `rows` of the changed record.
+    pub(in crate::service) fn assets(&self, assets: &Assets, rows: &[Vec<f64>]) -> Assets {
         let index = |column: &ReturnSource| match column {
             ReturnSource::Kept(index) => Some(*index),
             ReturnSource::Entering(_) => None,
@@ -120,9 +120,8 @@ impl AssetChange {
         changed.waiting =
             self.columns.iter().map(|column| index(column).is_some_and(|index| assets.waiting[index])).collect();
         changed.fund.holdings = self.kept(&assets.fund.holdings);
-        changed.fund.composition = self.shares(&assets.fund.composition).unwrap_or_else(|| inverse_volatility(&rows));
+        changed.fund.composition = self.shares(&assets.fund.composition).unwrap_or_else(|| inverse_volatility(rows));
         changed.fund.before = changed.fund.composition.clone();
-        changed.fund.rows = rows;
         changed.one_step = None;
         for (name, held) in assets.names.iter().zip(&assets.fund.holdings) {
             if *held > 0.0 && !self.names.contains(name) {

@@ -91,14 +91,12 @@ impl SessionState {
                     change.map_or(&assets.names, |change| &change.names),
                     None,
                 )?;
-                match change {
-                    Some(change) => {
-                        **assets = change.assets(assets, rows);
-                        let holding = assets.fund.holdings.iter().sum::<f64>().min(1.0);
-                        State { law: learning.law(&assets.fund.returns()), wealth: self.state.wealth, holding }
-                    }
-                    None => assets.fund.renew(rows, learning, &self.state),
+                let mut holding = self.state.holding;
+                if let Some(change) = change {
+                    **assets = change.assets(assets, &rows);
+                    holding = assets.fund.holding();
                 }
+                assets.fund.renew(rows, learning, self.state.wealth, holding)
             }
             None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
         };

@@ -78,7 +78,8 @@ impl AssetsBacktest {
 
     /// Returns the number of policies that are trained.
     fn trainings(&self) -> usize {
-        self.fund_walks().iter().map(|walk| walk.starts().count()).sum()
+        let policies = self.strategies().into_iter().filter(|strategy| strategy.rule.is_policy());
+        policies.count() * self.starts().count()
     }
 
     /// Returns how many log-returns the one-step problems of all periods read.

@@ -175,7 +175,7 @@ impl AssetsBacktest {
     pub fn steps(&self) -> Vec<(usize, AssetsStrategy)> {
         let number = |next: &mut usize, strategy: AssetsStrategy| {
             let first = *next;
-            *next += self.fund_walk(strategy).map_or(1, |walk| walk.starts().count());
+            *next += if strategy.rule.is_policy() { self.starts().count() } else { 1 };
             Some((first, strategy))
         };
         self.strategies().into_iter().scan(0, number).collect()

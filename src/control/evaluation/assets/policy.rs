@@ -95,19 +95,16 @@ impl WalkState {
 
     /// Returns the fund and the state, renewed with the returns `rows`.
     fn renewed(&self, rows: Vec<Vec<f64>>) -> (Fund, State) {
-        let WalkState { specification, composition, holdings, wealth, holding } = self;
-        let learning = specification.problem.learning;
-        let (composition, holdings) = (composition.clone(), holdings.clone());
-        let mut fund = Fund { rows: rows.clone(), before: composition.clone(), composition, holdings };
-        let state = State { wealth: *wealth, holding: *holding, law: learning.law(&fund.returns()) };
-        let state = fund.renew(rows, learning, &state);
+        let (composition, holdings) = (self.composition.clone(), self.holdings.clone());
+        let mut fund = Fund { rows: Vec::new(), before: composition.clone(), composition, holdings };
+        let state = fund.renew(rows, self.specification.problem.learning, self.wealth, self.holding);
         (fund, state)
     }
 }
 
 impl FundWalk<'_> {
     /// Returns the first period of each policy.
-    pub fn starts(&self) -> impl Iterator<Item = usize> + use<> {
+    fn starts(&self) -> impl Iterator<Item = usize> + use<> {
         (self.first..self.record.rows.len()).step_by(self.every)
     }
 
@@ -120,19 +117,22 @@ impl FundWalk<'_> {
         Specification { design, ..Specification::of(problem, self.seed) }.completed().ok()
     }
 
-    /// Walks through all periods on the current pool. `done` is called after every policy.
+    /// Walks through all periods on the current pool. `lived` gets the number of each policy, from 0, and the function
+    /// that trains and follows it, whose result it may store or know already.
     ///
     /// # Errors
-    /// A window or a wealth that breaks a rule of the specification; a training that fails; the stop signal.
-    pub fn run(&self, watch: &Watch, done: &(dyn Fn() + Sync)) -> Result<Vec<HeldPeriod>, TrainError> {
-        let mut periods = Vec::new();
-        let mut before = None;
-        for start in self.starts() {
-            let WalkedTenure { periods: more, after } =
-                self.tenure(start, before.as_ref(), (watch, Cache::default()))?;
-            periods.extend(more);
-            before = Some(after);
-            done();
+    /// Those of `lived`.
+    pub fn run<E>(
+        &self,
+        watch: &Watch,
+        kept: &Cache,
+        lived: impl Fn(usize, &dyn Fn() -> Result<WalkedTenure, TrainError>) -> Result<WalkedTenure, E>,
+    ) -> Result<Vec<HeldPeriod>, E> {
+        let (mut periods, mut before) = (Vec::new(), None);
+        for (index, start) in self.starts().enumerate() {
+            let tenure = lived(index, &|| self.tenure(start, before.as_ref(), (watch, kept.clone())))?;
+            periods.extend(tenure.periods);
+            before = Some(tenure.after);
         }
         Ok(periods)
     }
@@ -141,7 +141,7 @@ impl FundWalk<'_> {
     /// the policy before; the first one starts with all wealth in the bank.
     ///
     /// # Errors
-    /// As [`Self::run`].
+    /// A window or a wealth that breaks a rule of the specification; a training that fails; the stop signal.
     pub fn tenure(
         &self,
         start: usize,

@@ -3,6 +3,7 @@
 use super::{AssetsBacktest, AssetsDecisions};
 use crate::control::assets::advising::{FundsBall, floors};
 use crate::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
+use crate::control::cache::Cache;
 use crate::control::error::TrainError;
 use crate::control::evaluation::names::{StrategyKind, caution_in_words};
 use crate::control::problem::actions::ActionInterval;
@@ -98,6 +99,11 @@ impl Rule {
         }
     }
 
+    /// Returns true if the rule trains policies.
+    pub fn is_policy(self) -> bool {
+        matches!(self, Rule::Policy { .. })
+    }
+
     /// Returns the level of caution, if the rule uses a radius.
     pub fn caution(self) -> Option<CautionLevel> {
         match self {
@@ -129,7 +135,7 @@ impl AssetsStrategy {
     /// block.
     ///
     /// # Errors
-    /// As [`FundWalk::run`](super::policy::FundWalk::run).
+    /// As [`FundWalk::tenure`](super::policy::FundWalk::tenure).
     pub fn decide(
         &self,
         backtest: &AssetsBacktest,
@@ -138,7 +144,8 @@ impl AssetsStrategy {
         done: &(dyn Fn() + Sync),
     ) -> Result<AssetsDecisions, TrainError> {
         if let Some(walk) = backtest.fund_walk(*self) {
-            return walk.run(watch, done).map(AssetsDecisions::Lived);
+            let lived = walk.run(watch, &Cache::default(), |_, tenure| tenure().inspect(|_| done()));
+            return lived.map(AssetsDecisions::Lived);
         }
         let (every, first, periods) = (backtest.choices.every, backtest.first, backtest.record.rows.len());
         let (mut last, mut held): (Option<AssetsSolution>, Vec<Vec<f64>>) = (None, Vec::new());

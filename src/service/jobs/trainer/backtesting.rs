@@ -10,7 +10,6 @@ use serde::de::DeserializeOwned;
 use super::{JobEnd, Worker, failed, reported, requested};
 use crate::control::cache::Cache;
 use crate::control::error::TrainError;
-use crate::control::evaluation::assets::policy::WalkedTenure;
 use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::assets::rules::AssetsStrategy;
 use crate::control::evaluation::assets::{AssetsBacktest, AssetsDecisions};
@@ -53,14 +52,10 @@ impl Worker {
                     let decided = || backtest.decide(strategy, &balls, &watch, &|| {});
                     return self.checkpointed(claimed, &checkpoints, Some(step), decided);
                 };
-                let mut tenures: Vec<WalkedTenure> = Vec::new();
-                for (index, start) in walk.starts().enumerate() {
-                    let before = tenures.last().map(|tenure| &tenure.after);
-                    let decided = || walk.tenure(start, before, (&watch, kept.clone()));
-                    let tenure = self.checkpointed(claimed, &checkpoints, Some(step + index), decided)?;
-                    tenures.push(tenure);
-                }
-                Ok(AssetsDecisions::Lived(tenures.into_iter().flat_map(|tenure| tenure.periods).collect()))
+                let lived = walk.run(&watch, &kept, |index, tenure| {
+                    self.checkpointed(claimed, &checkpoints, Some(step + index), tenure)
+                });
+                lived.map(AssetsDecisions::Lived)
             };
             let decided = pool::map(backtest.steps(), decide);
             let decided = decided.into_iter().collect::<Result<_, JobEnd>>()?;
