@@ -17,7 +17,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     const row = history.observations[chosen - 1];
     if (history.assets) {
       const names = Object.keys(row.assets.advised_allocations);
-      if (`${names}` !== `${shown}`) {
+      if (JSON.stringify(names) !== JSON.stringify(shown)) {
         [shown, fields] = [names, severalFields(names, blank)];
         place.replaceChildren(fields.element);
       }
