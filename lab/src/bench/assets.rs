@@ -7,17 +7,16 @@ mod random;
 mod tables;
 
 use std::error::Error;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use ballast::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
-use ballast::control::problem::actions::ActionInterval;
-use ballast::control::problem::utility::RelativeUtility;
-use ballast::control::request::specification::UtilitySpecification;
-use ballast::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
+use ballast::control::assets::AssetsSolution;
+use ballast::control::request::support::Support;
 use clap::Args;
 use serde::Serialize;
 
+use self::tables::ordinary_step;
 use super::summary::median;
 
 #[derive(Debug, Clone, Args)]
@@ -38,10 +37,10 @@ pub struct AssetsBench {
     json: bool,
     /// Time random tables of several sizes instead, so many of each size
     #[arg(long, value_name = "TABLES", num_args = 0..=1, default_missing_value = "50", conflicts_with = "hostile")]
-    random: Option<usize>,
+    random: Option<NonZeroUsize>,
     /// Solve so many steps drawn from all that may be asked instead, and print those that are not certified
     #[arg(long, value_name = "STEPS", num_args = 0..=1, default_missing_value = "10000")]
-    hostile: Option<usize>,
+    hostile: Option<NonZeroUsize>,
     /// Number of the first hostile step
     #[arg(long, default_value_t = 0, requires = "hostile")]
     first: usize,
@@ -78,10 +77,10 @@ struct WindowFindings {
 
 pub fn run(bench: &AssetsBench) -> Result<(), Box<dyn Error>> {
     if let Some(tables) = bench.random {
-        return random::run(tables);
+        return random::run(tables.get());
     }
     if let Some(steps) = bench.hostile {
-        return hostile::run(bench.first..bench.first + steps);
+        return hostile::run(bench.first..bench.first.saturating_add(steps.get()));
     }
     let rows = read(&bench.file)?;
     if !bench.json {
@@ -135,12 +134,12 @@ fn measure(
         .into());
     }
     let rows: Vec<Vec<f64>> = rows.iter().map(|row| row[..assets].to_vec()).collect();
-    let (mut cold, mut warm, mut gap): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
+    let (mut cold, mut warm, mut widest): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
     let mut evaluations = 0.0;
     let mut last: Option<(AssetsSolution, f64)> = None;
     for end in rows.len() + 1 - bench.windows..=rows.len() {
         let window = &rows[end - months..end];
-        let (step, radius) = step(window, sup);
+        let (step, radius) = ordinary_step(window, sup, Support::None {}, RADIUS);
         let started = Instant::now();
         let found = step.solve(None);
         cold.push(started.elapsed().as_secs_f64());
@@ -148,14 +147,14 @@ fn measure(
         let near = last.as_ref().map(|(near, _)| step.solve(Some(near)));
         warm.extend(near.as_ref().map(|_| started.elapsed().as_secs_f64()));
         for solution in near.iter().chain([&found]) {
-            gap = gap.max(1e4 * (solution.bound - solution.value));
+            widest = widest.max(gap(solution));
         }
         evaluations += found.evaluations as f64 / bench.windows as f64;
         last = Some((found, radius));
     }
     let Some((AssetsSolution { allocation, value, .. }, radius)) = last else { return Err("no window".into()) };
     Ok(WindowFindings {
-        ground_norm: if sup { "sup" } else { "scaled_one" },
+        ground_norm: norm_name(sup),
         assets,
         months,
         rate: RATE,
@@ -163,23 +162,18 @@ fn measure(
         cold: median(&cold),
         warm: median(&warm),
         evaluations,
-        gap,
+        gap: widest,
         radius,
         allocation,
         value,
     })
 }
 
-fn step(window: &[Vec<f64>], sup: bool) -> (PortfolioStep, f64) {
-    let count = window.len() as f64;
-    let deviation = |asset: usize| {
-        let mean = window.iter().map(|row| row[asset]).sum::<f64>() / count;
-        (window.iter().map(|row| (row[asset] - mean).powi(2)).sum::<f64>() / count).sqrt()
-    };
-    let assets = window.first().map_or(0, Vec::len);
-    let radius = RADIUS * (0..assets).map(deviation).sum::<f64>() / assets as f64 / count.sqrt();
-    let ground = if sup { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(window)) };
-    let utility = RelativeUtility::new(UtilitySpecification::relative(RISK_AVERSION), 1.0);
-    let law = ReturnScenarios { returns: window, radius, floors: vec![f64::NEG_INFINITY; assets] };
-    (PortfolioStep::new(law, ground, utility, RATE, ActionInterval { lowest: 0.0, highest: 1.0 }), radius)
+/// Returns the gap between a value and its bound, in basis points.
+fn gap(solution: &AssetsSolution) -> f64 {
+    1e4 * (solution.bound - solution.value)
+}
+
+fn norm_name(sup: bool) -> &'static str {
+    if sup { "sup" } else { "scaled_one" }
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use ballast::numerics::statistics::summary::quantile;
 
+use super::gap;
 use super::tables::{RandomStep, hostile};
 
 /// Gap between value and bound, in basis points of log certainty equivalent, up to which an answer does not warn.
@@ -25,7 +26,7 @@ struct Answer {
 fn answer(drawn: &RandomStep) -> Answer {
     let started = Instant::now();
     let found = drawn.step.solve(None);
-    let gap = 1e4 * (found.bound - found.value);
+    let gap = gap(&found);
     let holds_nothing = drawn.lowest == 0.0 && found.allocation.iter().sum::<f64>() == 0.0;
     Answer {
         gap,

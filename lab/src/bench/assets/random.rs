@@ -4,7 +4,10 @@ use std::error::Error;
 use std::hint::black_box;
 use std::time::Instant;
 
+use ballast::control::request::support::Support;
+
 use super::super::summary::median;
+use super::gap;
 use super::tables::{ordinary, ordinary_step};
 
 /// Assets and dates.
@@ -13,30 +16,27 @@ const SIZES: [(usize, usize); 7] = [(5, 240), (20, 120), (10, 500), (12, 1000), 
 const SCALES: [f64; 2] = [0.15, 1.0];
 
 pub fn run(tables: usize) -> Result<(), Box<dyn Error>> {
-    if tables == 0 {
-        return Err("at least one table".into());
-    }
     let [assets, dates, scale, cold, worst, warm] =
         ["assets", "dates", "radius", "median, ms", "worst", "a date later"];
     println!("{assets:>8}{dates:>8}{scale:>8}{cold:>12}{worst:>10}{warm:>14}{:>18}", "widest gap, bp");
     for (assets, dates) in SIZES {
         for scale in SCALES {
-            let (mut cold, mut warm, mut gap): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
+            let (mut cold, mut warm, mut widest): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
             for number in 0..tables {
                 let rows = ordinary(number, assets, dates);
-                let step = ordinary_step(&rows[..dates], scale);
+                let (step, _) = ordinary_step(&rows[..dates], false, Support::default(), scale);
                 let started = Instant::now();
                 let found = black_box(step.solve(None));
                 cold.push(1e3 * started.elapsed().as_secs_f64());
-                let later = ordinary_step(&rows[1..], scale);
+                let (later, _) = ordinary_step(&rows[1..], false, Support::default(), scale);
                 let started = Instant::now();
                 let next = black_box(later.solve(Some(&found)));
                 warm.push(1e3 * started.elapsed().as_secs_f64());
-                gap = [found, next].iter().map(|found| 1e4 * (found.bound - found.value)).fold(gap, f64::max);
+                widest = [found, next].iter().map(gap).fold(widest, f64::max);
             }
             let worst = cold.iter().copied().fold(0.0, f64::max);
             println!(
-                "{assets:>8}{dates:>8}{scale:>8}{:>12.1}{worst:>10.1}{:>14.1}{gap:>18.4}",
+                "{assets:>8}{dates:>8}{scale:>8}{:>12.1}{worst:>10.1}{:>14.1}{widest:>18.4}",
                 median(&cold),
                 median(&warm)
             );

@@ -11,7 +11,7 @@ use ballast::numerics::transport::water_filling::{GroundMetric, inverse_volatili
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal, StudentT};
 
-use super::{RATE, RISK_AVERSION};
+use super::{RATE, RISK_AVERSION, norm_name};
 
 /// Purposes of the random streams.
 const ORDINARY: &str = "ordinary tables";
@@ -40,7 +40,7 @@ fn log_uniform(random: &mut impl Rng, low: f64, high: f64) -> f64 {
 }
 
 /// Draws normal log-returns of equal correlation between any two assets, date by date.
-pub fn normal(random: &mut impl Rng, assets: usize, dates: usize, correlation: f64) -> Vec<Vec<f64>> {
+fn normal(random: &mut impl Rng, assets: usize, dates: usize, correlation: f64) -> Vec<Vec<f64>> {
     let mut draw = || -> f64 { StandardNormal.sample(random) };
     let mut row = || {
         let common = correlation.sqrt() * draw();
@@ -49,29 +49,32 @@ pub fn normal(random: &mut impl Rng, assets: usize, dates: usize, correlation: f
     (0..dates).map(|_| row()).collect()
 }
 
-/// Returns the mean of the columns' deviations over the root of the number of dates, about the radius that `bridge`
-/// has for one fund.
-fn radius_unit(rows: &[Vec<f64>]) -> f64 {
+/// Returns a radius of `scale` times the mean of the columns' deviations over the root of the number of dates, which is
+/// about the radius that `bridge` has for one fund.
+fn radius(rows: &[Vec<f64>], scale: f64) -> f64 {
     let (dates, assets) = (rows.len() as f64, rows.first().map_or(0, Vec::len));
     let deviation = |asset: usize| {
         let mean = rows.iter().map(|row| row[asset]).sum::<f64>() / dates;
         (rows.iter().map(|row| (row[asset] - mean).powi(2)).sum::<f64>() / dates).sqrt()
     };
-    (0..assets).map(deviation).sum::<f64>() / assets as f64 / dates.sqrt()
+    scale * (0..assets).map(deviation).sum::<f64>() / assets as f64 / dates.sqrt()
+}
+
+/// Returns the ground cost by its name on the wire: `sup`, or `scaled_one` with weights that are inverse volatilities.
+fn ground(rows: &[Vec<f64>], sup: bool) -> GroundMetric {
+    if sup { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(rows)) }
 }
 
 fn whole_wealth() -> ActionInterval {
     ActionInterval { lowest: 0.0, highest: 1.0 }
 }
 
-/// Returns the step of an ordinary investor over a record, with a ball of `scale` units and the
-/// default support.
-pub fn ordinary_step(rows: &[Vec<f64>], scale: f64) -> PortfolioStep {
-    let law =
-        ReturnScenarios { returns: rows, radius: scale * radius_unit(rows), floors: floors(Support::default(), rows) };
-    let ground = GroundMetric::Weighted(inverse_volatility(rows));
+/// Returns the step of an ordinary investor over a record and its radius, which is `scale` times that of [`radius`].
+pub fn ordinary_step(rows: &[Vec<f64>], sup: bool, support: Support, scale: f64) -> (PortfolioStep, f64) {
+    let radius = radius(rows, scale);
+    let law = ReturnScenarios { returns: rows, radius, floors: floors(support, rows) };
     let utility = RelativeUtility::new(UtilitySpecification::relative(RISK_AVERSION), 1.0);
-    PortfolioStep::new(law, ground, utility, RATE, whole_wealth())
+    (PortfolioStep::new(law, ground(rows, sup), utility, RATE, whole_wealth()), radius)
 }
 
 /// Draws table `number` of a size, one date longer than `dates`, with a correlation up to 0.9.
@@ -108,16 +111,15 @@ pub fn hostile(number: usize) -> RandomStep {
         2 => ActionInterval { lowest: 1.0, highest: 1.0 },
         _ => whole_wealth(),
     };
-    let ground = if sup { GroundMetric::Sup } else { GroundMetric::Weighted(inverse_volatility(&rows)) };
-    let law = ReturnScenarios { returns: &rows, radius: scale * radius_unit(&rows), floors: floors(support, &rows) };
+    let law = ReturnScenarios { returns: &rows, radius: radius(&rows, scale), floors: floors(support, &rows) };
     let drawn = format!(
         "{utility:?}, {}, radius {scale:.3} units, correlation {correlation:.2}, {support:?}, total {} to {:.2}, columns {columns}",
-        if sup { "sup" } else { "scaled_one" },
+        norm_name(sup),
         total.lowest,
         total.highest
     );
     RandomStep {
-        step: PortfolioStep::new(law, ground, utility, RATE, total),
+        step: PortfolioStep::new(law, ground(&rows, sup), utility, RATE, total),
         assets,
         dates,
         lowest: total.lowest,
