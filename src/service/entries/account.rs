@@ -4,6 +4,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::control::assets::fund::Fund;
 use crate::control::problem::dynamics::Dynamics;
 use crate::service::entries::periods::{Periods, ReplayedPeriod};
 use crate::service::entries::record::SessionRecord;
@@ -37,57 +38,59 @@ pub struct Benchmarks {
     pub bank: Option<f64>,
 }
 
-/// The account of somebody who restores the same shares of wealth at the start of each period.
+/// The account of somebody who restores the same composition and share of wealth at the start of each period.
 #[derive(Debug, Clone)]
 struct FixedShares {
     /// `None` once a withdrawal could not be paid.
     wealth: Option<f64>,
-    /// Share of wealth in each asset before trading.
-    holdings: Vec<f64>,
-    /// Share of wealth in each asset that is restored.
-    shares: Vec<f64>,
+    /// The composition that is restored, and what is held before trading.
+    fund: Fund,
+    /// Share of wealth in all assets that is restored.
+    total: f64,
     /// Share of wealth in assets that left, to be sold before the coming period.
     sold: f64,
 }
 
 impl FixedShares {
-    fn at(start: &SessionState, shares: Vec<f64>) -> Self {
+    fn at(start: &SessionState, composition: Vec<f64>, total: f64) -> Self {
         let holdings = match &start.assets {
             Some(assets) => assets.fund.holdings.clone(),
             None => vec![start.state.holding],
         };
-        FixedShares { wealth: Some(start.state.wealth), holdings, shares, sold: 0.0 }
+        let fund = Fund { rows: Vec::new(), before: composition.clone(), composition, holdings };
+        FixedShares { wealth: Some(start.state.wealth), fund, total, sold: 0.0 }
     }
 
     /// Follows a change of the assets from those with the names `before` to those with the names `after`.
     fn change(&mut self, before: &[String], after: &[String]) {
-        let of =
-            |values: &[f64], name: &String| before.iter().position(|own| own == name).map_or(0.0, |own| values[own]);
-        let [holdings, shares] = [&self.holdings, &self.shares]
-            .map(|values| after.iter().map(|name| of(values, name)).collect::<Vec<f64>>());
-        let (all, kept): (f64, f64) = (self.shares.iter().sum(), shares.iter().sum());
-        self.sold = self.holdings.iter().sum::<f64>() - holdings.iter().sum::<f64>();
-        self.holdings = holdings;
-        self.shares = match kept > 0.0 {
-            true => shares.iter().map(|share| all * share / kept).collect(),
+        let of = |values: &[f64], name| before.iter().position(|own| own == name).map_or(0.0, |own| values[own]);
+        let kept = |values: &[f64]| after.iter().map(|name| of(values, name)).collect::<Vec<f64>>();
+        let (holdings, composition) = (kept(&self.fund.holdings), kept(&self.fund.composition));
+        let whole: f64 = composition.iter().sum();
+        self.sold = self.fund.holdings.iter().sum::<f64>() - holdings.iter().sum::<f64>();
+        self.fund.holdings = holdings;
+        self.fund.composition = match whole > 0.0 {
+            true => composition.iter().map(|share| share / whole).collect(),
             // None of its assets stays.
-            false => vec![all / after.len() as f64; after.len()],
+            false => equal(after.len()),
         };
     }
 
     /// Returns the wealth after a period of these log-returns.
     fn pass(&mut self, dynamics: Dynamics, log_returns: &[f64]) -> Option<f64> {
-        let wealth = self.wealth.take()?;
-        let bought = self.shares.iter().zip(&self.holdings).map(|(share, held)| f64::abs(share - held));
-        let traded = bought.sum::<f64>() + std::mem::take(&mut self.sold);
-        let left = wealth * dynamics.left(traded);
-        let grown: Vec<f64> = self.shares.iter().zip(log_returns).map(|(share, z)| left * share * z.exp()).collect();
-        let bank = left * (1.0 - self.shares.iter().sum::<f64>()) * (1.0 + dynamics.rate_per_step);
-        let next = bank + grown.iter().sum::<f64>() + dynamics.contribution;
+        let shares = self.fund.shares(self.total);
+        let (traded, log_return) = (self.fund.traded(&shares), self.fund.log_return(&shares, log_returns));
+        let traded = traded + std::mem::take(&mut self.sold);
+        let (next, holding) = dynamics.next_after(self.wealth.take()?, traded, self.total, log_return);
+        self.fund.passed(&shares, log_returns, None, holding);
         self.wealth = (next > 0.0).then_some(next);
-        self.holdings = grown.iter().map(|grown| grown / next).collect();
         self.wealth
     }
+}
+
+/// Returns equal shares of so many assets.
+fn equal(assets: usize) -> Vec<f64> {
+    vec![1.0 / assets as f64; assets]
 }
 
 /// The account of every period.
@@ -106,34 +109,28 @@ pub(super) fn of(periods: &Periods) -> Result<Accounts, ServiceError> {
     let start = &passage.standing;
     let assets = start.names().len().max(1);
     let composition = start.assets.as_ref().map_or_else(|| vec![1.0], |assets| assets.fund.composition.clone());
-    let mut equal = FixedShares::at(start, vec![1.0 / assets as f64; assets]);
-    let mut initial = FixedShares::at(start, composition);
-    let mut bank = FixedShares::at(start, vec![0.0; assets]);
-    let mut before_names = start.names().to_vec();
+    let mut equal_weights = FixedShares::at(start, equal(assets), 1.0);
+    let mut initial = FixedShares::at(start, composition.clone(), 1.0);
+    let mut bank = FixedShares::at(start, composition, 0.0);
+    let mut names = start.names().to_vec();
     let mut accounts = Vec::with_capacity(periods.all.len());
-    for (step, period) in periods.all.iter().enumerate() {
-        if before_names.as_slice() != passage.standing.names() {
-            [&mut equal, &mut initial, &mut bank]
-                .into_iter()
-                .for_each(|rule| rule.change(&before_names, passage.standing.names()));
-            let assets = passage.standing.names().len();
-            equal.shares = vec![1.0 / assets as f64; assets];
+    loop {
+        if names != passage.standing.names() {
+            let next = passage.standing.names().to_vec();
+            [&mut equal_weights, &mut initial, &mut bank].into_iter().for_each(|rule| rule.change(&names, &next));
+            equal_weights.fund.composition = equal(next.len());
+            names = next;
         }
-        before_names = passage.standing.names().to_vec();
-        let planned = passage.stretch().dynamics(step);
         let Some(passed) = passage.next().map_err(ServiceError::of_recorded)? else { break };
-        let ReplayedPeriod { before, seen, turnover, .. } = passed;
-        let rate_per_step = period.report.rate.unwrap_or(planned.rate_per_step);
-        let contribution = period.report.flow.unwrap_or(planned.contribution);
-        let dynamics = Dynamics { rate_per_step, contribution, ..planned };
+        let ReplayedPeriod { before, seen, turnover, dynamics, .. } = passed;
         let moves = seen.moves();
         accounts.push(PeriodAccount {
-            rate: rate_per_step,
-            flow: contribution,
+            rate: dynamics.rate_per_step,
+            flow: dynamics.contribution,
             turnover,
             cost: before.state.wealth * dynamics.trading_cost * turnover,
             benchmarks: Benchmarks {
-                equal_weights: equal.pass(dynamics, &moves),
+                equal_weights: equal_weights.pass(dynamics, &moves),
                 initial_composition: initial.pass(dynamics, &moves),
                 bank: bank.pass(dynamics, &moves),
             },

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::control::error::FieldError;
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::state::State;
 use crate::control::request::learning::Learning;
 use crate::service::entries::acknowledged::Acknowledged;
@@ -88,6 +89,8 @@ pub struct ReplayedPeriod {
     pub executed: Vec<f64>,
     /// Share of wealth bought and sold for them.
     pub turnover: f64,
+    /// The dynamics of the period, with the rate and the flow reported.
+    pub dynamics: Dynamics,
 }
 
 impl SessionPeriod {
@@ -268,14 +271,14 @@ impl<'a> Replay<'a> {
         let passed =
             self.standing.after(dynamics, period, &completed, (advised, self.stretch().terms.periods_per_year));
         let passed = passed.map_err(|error| (period, error))?;
-        let Transition { seen, log_return, executed_allocation, executed, turnover, mut standing } = passed;
+        let Transition { seen, log_return, executed_allocation, executed, turnover, dynamics, mut standing } = passed;
         standing.price_as(report);
         let before = std::mem::replace(&mut self.standing, standing);
         self.record.learn(period, &seen);
         self.step = period;
         let composed = acknowledged.as_ref().and_then(|acknowledged| acknowledged.composed());
         self.renew(composed).map_err(|error| (period, error))?;
-        Ok(Some(ReplayedPeriod { before, seen, log_return, executed_allocation, executed, turnover }))
+        Ok(Some(ReplayedPeriod { before, seen, log_return, executed_allocation, executed, turnover, dynamics }))
     }
 
     /// Returns the state with the law of the fund of several assets, which a replay does not keep up to date.

@@ -50,6 +50,8 @@ pub struct Transition {
     pub executed: Vec<f64>,
     /// Share of wealth bought and sold for them.
     pub turnover: f64,
+    /// The dynamics of the period, with the rate and the flow reported.
+    pub dynamics: Dynamics,
     pub standing: SessionState,
 }
 
@@ -174,8 +176,9 @@ impl SessionState {
         let mut standing = SessionState { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
         standing.learn(&seen, &executed, period);
         standing.price_as(report);
+        let dynamics = realised.dynamics(dynamics);
         let PeriodOutcome { action: executed_allocation, log_return, .. } = realised;
-        Ok(Transition { seen, log_return, executed_allocation, executed, turnover, standing })
+        Ok(Transition { seen, log_return, executed_allocation, executed, turnover, dynamics, standing })
     }
 
     /// Returns the report of a period without trades unless it gives holdings.
