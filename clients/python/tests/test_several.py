@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ballast import AsyncBallast, Ballast, frames, wire
+from ballast import AsyncBallast, Ballast, Training, frames, wire
 
 matplotlib.use("Agg")
 
@@ -97,16 +97,21 @@ def test_what_is_held_already_is_traded_from_at_a_cost_and_risk_aversion_has_one
     assert one == ballast.advise(TABLE["energy"], rate_per_step=0.002, utility=utility)
 
 
-def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Ballast) -> None:
-    training = ballast.train_assets(
-        TABLE,
+def _training(ballast: Ballast, table: pd.DataFrame, key: str, *, horizon: int, trading_cost: float = 0.0) -> Training:
+    return ballast.train_assets(
+        table,
         kind="simple",
         rate_per_step=0.002,
-        horizon=2,
+        horizon=horizon,
+        trading_cost=trading_cost,
         radius={"rule": "bridge", "scale": 0.1},
         design={"count": 20},
-        idempotency_key="a policy of several",
+        idempotency_key=key,
     )
+
+
+def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Ballast) -> None:
+    training = _training(ballast, TABLE, "a policy of several", horizon=2)
     session = training.session(holdings={"energy": 0.2, "health": 0.3})
     assert session.assets_what_if()["allocation"] == session.assets_action()["allocation"]
     returns = pd.Series({"energy": 0.03, "health": -0.01})
@@ -128,17 +133,7 @@ def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Balla
 
 
 def test_losses_gaps_and_other_assets_are_in_the_frames(ballast: Ballast) -> None:
-    design: wire.DesignSpecification = {"count": 20}
-    training = ballast.train_assets(
-        TABLE,
-        kind="simple",
-        rate_per_step=0.002,
-        horizon=3,
-        trading_cost=0.001,
-        radius={"rule": "bridge", "scale": 0.1},
-        design=design,
-        idempotency_key="a policy of two",
-    )
+    training = _training(ballast, TABLE, "a policy of two", horizon=3, trading_cost=0.001)
     session = training.session(holdings={"energy": 0.2, "health": 0.3})
     held = {"energy": 0.5, "health": 0.25}
     session.observe(simple_returns=pd.Series({"energy": 0.03, "health": math.nan}), executed_allocations=held, flow=1.0)
@@ -165,15 +160,7 @@ def test_losses_gaps_and_other_assets_are_in_the_frames(ballast: Ballast) -> Non
     # Energy is gone, and technology comes for it.
     technology = [0.01 + 0.04 * math.sin(0.7 * quarter) for quarter in range(18)]
     table = TABLE[["health"]].assign(technology=technology[:16])
-    next_policy = ballast.train_assets(
-        table,
-        kind="simple",
-        rate_per_step=0.002,
-        horizon=2,
-        radius={"rule": "bridge", "scale": 0.1},
-        design=design,
-        idempotency_key="another policy of two",
-    )
+    next_policy = _training(ballast, table, "another policy of two", horizon=2)
     record = np.log1p(technology).tolist()
     record[16] = math.nan
     renewed = session.renew(next_policy.policy().id, records={"technology": record}, leaving=["energy"])
