@@ -25,8 +25,8 @@ use crate::numerics::gp::GaussianProcess;
 /// Bytes of a double.
 const NUMBER: usize = 8;
 /// Square matrices of the order of the design that exist at once while both surrogates are fitted side by side: the
-/// kernel, its inverse, and the workspaces to invert and to factor, each twice.
-const FIT_MATRICES: usize = 8;
+/// kernel, which becomes its factor, and the workspace to factor it, each twice.
+const FIT_MATRICES: usize = 4;
 /// Bytes of a candidate or a guard, with features, scaled inputs and their headers, without the numbers.
 const CANDIDATE_BYTES: usize = 160;
 /// Bytes of a number of a finished policy: itself, its digits as JSON, and the copies of those for the store.

@@ -12,6 +12,7 @@ pub mod fit;
 pub mod likelihood;
 pub mod matern;
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -59,6 +60,13 @@ pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters, kerne
         matern::matern_from_squared(below);
         below.iter_mut().for_each(|value| *value *= hyper.signal_variance);
     }
+}
+
+/// Returns the matrix of which [`kernel_lower`] writes the lower triangle.
+fn kernel(scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> DMatrix<f64> {
+    let mut kernel = DMatrix::zeros(scaled.nrows(), scaled.nrows());
+    kernel_lower(scaled, hyper, &mut kernel);
+    kernel
 }
 
 /// The posterior mean of a process, or of several that share inputs and length scales. It keeps only what evaluation
@@ -141,7 +149,7 @@ impl GpMean {
     }
 }
 
-/// Predictions of each target from the others.
+/// Predictions of targets from the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeaveOneOut {
     /// y_i minus its prediction from the other values of the same target, one vector for each target.
@@ -174,14 +182,55 @@ impl GaussianProcess {
     ) -> Result<GaussianProcess, Singular> {
         assert_eq!(inputs.nrows(), targets.len(), "one target for each row");
         let scaled = hyper.scale(inputs);
-        let (cholesky, jitter) = factor_with_jitter(|| {
-            let mut kernel = DMatrix::zeros(targets.len(), targets.len());
-            kernel_lower(&scaled, hyper, &mut kernel);
-            kernel
-        })?;
+        let factored = factor_with_jitter(|| kernel(&scaled, hyper))?;
+        Ok(GaussianProcess::of_factor(inputs, targets, hyper.clone(), factored))
+    }
+
+    /// Conditions the process on the first of `targets`, with the signal variance that `signal_variance` returns for the
+    /// sum of y^T A^-1 y over all of them. Returns it with the log likelihood of all.
+    ///
+    ///   K = s2 A,   ln p = -sum y^T A^-1 y / (2 s2) - p ln det A / 2 - p n ln(2 pi s2) / 2
+    ///
+    /// `unit` holds the length scales, the signal variance 1 and the ratio of noise to signal. Jitter and cost are as in
+    /// [`GaussianProcess::condition`], and n^2 more for each target.
+    pub(super) fn profiled(
+        inputs: &DMatrix<f64>,
+        targets: &[Vec<f64>],
+        unit: &Hyperparameters,
+        signal_variance: impl FnOnce(f64) -> f64,
+    ) -> Result<(GaussianProcess, f64), Singular> {
+        let (values, scaled) = (inputs.nrows() as f64 * targets.len() as f64, unit.scale(inputs));
+        let (cholesky, jitter) = factor_with_jitter(|| kernel(&scaled, unit))?;
+        let squares = |values: &Vec<f64>| {
+            let whitened = cholesky.solve_lower(values);
+            matern::dot(&whitened, &whitened)
+        };
+        let squares: f64 = targets.iter().map(squares).sum();
+        let signal_variance = signal_variance(squares);
+        let log_likelihood = -0.5 * squares / signal_variance
+            - 0.5 * targets.len() as f64 * cholesky.log_determinant()
+            - 0.5 * values * (TAU * signal_variance).ln();
+        let hyper =
+            Hyperparameters { signal_variance, noise_variance: unit.noise_variance * signal_variance, ..unit.clone() };
+        let cholesky = cholesky.times(signal_variance.sqrt());
+        let process = GaussianProcess::of_factor(inputs, &targets[0], hyper, (cholesky, jitter * signal_variance));
+        Ok((process, log_likelihood))
+    }
+
+    fn of_factor(
+        inputs: &DMatrix<f64>,
+        targets: &[f64],
+        hyper: Hyperparameters,
+        (cholesky, jitter): (Cholesky, f64),
+    ) -> GaussianProcess {
         let weights = cholesky.solve(targets);
-        let mean = GpMean::new(inputs, std::slice::from_ref(&weights), hyper);
-        Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })
+        let mean = GpMean::new(inputs, std::slice::from_ref(&weights), &hyper);
+        GaussianProcess { hyper, cholesky, jitter, weights, mean }
+    }
+
+    /// Returns the hyperparameters.
+    pub fn hyperparameters(&self) -> &Hyperparameters {
+        &self.hyper
     }
 
     /// Returns the bytes that a process over `points` rows of `inputs` columns holds: mostly the square factor, and a
@@ -244,19 +293,18 @@ impl GaussianProcess {
         self.cholesky.solve(targets)
     }
 
-    /// Predicts each value of `targets` from the others, without refitting, and returns errors and standard deviations.
+    /// Predicts the values of `targets` at some of the inputs from all others, without refitting, and returns errors and
+    /// standard deviations. `rows` are the numbers of these inputs, ascending.
     ///
     ///   error_i = alpha_i / (A^-1)_ii,   latent variance_i = 1 / (A^-1)_ii - noise, at least 0,   A = K + noise I
     ///
-    /// Cost O(2 n^3 / 3). Source: Rasmussen and Williams 2006, eqs. (5.10) to (5.12).
-    pub fn leave_one_out(&self, targets: &[Vec<f64>]) -> LeaveOneOut {
-        let points = self.weights.len();
-        let mut inverse = DMatrix::zeros(points, points);
-        self.cholesky.inverse_lower(&mut inverse);
-        let precision = inverse.diagonal();
+    /// Cost O(n^2 / 2) for each input. Source: Rasmussen and Williams 2006, eqs. (5.10) to (5.12).
+    /// Checked by: tests/solver/gp.rs, leave_one_out_equals_conditioning_without_the_point.
+    pub fn leave_one_out(&self, targets: &[Vec<f64>], rows: &[usize]) -> LeaveOneOut {
+        let precision = self.cholesky.inverse_diagonal(rows);
         let of = |values: &Vec<f64>| -> Vec<f64> {
             let weights = self.weights_of(values);
-            weights.iter().zip(precision.iter()).map(|(weight, p)| weight / p).collect()
+            rows.iter().zip(&precision).map(|(&row, p)| weights[row] / p).collect()
         };
         let errors = targets.iter().map(of).collect();
         let latent_sd = precision.iter().map(|p| (1.0 / p - self.hyper.noise_variance).max(0.0).sqrt()).collect();

@@ -138,15 +138,16 @@ fn partial_distances_add_up_and_the_mean_alone_equals_the_process() {
 fn leave_one_out_equals_conditioning_without_the_point() {
     let (inputs, targets) = smooth_sample(70, 2);
     let hyper = Hyperparameters { lengthscales: vec![1.5, 1.0], signal_variance: 2.0, noise_variance: 0.01 };
-    let left_out =
-        GaussianProcess::condition(&inputs, &targets, &hyper).unwrap().leave_one_out(std::slice::from_ref(&targets));
-    for i in 0..targets.len() {
+    let rows: Vec<usize> = (0..targets.len()).filter(|row| row % 3 != 1).collect();
+    let process = GaussianProcess::condition(&inputs, &targets, &hyper).unwrap();
+    let left_out = process.leave_one_out(std::slice::from_ref(&targets), &rows);
+    for (place, &i) in rows.iter().enumerate() {
         let mut others = targets.clone();
         others.remove(i);
         let process = GaussianProcess::condition(&inputs.clone().remove_row(i), &others, &hyper).unwrap();
         let query: Vec<f64> = inputs.row(i).iter().copied().collect();
-        assert!((left_out.errors[0][i] - (targets[i] - process.mean(&query))).abs() < 1e-9);
-        assert!((left_out.latent_sd[i].powi(2) - process.latent_variance(&query)).abs() < 1e-9);
+        assert!((left_out.errors[0][place] - (targets[i] - process.mean(&query))).abs() < 1e-9);
+        assert!((left_out.latent_sd[place].powi(2) - process.latent_variance(&query)).abs() < 1e-9);
     }
 }
 
@@ -160,13 +161,13 @@ fn a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes() {
         let found = fit(&inputs, &targets, &bounds, start).unwrap();
         assert_eq!(found.outcome, SearchOutcome::Converged);
         assert!(found.log_likelihood > before + 10.0);
-        let (value, gradient) = one_likelihood(&inputs, &targets, &found.hyperparameters).unwrap();
+        let (value, gradient) = one_likelihood(&inputs, &targets, found.process.hyperparameters()).unwrap();
         assert_close(value, found.log_likelihood);
-        let point = log_scales(&found.hyperparameters);
+        let point = log_scales(found.process.hyperparameters());
         let boxes = [bounds.lengthscale, bounds.lengthscale, bounds.signal_variance, bounds.noise_variance];
         for ((x, slope), [low, high]) in point.iter().zip(&gradient).zip(boxes) {
             let projected = (x + slope).clamp(low.ln(), high.ln()) - x;
-            assert!(projected.abs() < 1e-3, "projected slope {projected} at {:?}", found.hyperparameters);
+            assert!(projected.abs() < 1e-3, "projected slope {projected} at {:?}", found.process.hyperparameters());
         }
     }
 }
@@ -174,12 +175,13 @@ fn a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes() {
 #[test]
 fn a_fit_ends_at_the_bounds_that_the_data_lie_beyond() {
     let (inputs, targets) = smooth_sample(120, 2);
-    let free = fit(&inputs, &targets, &wide_bounds(), None).unwrap().hyperparameters;
+    let free = fit(&inputs, &targets, &wide_bounds(), None).unwrap().process;
+    let free = free.hyperparameters();
     let least = free.lengthscales.iter().copied().fold(f64::INFINITY, f64::min);
     let most = free.lengthscales.iter().copied().fold(0.0, f64::max);
     for (lengthscale, bound) in [([1e-2, 0.5 * least], 0.5 * least), ([2.0 * most, 1e2], 2.0 * most)] {
         let found = fit(&inputs, &targets, &Bounds { lengthscale, ..wide_bounds() }, None).unwrap();
-        for length in found.hyperparameters.lengthscales {
+        for length in &found.process.hyperparameters().lengthscales {
             // The search is over logarithms: a bound is met to rounding.
             assert!((length / bound - 1.0).abs() < 1e-12, "{length} and not {bound}");
         }
@@ -221,10 +223,19 @@ fn a_fit_asked_to_stop_says_so() {
     assert_eq!(stopped, Err(FitError::Stopped));
 }
 
-/// The search through a subset, in its own coordinates, against the crate's L-BFGS-B on all rows and all scales.
+/// The search through subsets, in its own coordinates, against the crate's L-BFGS-B on all rows and all scales.
 #[test]
-fn a_fit_through_a_subset_ends_as_high_as_an_independent_search_over_all_rows() {
-    let (inputs, targets) = smooth_sample(420, 2);
+fn a_fit_through_subsets_ends_as_high_as_an_independent_search_over_all_rows() {
+    for (rows, lost) in [(420, 1e-3), (1200, 3.0)] {
+        ends_as_high(rows, lost);
+    }
+}
+
+/// With up to 600 rows the fit stops where a step promises 1e-3 of ln p; convergence is superlinear, so no more than that
+/// is left. Of more rows the scales are those of 600: the optimum of 4 scales is off by half their number times the share
+/// of rows left out, 1 of ln p on average.
+fn ends_as_high(rows: usize, lost: f64) {
+    let (inputs, targets) = smooth_sample(rows, 2);
     let bounds = wide_bounds();
     let found = fit(&inputs, &targets, &bounds, None).unwrap();
     assert_eq!(found.outcome, SearchOutcome::Converged);
@@ -243,8 +254,7 @@ fn a_fit_through_a_subset_ends_as_high_as_an_independent_search_over_all_rows() 
     let boxes = [bounds.lengthscale, bounds.lengthscale, bounds.signal_variance, bounds.noise_variance];
     let [lower, upper] = [0, 1].map(|side| boxes.map(|bounds| bounds[side].ln()));
     let searched = minimise_bounded(objective, &[0.0, 0.0, 0.0, -4.0], &lower, &upper, 200);
-    // The fit stops where a step promises 1e-3 of ln p; convergence is superlinear, so no more than that is left.
-    assert!(found.log_likelihood > -searched.value - 1e-3, "{found:?} {searched:?}");
+    assert!(found.log_likelihood > -searched.value - lost, "{found:?} {searched:?}");
     assert_eq!(found, fit(&inputs, &targets, &bounds, None).unwrap());
 }
 
@@ -269,10 +279,10 @@ fn timings_at_a_thousand_rows() {
     let found = fit(&inputs, &targets, &wide_bounds(), None).unwrap();
     println!("fit: {:?}, {found:?}", clock.elapsed());
     let clock = Instant::now();
-    one_likelihood(&inputs, &targets, &found.hyperparameters).unwrap();
+    one_likelihood(&inputs, &targets, found.process.hyperparameters()).unwrap();
     println!("one evaluation: {:?}", clock.elapsed());
     let clock = Instant::now();
-    let process = GaussianProcess::condition(&inputs, &targets, &found.hyperparameters).unwrap();
+    let process = GaussianProcess::condition(&inputs, &targets, found.process.hyperparameters()).unwrap();
     println!("condition: {:?}", clock.elapsed());
     let queries: Vec<[f64; 5]> = (0..1000).map(|k| [0.001 * f64::from(k); 5]).collect();
     let clock = Instant::now();

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use ballast::numerics::gp::GaussianProcess;
 use ballast::numerics::gp::cholesky::Cholesky;
 use ballast::numerics::gp::fit::{Bounds, fit};
 use ballast::numerics::machine::elementary::exp;
@@ -61,7 +60,7 @@ pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
         found.evaluations,
         found.outcome
     );
-    let process = GaussianProcess::condition(&inputs, &targets, &found.hyperparameters)?;
+    let process = &found.process;
     let mut generator = stream(2, "bench-queries", 0, 0);
     let queries: Vec<Vec<f64>> = (0..QUERIES).map(|_| normals(&mut generator, bench.inputs)).collect();
     let mut scratch = Vec::new();

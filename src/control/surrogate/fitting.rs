@@ -13,7 +13,7 @@ use crate::control::problem::holdings::Holdings;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::SurrogateDiagnostics;
-use crate::numerics::gp::fit::{self, Bounds, FitError};
+use crate::numerics::gp::fit::{self, Bounds, Fit, FitError};
 use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::statistics::summary::quantile;
 
@@ -29,6 +29,9 @@ const WEIGHT_OF_ERROR: f64 = 3.0;
 /// Share of the signal variance that counts as noise when errors are smoothed: single errors are noisy, their size is
 /// not.
 const NOISE_OF_ERRORS: f64 = 0.3;
+
+/// The most design points that are predicted from the others. Predicting all of them would cost as much as the fit.
+const LEFT_OUT: usize = 500;
 
 /// Guards whose deviations are computed together: a block that stays in the second-level cache with the factor's.
 const GUARDS_AT_A_TIME: usize = 64;
@@ -138,8 +141,8 @@ impl Fitting<'_> {
         let inputs = self.inputs(solved);
         let [value, policy] = self.targets(solved);
         Ok(StartingScales {
-            value: self.search("value", &inputs, &value.scaled, None)?.hyperparameters,
-            policy: self.search("policy", &inputs, &policy.scaled, None)?.hyperparameters,
+            value: self.search("value", &inputs, &value.scaled, None)?.process.hyperparameters().clone(),
+            policy: self.search("policy", &inputs, &policy.scaled, None)?.process.hyperparameters().clone(),
         })
     }
 
@@ -162,7 +165,8 @@ impl Fitting<'_> {
         };
         let gains = solved.iter().map(|point| point.floor_gain).collect();
         let gains = Targets::of_one(gains, PriorMean::Zero).scaled;
-        let errors = condition(&gains, hyper)?.leave_one_out(&gains).errors;
+        let all: Vec<usize> = (0..solved.len()).collect();
+        let errors = condition(&gains, hyper)?.leave_one_out(&gains, &all).errors;
         let errors = errors.iter().flatten().map(|error| error.abs()).collect();
         let errors = Targets::of_one(errors, PriorMean::Zero).scaled;
         let smooth = Hyperparameters { noise_variance: NOISE_OF_ERRORS * hyper.signal_variance, ..hyper.clone() };
@@ -240,7 +244,7 @@ impl Fitting<'_> {
         inputs: &DMatrix<f64>,
         targets: &[Vec<f64>],
         start: Option<&Hyperparameters>,
-    ) -> Result<fit::Fit, TrainError> {
+    ) -> Result<Fit, TrainError> {
         let bounds = self.specification.surrogate.bounds;
         let bounds = Bounds {
             lengthscale: bounds.lengthscale,
@@ -264,15 +268,16 @@ impl Fitting<'_> {
         targets: &Targets,
         start: &Hyperparameters,
     ) -> Result<Fitted, TrainError> {
-        let found = self.search(surrogate, inputs, &targets.scaled, Some(start))?;
-        let process = GaussianProcess::condition(inputs, &targets.scaled[0], &found.hyperparameters)
-            .map_err(|error| self.singular(surrogate, error.jitter))?;
+        let Fit { process, log_likelihood, outcome, .. } =
+            self.search(surrogate, inputs, &targets.scaled, Some(start))?;
+        let (points, left_out) = (inputs.nrows(), inputs.nrows().min(LEFT_OUT));
+        let left_out: Vec<usize> = (0..left_out).map(|k| k * points / left_out).collect();
         Ok(Fitted {
-            left_out: process.leave_one_out(&targets.scaled),
-            log_likelihood_per_point: found.log_likelihood / targets.scaled.iter().map(Vec::len).sum::<usize>() as f64,
-            search: format!("{:?}", found.outcome),
+            left_out: process.leave_one_out(&targets.scaled, &left_out),
+            log_likelihood_per_point: log_likelihood / targets.scaled.iter().map(Vec::len).sum::<usize>() as f64,
+            search: format!("{outcome:?}"),
             stored: StoredSurrogate {
-                hyperparameters: found.hyperparameters,
+                hyperparameters: process.hyperparameters().clone(),
                 weights: targets.scaled.iter().map(|values| process.weights_of(values)).collect(),
                 offset: targets.offset,
                 scale: targets.scale,

@@ -17,6 +17,8 @@ const RELATIVE_JITTERS: [f64; 5] = [0.0, 1e-12, 1e-10, 1e-8, 1e-6];
 const LEAST_PIVOT_SHARE: f64 = 1e-14;
 /// Columns that a triangular solve eliminates together: one pass over the unknowns for each four columns.
 const COLUMNS: usize = 4;
+/// Columns of the inverse of a factor that are solved together: a block that stays in the second-level cache.
+const COLUMNS_TOGETHER: usize = 64;
 
 /// The error that a matrix is indefinite, to working precision, even with the largest amount tried on its diagonal.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -104,6 +106,26 @@ impl Cholesky {
             MatMut::from_column_major_slice_mut(right.as_mut_slice(), n, columns),
             Par::Seq,
         );
+    }
+
+    /// Returns the factor of A times the square of `root`. Cost n^2.
+    pub fn times(self, root: f64) -> Cholesky {
+        Cholesky { lower: self.lower * root }
+    }
+
+    /// Returns (A^-1)_ii for each i of `rows`, ascending: the squared length of column i of L^-1, whose entries before i
+    /// are 0. Cost (n - i)^2 for each.
+    pub fn inverse_diagonal(&self, rows: &[usize]) -> Vec<f64> {
+        let n = self.lower.nrows();
+        let of = |some: &[usize]| -> Vec<f64> {
+            let (first, mut columns) = (some[0], DMatrix::zeros(n - some[0], some.len()));
+            some.iter().enumerate().for_each(|(column, row)| columns[(row - first, column)] = 1.0);
+            let lower = MatRef::from_column_major_slice(self.lower.as_slice(), n, n);
+            let unknown = MatMut::from_column_major_slice_mut(columns.as_mut_slice(), n - first, some.len());
+            solve_lower_triangular_in_place(lower.submatrix(first, first, n - first, n - first), unknown, Par::Seq);
+            columns.column_iter().map(|column| column.norm_squared()).collect()
+        };
+        rows.chunks(COLUMNS_TOGETHER).flat_map(of).collect()
     }
 
     /// Writes A^-1 on and below the diagonal of `inverse`, n by n. Cost 2 n^3 / 3.
@@ -202,7 +224,16 @@ mod tests {
             let mut inverse = DMatrix::from_element(n, n, f64::NAN);
             factor.inverse_lower(&mut inverse);
             inverse.fill_upper_triangle_with_lower_triangle();
-            assert!((inverse * &a - DMatrix::identity(n, n)).amax() < 1e-12, "n = {n}");
+            assert!((&inverse * &a - DMatrix::identity(n, n)).amax() < 1e-12, "n = {n}");
+            let rows: Vec<usize> = (0..n).step_by(3).collect();
+            for (row, entry) in rows.iter().zip(factor.inverse_diagonal(&rows)) {
+                assert!((entry - inverse[(*row, *row)]).abs() < 1e-14, "n = {n}, row {row}");
+            }
+            assert!(
+                (factor.clone().times(3.0).log_determinant() - factor.log_determinant() - 2.0 * n as f64 * 3_f64.ln())
+                    .abs()
+                    < 1e-9
+            );
             let expected = a.determinant().ln();
             assert!(!expected.is_finite() || (factor.log_determinant() - expected).abs() < 1e-9);
         }
