@@ -1,7 +1,7 @@
 //! `ballast-lab fund-coverage`: counts how often the balls of all funds of several assets contain the true laws of the
 //! funds at once.
 //!
-//! The assets have normal log-returns with deviations of 4 to 7 % a period and pairwise correlations of 0.6. For each sample of n
+//! The assets have normal log-returns with deviations of 4 to 7 % a period and pairwise correlations of 0 or 0.6. For each sample of n
 //! dates every fund gets the ball of radius `rho Q / sqrt n` at alpha = 0.1, where Q is its own bridge quantile and rho the joint
 //! factor. The table shows the share of samples in which the balls of all tested funds contain their laws. The tested funds are
 //! the single assets, equal shares, and random funds, which differ from those that rho was computed from. The true laws are
@@ -14,7 +14,7 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 const ALPHA: f64 = 0.1;
-const CORRELATION: f64 = 0.6;
+const CORRELATIONS: [f64; 2] = [0.0, 0.6];
 const PATHS: usize = 500;
 const TRUE_DATES: usize = 20_000;
 const DRAWN: usize = 40;
@@ -26,14 +26,14 @@ pub struct FundCoverage {
     samples: usize,
 }
 
-fn sample(assets: usize, dates: usize, purpose: &str, index: usize) -> Vec<Vec<f64>> {
+fn sample(assets: usize, correlation: f64, dates: usize, purpose: &str, index: usize) -> Vec<Vec<f64>> {
     let mut generator = stream(1, purpose, dates, index);
     let mut normal = || generator.sample::<f64, _>(StandardNormal);
     let row = |_| {
         let common = normal();
         let deviation = |asset: usize| 0.04 + 0.03 * asset as f64 / (assets - 1) as f64;
         let own =
-            |asset| 0.01 + deviation(asset) * (CORRELATION.sqrt() * common + (1.0 - CORRELATION).sqrt() * normal());
+            |asset| 0.01 + deviation(asset) * (correlation.sqrt() * common + (1.0 - correlation).sqrt() * normal());
         (0..assets).map(own).collect()
     };
     (0..dates).map(row).collect()
@@ -68,17 +68,17 @@ fn distance(few: &[f64], many: &[f64]) -> f64 {
 
 pub fn run(arguments: &FundCoverage) {
     let samples = arguments.samples;
-    println!("| assets | dates | joint factor, mean | all balls hold | without the factor |");
-    println!("|---|---|---|---|---|");
-    for assets in [2, 5, 10] {
+    println!("| assets | correlation | dates | joint factor, mean | all balls hold | without the factor |");
+    println!("|---|---|---|---|---|---|");
+    for (assets, correlation) in [2, 5, 10].into_iter().flat_map(|assets| CORRELATIONS.map(|each| (assets, each))) {
         let funds = looked_at(assets);
         for dates in [60, 240] {
             // A multiple of the dates, so that the two samples can be matched rank by rank.
-            let truth = sample(assets, TRUE_DATES / dates * dates, "coverage truth", 0);
+            let truth = sample(assets, correlation, TRUE_DATES / dates * dates, "coverage truth", 0);
             let laws: Vec<Vec<f64>> = funds.iter().map(|fund| sorted(fund_returns(&truth, fund))).collect();
             let (mut factors, mut held, mut held_alone) = (0.0, 0, 0);
             for index in 0..samples {
-                let rows = sample(assets, dates, "coverage", index);
+                let rows = sample(assets, correlation, dates, "coverage", index);
                 let bridges = FundBridges::simulate(&rows, PATHS, index as u64);
                 let factor = bridges.joint_factor(ALPHA).value;
                 let ratio = |(fund, law): (&Vec<f64>, &Vec<f64>)| {
@@ -91,7 +91,8 @@ pub fn run(arguments: &FundCoverage) {
                 held_alone += usize::from(largest <= 1.0);
             }
             let percent = |count: usize| 100.0 * count as f64 / samples as f64;
-            println!("| {assets} | {dates} | {factors:.3} | {:.1} % | {:.1} % |", percent(held), percent(held_alone));
+            let [held, alone] = [held, held_alone].map(percent);
+            println!("| {assets} | {correlation} | {dates} | {factors:.3} | {held:.1} % | {alone:.1} % |");
         }
     }
 }
