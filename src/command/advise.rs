@@ -8,7 +8,6 @@ use std::fmt;
 use ballast::control::error::FieldError;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::learning::Learning;
-use ballast::control::request::radius_rules::BRIDGE_NUMBERS;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advice::advise::Advise;
 use ballast::service::advice::advise_assets::AdviseAssets;
@@ -95,10 +94,9 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
 }
 
 fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
-    let count = returns.rows().len();
     let holding = arguments.one_holding()?;
     let answer = |returns: &Returns| arguments.question(returns, holding).answer();
-    let advised = answer(returns).map_err(|error| by_option(error, count, &arguments.record))?;
+    let advised = answer(returns).map_err(|error| by_option(error, arguments.record.source()))?;
     let text = || {
         let coarser: Vec<(&str, Result<f64, FieldError>)> = (returns.coarser().iter())
             .map(|returns| (returns.noun(), answer(returns).map(|advised| advised.advice.allocation)))
@@ -125,8 +123,7 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
         holdings: Some(arguments.holdings_of(&returns.record.assets)?),
         seed: arguments.seed,
     };
-    let count = returns.record.rows.len();
-    let advised = question.answer().map_err(|error| by_option(error, count, &arguments.record))?;
+    let advised = question.answer().map_err(|error| by_option(error, arguments.record.source()))?;
     let (noun, periods) = (returns.record.frequency.noun(), returns.record.periods_per_year as f64);
     let text = || words::describe_several(&advised, arguments.wealth, noun, periods);
     Ok(show(&returns.sentence, arguments.json, &advised, text)?)
@@ -182,15 +179,14 @@ impl AdviseArgs {
     }
 }
 
-/// Renames the field of an error about `count` returns to the option that the user knows.
-fn by_option(error: FieldError, count: usize, record: &RecordArguments) -> FieldError {
-    if error.field == "problem.radius.paths" {
-        // For one step: the returns and one more.
-        let most = error.value.parse().map_or(0, |paths: usize| BRIDGE_NUMBERS / paths.max(1) - 1);
-        let rule = format!(
-            "must be at most {most}, because the radius is not simulated for more; use --window {most} to keep the last ones"
-        );
-        return FieldError::new(record.source(), format!("{count} returns"), rule);
+/// Renames the field of an error to the option that the user knows; `source` determines how many returns are used.
+fn by_option(error: FieldError, source: &'static str) -> FieldError {
+    if error.field == "problem.history" {
+        return FieldError {
+            field: source.into(),
+            rule: format!("{}; --window keeps the last ones", error.rule),
+            ..error
+        };
     }
     if let Some(column) = error.field.strip_prefix("holdings.") {
         return FieldError { value: format!("{column}={}", error.value), field: "--holding".into(), ..error };

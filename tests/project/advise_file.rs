@@ -94,25 +94,24 @@ fn what_is_wrong_is_said_by_line_or_option() {
 }
 
 #[test]
-fn more_days_than_a_radius_is_simulated_for_need_a_window() {
+fn sixty_years_of_days_are_advised_and_more_than_eighty_need_a_window() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("days.csv");
-    let first = jiff::civil::date(1970, 1, 1);
+    let first = jiff::civil::date(1960, 1, 1);
     let day = |day: i64| {
         format!("{},{}\n", first.checked_add(jiff::Span::new().days(day)).unwrap(), 0.001 * (day % 7 - 3) as f64)
     };
-    std::fs::write(&path, format!("date,return\n{}", (0..15_000).map(day).collect::<String>())).unwrap();
+    std::fs::write(&path, format!("date,return\n{}", (0..20_001).map(day).collect::<String>())).unwrap();
     let arguments = ["advise", path.to_str().unwrap(), "--rate", "0"];
     let refused = ballast(&arguments);
     assert_eq!(
         text(&refused.stderr),
-        "ballast: the file is 15000 returns: must be at most 14999, because the radius is not simulated for more; use \
-         --window 14999 to keep the last ones\n"
+        "ballast: the file is 20001 values: must hold 2 to 20000 log-returns; --window keeps the last ones\n"
     );
-    let named = ballast(&[&arguments[..], &["--window", "15000"]].concat());
-    assert!(text(&named.stderr).starts_with("ballast: --window is 15000 returns: must be at most 14999"), "{named:?}");
-    let answered = ballast(&[&arguments[..], &["--window", "14999"]].concat());
-    assert!(text(&answered.stdout).starts_with("14999 daily returns, 1970-01-02 to 2011-01-25, "), "{answered:?}");
+    let named = ballast(&[&arguments[..], &["--window", "20001"]].concat());
+    assert!(text(&named.stderr).starts_with("ballast: --window is 20001"), "{named:?}");
+    let answered = ballast(&[&arguments[..], &["--window", "15000"]].concat());
+    assert!(text(&answered.stdout).starts_with("15000 daily returns, 1973-09-08 to 2014-10-04, "), "{answered:?}");
 }
 
 #[test]

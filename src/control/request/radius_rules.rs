@@ -4,12 +4,14 @@ use crate::control::error::FieldError;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds, whole, within};
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
+use crate::numerics::bridge::paths::GRADED_FROM;
 
 /// Allowed number of simulated bridge paths.
 pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
-/// Largest bridge matrix, 30 million numbers: 240 MB.
-pub const BRIDGE_NUMBERS: usize = 30_000_000;
-/// Largest bridge matrix for a calibration, which reads it for each of a thousand records: about a second.
+/// Largest bridge matrix, 30 million numbers: 60 MB. Long records share a matrix of fewer times than returns.
+const BRIDGE_NUMBERS: usize = 30_000_000;
+/// Largest product of paths and returns for a calibration, which reads the paths for each of a thousand records: about a
+/// second.
 const CALIBRATED_NUMBERS: usize = 3_000_000;
 /// Allowed factors on a bridge radius.
 pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
@@ -77,8 +79,13 @@ pub fn check_radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result
             if let RadiusRule::Bridge { correction: Some(correction), .. } = *rule {
                 within("problem.radius.correction", correction, RADIUS_CORRECTION.0, RADIUS_CORRECTION.1)?;
             }
-            if paths.saturating_mul(problem.history.len() + problem.horizon) > numbers {
-                let rule = format!("must be smaller: multiplied by the final sample size it may be at most {numbers}");
+            let size = problem.history.len() + problem.horizon;
+            let times = if calibrated { size } else { size.min(GRADED_FROM) };
+            if paths.saturating_mul(times) > numbers {
+                let counted = if calibrated { String::new() } else { format!(" (of which {GRADED_FROM} count)") };
+                let rule = format!(
+                    "must be smaller: multiplied by the final sample size{counted} it may be at most {numbers}"
+                );
                 return Err(FieldError::new("problem.radius.paths", paths, rule));
             }
             Ok(())
