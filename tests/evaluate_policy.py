@@ -220,8 +220,7 @@ def evaluate(policy, question):
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
         unit = 1.0 if sees_wealth(problem) else wealth
         value = math.log(certainty_equivalent(problem["utility"], value) * unit / (wealth * bank))
-    is_cut = value > solution["largest_gain"]
-    gain = min(max(value, 0.0), solution["largest_gain"]) + beyond
+    gain = max(value, 0.0) + beyond
     free = 1 - reserve / (question["wealth"] * (1 - cost))
     low, high = 0.0, max(0.0, min(problem["action_interval"][1], free))
     share = question["wealth"] / (question["wealth"] + later)
@@ -236,7 +235,7 @@ def evaluate(policy, question):
         "floor_gain": gain,
         "certainty_equivalent": liquidated * bank * math.exp(gain),
         "deviation": deviation,
-        "in_design": deviation <= solution["deviation_limit"] and not is_cut and not ruined,
+        "in_design": deviation <= solution["deviation_limit"] and not ruined,
     }
 
 

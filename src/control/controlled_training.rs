@@ -16,10 +16,11 @@ use crate::control::request::contributions::Contributions;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, Specification, SurrogateTarget, UtilitySpecification};
 use crate::control::request::support::Support;
+use crate::control::surrogate::counts::Counts;
 use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::{FeatureSelection, Features};
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{Candidates, Counts, DesignFitting};
+use crate::control::surrogate::learning::{Candidates, DesignFitting};
 use crate::control::surrogate::stored::Solution;
 use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::control::uncertainty::laws::Laws;
@@ -163,7 +164,9 @@ impl<P: Controlled> Candidates for SimulatedStates<'_, P> {
             features,
             action,
             floor_gain: gain,
+            largest_gain: f64::INFINITY,
             floor_gains: vec![gain],
+            between: Vec::new(),
             policy_targets: vec![action],
             duality_gap,
             certified,

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::problem::actions::Band;
+use crate::control::surrogate::counts::LEAPS;
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 
 /// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
@@ -45,10 +46,9 @@ pub struct StepDiagnostics {
     pub policy: Option<SurrogateDiagnostics>,
 }
 
-/// Root mean square errors of the value of a step, in basis points of the certainty equivalent: over the design's own
-/// law of its states, at the holdings it was solved at. They do not cover states that this law seldom visits, such as
-/// those after a return beyond the record, where the value may be off by a hundred times as much. Nor do they cover the
-/// first step of a design that starts at one law.
+/// Root mean square errors of the value of a step, in basis points of the certainty equivalent, at any holding. They
+/// are over the design's own law of its states, of which one in eight leaps beyond the record: one return on the way to
+/// it may be anything within the support.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedError {
@@ -56,6 +56,15 @@ pub struct ExpectedError {
     pub own: f64,
     /// The error with those of the steps after it, added up as independent errors.
     pub total: f64,
+}
+
+impl ExpectedError {
+    /// Returns the error that comes from the steps after, in log certainty equivalent. At a state outside the design all
+    /// of it may be that of the leaping states.
+    pub fn later(self, in_design: bool) -> f64 {
+        let share = if in_design { 1.0 } else { 1.0 / LEAPS as f64 };
+        1e-4 * ((self.total * self.total - self.own * self.own).max(0.0) / share).sqrt()
+    }
 }
 
 /// The figures of a fitted surrogate.
@@ -72,7 +81,7 @@ pub struct SurrogateDiagnostics {
     pub noise_variance: f64,
     /// Log likelihood of the scaled targets, at the hyperparameters found.
     pub log_likelihood_per_point: f64,
-    /// Root mean square of the leave-one-out errors, in the target's own unit.
+    /// Root mean square of the leave-one-out errors of up to 500 design points, in the target's own unit.
     pub leave_one_out_error: f64,
     /// Diagonal added to the covariance matrix to factorise it, relative to its diagonal.
     pub jitter: f64,

@@ -18,8 +18,9 @@ use crate::control::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW, Holdings}
 use crate::control::problem::state::State;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
-use crate::control::solved_step::StepSolution;
+use crate::control::solved_step::{ExpectedError, StepSolution};
 use crate::control::surrogate::accuracy::Aim;
+use crate::control::surrogate::counts::LEAPING;
 use crate::control::surrogate::design::Design;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitting::DesignPoint;
@@ -90,11 +91,15 @@ impl Training {
         let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
         let bellman = BellmanStep { problem: &self.problem, step, next: &next };
         let counts = self.design.counts(step);
-        let radii = vec![OnceLock::new(); counts.candidates(counts.design)];
+        let radii =
+            [counts.candidates(counts.design), counts.leaping(counts.design)].map(|count| vec![OnceLock::new(); count]);
         let solver = DesignSolver { bellman, design: &self.design, measured: &self.measured, radii };
         if counts.design == 1 {
             watch.go_on()?;
-            let solved = solver.solve_the_only()?;
+            let mut solved = solver.solve_the_only()?;
+            // The step itself is solved without a surrogate.
+            let later = after.and_then(|after| after.diagnostics.expected_error);
+            solved.diagnostics.expected_error = later.map(|later| ExpectedError { own: 0.0, total: later.total });
             (watch.progress)(StepProgress { step, phase: Phase::Solving, done: 1, total: 1 });
             return Ok(solved);
         }
@@ -141,8 +146,8 @@ struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
     measured: &'a LawSummaryCache,
-    /// Radii of the candidates, if their features were computed with them.
-    radii: Vec<OnceLock<f64>>,
+    /// Radii of the candidates and of the design points that leap, if their features were computed with them.
+    radii: [Vec<OnceLock<f64>>; 2],
 }
 
 impl Candidates for DesignSolver<'_> {
@@ -156,7 +161,7 @@ impl Candidates for DesignSolver<'_> {
             problem.laws.summaries_of(&states.iter().map(|state| &state.law).collect::<Vec<_>>(), alphas)
         });
         let features = |(index, law): (usize, LawSummary)| {
-            if let Some(known) = self.radii.get(index) {
+            if let Some(known) = self.radius(index) {
                 known.get_or_init(|| law.radii.radius);
             }
             // Laws do not depend on the holdings: states are only needed if wealth is a feature.
@@ -171,7 +176,18 @@ impl Candidates for DesignSolver<'_> {
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
         let state = self.state(index);
         let found = self.solved(index, &state, self.bellman.problem.holdings(HOLDINGS))?;
-        Ok(design_point(state.wealth, features, found))
+        Ok(self.design_point(&state, features, found))
+    }
+
+    fn solve_to_judge(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
+        let (state, holdings) = (self.state(index), self.bellman.problem.holdings(HOLDINGS));
+        let mut point = self.design_point(&state, features, self.solved(index, &state, holdings.halved())?);
+        if holdings.matter() {
+            let (nodes, between) = point.floor_gains.iter().enumerate().partition(|(place, _)| place.is_multiple_of(2));
+            let gains = |some: Vec<(usize, &f64)>| some.into_iter().map(|(_, gain)| *gain).collect();
+            (point.floor_gains, point.between) = (gains(nodes), gains(between));
+        }
+        Ok(point)
     }
 }
 
@@ -182,13 +198,12 @@ impl DesignSolver<'_> {
         let only = self.state(0);
         let found = self.solved(0, &only, problem.holdings(HOLDINGS_OF_ONE_LAW))?;
         let single = SingleSolution { floor_gains: found.floor_gains.clone(), band: found.solution.band };
-        let point = design_point(only.wealth, problem.features(step, &only), found);
+        let point = self.design_point(&only, problem.features(step, &only), found);
         Ok(StepSolution { step, solution: Solution::Single(single), diagnostics: diagnostics(step, &[point]) })
     }
 
     fn solved(&self, point: usize, state: &State, holdings: Holdings) -> Result<DesignSolution, TrainError> {
-        let found =
-            self.bellman.solve_for_design(state, self.radii.get(point).and_then(OnceLock::get).copied(), holdings);
+        let found = self.bellman.solve_for_design(state, self.radius(point).and_then(OnceLock::get).copied(), holdings);
         let worst = |values: &[f64]| values.iter().copied().find(|value| !value.is_finite());
         let (gain, action) = (worst(&found.floor_gains), worst(&found.policy_targets));
         if gain.is_none() && action.is_none() && found.solution.floor_gain.is_finite() {
@@ -199,15 +214,32 @@ impl DesignSolver<'_> {
         Err(TrainError::NotFinite { step: self.bellman.step, point, gain, action })
     }
 
+    /// Converts a solved state to a design point of the surrogates.
+    fn design_point(&self, state: &State, features: Features, found: DesignSolution) -> DesignPoint {
+        let DesignSolution { solution, floor_gains, policy_targets } = found;
+        let RobustSolution { band, floor_gain, duality_gap, certified, .. } = solution;
+        let empty = State { holding: 0.0, ..state.clone() };
+        DesignPoint {
+            wealth: state.wealth,
+            features,
+            action: band.low,
+            floor_gain,
+            largest_gain: self.bellman.problem.largest_gain(self.bellman.step, &empty),
+            floor_gains,
+            between: Vec::new(),
+            policy_targets,
+            duality_gap,
+            certified,
+        }
+    }
+
+    /// Returns the place of a state's radius, if it may become a design point: those that leap come after the others.
+    fn radius(&self, index: usize) -> Option<&OnceLock<f64>> {
+        let [still, leaping] = &self.radii;
+        index.checked_sub(LEAPING).map_or_else(|| still.get(index), |leap| leaping.get(leap))
+    }
+
     fn state(&self, index: usize) -> State {
         self.design.state(self.bellman.step, index)
     }
-}
-
-/// Converts a solved state to a design point of the surrogates.
-fn design_point(wealth: f64, features: Features, found: DesignSolution) -> DesignPoint {
-    let DesignSolution { solution, floor_gains, policy_targets } = found;
-    let RobustSolution { band, floor_gain, duality_gap, certified, .. } = solution;
-    let action = band.low;
-    DesignPoint { wealth, features, action, floor_gain, floor_gains, policy_targets, duality_gap, certified }
 }

@@ -29,7 +29,7 @@ fn bridge(scale: f64) -> Value {
 
 fn request(horizon: usize, radius: Value, centre: Value) -> Value {
     json!({ "problem": { "horizon": horizon, "rate_per_step": RATE, "history": HISTORY, "radius": radius, "centre": centre,
-        "utility": { "kind": "power", "risk_aversion": RISK_AVERSION } }, "design": { "count": 40 } })
+        "utility": { "kind": "power", "risk_aversion": RISK_AVERSION } }, "design": { "count": 120 } })
 }
 
 fn smoothed(bandwidth: f64) -> Value {
@@ -234,7 +234,7 @@ fn the_value_of_a_centre_is_that_of_steps_in_each_other() {
             let advice = solved.advise(0, &start, AdviceMode::Surrogate);
             let found = (advice.certainty_equivalent / advice.floor).ln();
             println!("{centre} {radius} {found:e} {:e} {} {}", exact.floor_gain, advice.allocation, exact.action);
-            // Forty points of a surrogate leave a tenth of a basis point.
+            // A surrogate of 120 points leaves a tenth of a basis point.
             assert!((found - exact.floor_gain).abs() < 1e-5, "{centre} {radius}: {found} {}", exact.floor_gain);
             assert!(exact.floor_gain > 1e-4, "{exact:?}");
         }

@@ -301,12 +301,6 @@ fn no_import_shows_more_than_the_best_return_earns_in_every_period() {
         solution["value"]["offset"] = json!(1e30);
         solution["value"]["scale"] = json!(1e30);
         solution["deviation_limit"] = json!(1e30);
-        solution["largest_gain"] = json!(100.0);
-    }
-    let refused = Policy::from_json(&serde_json::to_vec(&claims).unwrap()).unwrap_err().to_string();
-    assert!(refused.starts_with("steps[1].solution.largest_gain is 100"), "{refused}");
-    for step in [1, 2] {
-        claims["steps"][step]["solution"]["largest_gain"] = json!(4.9);
     }
     let claiming = Advisor::new(Policy::from_json(&serde_json::to_vec(&claims).unwrap()).unwrap());
     let mut state = claiming.initial_state(None, None).unwrap();

@@ -82,7 +82,7 @@ fn of_cost(cost: f64, utility: Value) -> Advisor {
     crate::support::policies::advisor(json!({
         "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "trading_cost": cost,
             "radius": { "rule": "root_n", "kappa": 0.01 } },
-        "design": { "count": 80 } }))
+        "design": { "count": 160 } }))
 }
 
 fn utilities() -> [Value; 3] {

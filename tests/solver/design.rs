@@ -1,8 +1,9 @@
 //! The states that surrogates are trained on.
 
 use crate::support::policies::specification;
+use ballast::control::request::support::{Interval, LawExtent, Support};
+use ballast::control::surrogate::counts::{Counts, LEAPING};
 use ballast::control::surrogate::design::Design;
-use ballast::control::surrogate::learning::Counts;
 use ballast::control::surrogate::target::TargetMap;
 use serde_json::{Value, json};
 
@@ -26,7 +27,7 @@ fn wealth_alone_is_a_ladder_over_all_that_can_be_reached() {
     let mean = HISTORY.iter().sum::<f64>() / 6.0;
     let variance = HISTORY.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / 6.0;
     for step in 0..4 {
-        assert_eq!(design.counts(step), Counts { design: 20, chosen: false, guards: 20..20 });
+        assert_eq!(design.counts(step), Counts { design: 20, chosen: false, leaps: false, guards: 20..20 });
         let rungs: Vec<f64> = (0..20).map(|index| design.state(step, index).wealth.ln()).collect();
         let gap = (rungs[19] - rungs[0]) / 19.0;
         assert!(rungs.windows(2).all(|pair| (pair[1] - pair[0] - gap).abs() < 1e-12), "{rungs:?}");
@@ -57,7 +58,8 @@ fn where_all_states_are_one_there_is_one_design_point() {
 fn a_quarter_is_taken_as_drawn_and_the_guards_are_none_of_the_candidates() {
     let design = Design::new(&specification(request("adaptive", exponential())));
     let counts = design.counts(2);
-    assert_eq!((counts.candidates(20), counts.as_drawn(20), counts.guards), (60, 5, 60..260));
+    // Two of the five leap.
+    assert_eq!((counts.candidates(20), counts.as_drawn(20), counts.leaping(20), counts.guards), (60, 3, 2, 60..260));
 }
 
 #[test]
@@ -80,6 +82,45 @@ fn simulated_states_keep_to_the_history_the_support_and_the_returns_accepted() {
     }
     let accepted = ballast::control::request::rules::LOG_RETURN;
     assert!(widest > 1.0 && widest <= accepted, "{widest}");
+}
+
+/// The adversary's default support after the history is [-0.189, 0.219]: 0.015 and five deviations of 0.0377 less and
+/// more, of which the lower end is below twice the worst return and the upper above twice the best.
+#[test]
+fn leaping_states_reach_all_of_the_support_with_one_return() {
+    let reach = |support: Value, learned: &str| {
+        let mut request = request("adaptive", exponential());
+        request["problem"]["support"] = support;
+        request["design"]["initial_laws"] = json!(learned);
+        request["design"]["sampling_law"] =
+            json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.01, "variance": 1e-10 }] });
+        let design = Design::new(&specification(request));
+        assert!(design.counts(3).leaps && !design.counts(0).leaps);
+        let leap = |index: usize| {
+            let atoms = design.state(3, LEAPING + index).law.atoms().to_vec();
+            let drawn = |z: &f64| (z - 0.01).abs() < 1e-3;
+            let leaps: Vec<f64> = atoms.into_iter().filter(|z| !HISTORY.contains(z) && !drawn(z)).collect();
+            assert!(leaps.len() < 2, "{leaps:?}");
+            leaps.first().copied().unwrap_or(0.01)
+        };
+        let mut leaps: Vec<f64> = (0..400).map(leap).collect();
+        leaps.sort_by(f64::total_cmp);
+        leaps
+    };
+    let extent = LawExtent::of(HISTORY.into_iter());
+    let Interval { min, max } = Support::default().around(|| extent).unwrap();
+    assert!(min < -0.15 && max > 0.15, "[{min}, {max}]");
+    // The support may follow the returns drawn before the leap, which narrow it.
+    let ends = |leaps: &[f64]| [leaps[0], leaps[leaps.len() - 1]];
+    let usual = reach(json!({ "rule": "worst_seen", "factor": 2.0 }), "given");
+    let [lowest, highest] = ends(&usual);
+    assert!((lowest - min).abs() < 1e-3 && (highest - max).abs() < 1e-3, "[{lowest}, {highest}] for [{min}, {max}]");
+    // Spread evenly, but for a twentieth at either end.
+    let largest = usual.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    assert!(largest < 0.03 * (max - min), "{largest}");
+    assert_eq!(ends(&reach(json!({ "rule": "between", "min": -0.3, "max": 0.2 }), "given")), [-0.3, 0.2]);
+    let free = reach(json!({ "rule": "none" }), "given");
+    assert!(free[0] < -1.0 && free.iter().filter(|z| **z < min).count() < 200, "{free:?}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use ballast_test_support as support;
 mod accuracy;
 mod assets;
 mod bellman;
+mod beyond;
 mod calibration;
 mod caution;
 mod centre;

@@ -39,7 +39,7 @@ fn fresh_states(step: usize, count: usize) -> Vec<State> {
     (0..count).map(|index| design.state(step, index)).collect()
 }
 
-static TRAINED: LazyLock<Advisor> = LazyLock::new(|| advisor(request(1, 150)));
+static TRAINED: LazyLock<Advisor> = LazyLock::new(|| advisor(request(1, 250)));
 
 /// The error of an advice at a fresh state, in basis points.
 struct Judged {

@@ -19,6 +19,7 @@ use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
+use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::search::chebyshev::{Chebyshev, local_cubic};
 
 /// Chebyshev nodes in the action. Over the action interval the log of the next wealth, which is the feature, is nearly
@@ -27,6 +28,10 @@ const ACTION_NODES: usize = 4;
 
 /// Predictions tabulated over returns and trades, for one state.
 pub struct GainField<'a> {
+    problem: &'a Problem,
+    step: usize,
+    /// The law before the period.
+    law: &'a EmpiricalDistribution,
     next: &'a NextValue,
     utility: RelativeUtility,
     dynamics: Dynamics,
@@ -52,11 +57,11 @@ impl<'a> GainField<'a> {
     /// Tabulates the field. `returns` are ascending and distinct, `utility` is relative to the floor of `state`. Cost
     /// O(returns x nodes x design count).
     pub fn tabulate(
-        problem: &Problem,
+        problem: &'a Problem,
         step: usize,
         next: &'a NextValue,
         utility: RelativeUtility,
-        state: &State,
+        state: &'a State,
         returns: Vec<f64>,
     ) -> Self {
         let [dynamics, after] = [step, step + 1].map(|step| problem.dynamics(step));
@@ -76,6 +81,9 @@ impl<'a> GainField<'a> {
         let in_hand = dynamics.in_hand(state.wealth, state.holding);
         let holdings = next.holdings(problem);
         GainField {
+            problem,
+            step,
+            law: &state.law,
             next,
             utility,
             dynamics,
@@ -127,7 +135,11 @@ impl<'a> GainField<'a> {
         let growths: Vec<f64> = returns.iter().map(|z| z.exp() / (1.0 + self.dynamics.rate_per_step)).collect();
         let sold = 1.0 - self.cost_of_selling();
         let excesses = growths.iter().map(|growth| sold * growth - 1.0).collect();
-        FieldRows { field: self, rows, growths, excesses }
+        let largest = match self.next {
+            NextValue::Surrogate(_) => self.problem.largest_gains_after(self.step, self.law, returns),
+            NextValue::Terminal | NextValue::Constant(..) | NextValue::Exact(..) => vec![f64::INFINITY; returns.len()],
+        };
+        FieldRows { field: self, rows, growths, excesses, largest }
     }
 
     fn trade_count(&self) -> usize {
@@ -178,6 +190,8 @@ struct FieldRows<'f> {
     growths: Vec<f64>,
     /// `(1 - c) e^z / (1 + r) - 1`: the gain of a unit of allocation over the bank once it is sold.
     excesses: Vec<f64>,
+    /// Upper bounds on the gain of the next state with nothing held.
+    largest: Vec<f64>,
 }
 
 impl Payoffs for FieldRows<'_> {
@@ -203,7 +217,8 @@ impl Payoffs for FieldRows<'_> {
             }
             NextValue::Surrogate(_) | NextValue::Exact(..) => {
                 let mut gains = self.interpolated(trade);
-                next.gains(&mut gains, relative.iter().map(|relative| bank * relative));
+                let totals = relative.iter().map(|relative| bank * relative);
+                next.gains(&mut gains, totals.zip(self.largest.iter().copied()));
                 gains
             }
         };
@@ -218,9 +233,11 @@ impl FieldRows<'_> {
         let GainField { next, holdings, after, .. } = self.field;
         let held: Vec<f64> = self.holdings(trade).collect();
         let mut gains = self.interpolated_at(trade, &held);
-        let within = totals.iter().zip(&held).map(|(total, &holding)| {
-            let liquidation = after.liquidation(holdings.within(holding)) / after.liquidation(holding);
-            (total - after.to_come) * liquidation + after.to_come
+        let within = totals.iter().zip(&held).zip(&self.largest).map(|((total, &holding), largest)| {
+            let unsold = (total - after.to_come) / after.liquidation(holding);
+            let within = after.total(unsold, holdings.within(holding));
+            // A holding before trading also gains the cost of selling it.
+            (within, largest + (after.total(unsold, 0.0) / within).ln())
         });
         next.gains(&mut gains, within);
         for ((gain, &holding), total) in gains.iter_mut().zip(&held).zip(totals) {

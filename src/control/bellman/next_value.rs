@@ -105,14 +105,14 @@ impl NextValue {
         table
     }
 
-    /// Turns predictions into floor gains, in place. `totals` is the total wealth of each state after selling all, for
-    /// a holding no higher than the highest at which the value is known.
-    pub fn gains(&self, predictions: &mut [f64], totals: impl Iterator<Item = f64>) {
+    /// Turns predictions into floor gains, in place. For each state, `totals` holds total wealth after selling all, for
+    /// a holding no higher than the highest at which the value is known, and an upper bound on the gain.
+    pub fn gains(&self, predictions: &mut [f64], totals: impl Iterator<Item = (f64, f64)>) {
         match self {
             NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
-                for (prediction, total) in predictions.iter_mut().zip(totals) {
-                    *prediction = surrogate.clamped_gain(*prediction, total);
+                for (prediction, (total, largest)) in predictions.iter_mut().zip(totals) {
+                    *prediction = surrogate.clamped_gain(*prediction, total, largest);
                 }
             }
             NextValue::Exact(..) => predictions.iter_mut().for_each(|gain| *gain = gain.max(0.0)),

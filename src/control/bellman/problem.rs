@@ -12,6 +12,7 @@ use crate::control::request::support::Support;
 use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features};
 use crate::control::uncertainty::laws::{LawSummary, Laws};
+use crate::numerics::law::empirical::EmpiricalDistribution;
 
 /// The problem of a completed specification.
 pub struct Problem {
@@ -105,6 +106,16 @@ impl Problem {
         let best = self.laws.best_return(&state.law, problem.horizon - step);
         let [all, unsold] = [state.holding, 0.0].map(|holding| self.dynamics(step).total(state.wealth, holding));
         largest_gain(problem, step, best) + (unsold / all).ln()
+    }
+
+    /// Returns the bound of [`Self::largest_gain`] for the states with nothing held that follow from one with `law` at
+    /// `step`, through each of `returns`.
+    pub fn largest_gains_after(&self, step: usize, law: &EmpiricalDistribution, returns: &[f64]) -> Vec<f64> {
+        let problem = &self.specification.problem;
+        let periods = problem.horizon.saturating_sub(step + 1);
+        let largest =
+            |&log_return: &f64| largest_gain(problem, step + 1, self.laws.best_return_with(law, log_return, periods));
+        returns.iter().map(largest).collect()
     }
 
     /// Returns the features of a state, unscaled.

@@ -279,13 +279,15 @@ impl Advisor {
         let largest = self.problem.largest_gain(step, state);
         let (dynamics, highest) = (self.problem.dynamics(step), self.problem.actions(step, state).highest);
         let in_hand = dynamics.in_hand(state.wealth, state.holding);
-        match &self.policy.steps()[step].solution {
+        let solved = &self.policy.steps()[step];
+        let later = |in_design: bool| solved.diagnostics.expected_error.map_or(0.0, |error| error.later(in_design));
+        match &solved.solution {
             Solution::Single(single) => {
                 let in_design = self.is_single_state(step, state) && self.pays(step, state);
                 let holdings = self.problem.holdings(single.floor_gains.len());
                 let gain = holdings.gain(&single.floor_gains, dynamics, state.holding, in_hand);
                 let band = Band { low: single.band.low.min(highest), high: single.band.high.min(highest) };
-                Prediction { band, floor_gain: gain.min(largest), deviation: 0.0, in_design }
+                Prediction { band, floor_gain: gain.min(largest), deviation: later(in_design), in_design }
             }
             Solution::Surrogates(stored) => {
                 let PreparedStep { value, policy, factor } = self.prepared_from(step, stored);
@@ -299,19 +301,13 @@ impl Advisor {
                 let ends: Vec<f64> = ends.into_iter().map(|end| (end / unit).clamp(0.0, highest)).collect();
                 let prediction = holdings.at(&predictions, state.holding);
                 let total = dynamics.total(state.wealth, holdings.within(state.holding));
-                let gain = value.clamped_gain(prediction, total) + holdings.beyond(dynamics, state.holding, in_hand);
-                // Gains above the largest that was solved are cut off, because they are not known.
-                let cut = value.beyond_solved(prediction, total);
-                let is_solved = cut <= 0.0 && !ends.iter().any(|end| self.problem.is_ruined(radius, *end));
-                Prediction {
-                    band: Band::of(&ends),
-                    floor_gain: gain.min(largest),
-                    deviation: value
-                        .gain_spread(prediction, deviation * stored.value.scale, total)
-                        .max(cut)
-                        .min(largest),
-                    in_design: deviation <= stored.deviation_limit && is_finite && is_solved && self.pays(step, state),
-                }
+                let gain =
+                    value.clamped_gain(prediction, total, largest) + holdings.beyond(dynamics, state.holding, in_hand);
+                let ruins = ends.iter().any(|end| self.problem.is_ruined(radius, *end));
+                let in_design = deviation <= stored.deviation_limit && is_finite && !ruins && self.pays(step, state);
+                let own = value.gain_spread(prediction, deviation * stored.value.scale, total);
+                let deviation = own.hypot(later(in_design)).min(largest);
+                Prediction { band: Band::of(&ends), floor_gain: gain.min(largest), deviation, in_design }
             }
         }
     }

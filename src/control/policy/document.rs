@@ -125,8 +125,6 @@ impl Policy {
                 Solution::Surrogates(stored) => {
                     check_surrogates(&field, stored, feature_count)?;
                     check_functions(&field, stored, &self.specification)?;
-                    let largest = credible_gain(&self.specification, index);
-                    rules::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, largest)?;
                 }
             }
         }

@@ -44,6 +44,11 @@ impl Holdings {
         (0..self.count).map(move |index| self.highest * index as f64 / last)
     }
 
+    /// Returns the same holdings with those halfway between them.
+    pub fn halved(self) -> Self {
+        Holdings { count: if self.matter() { 2 * self.count - 1 } else { self.count }, ..self }
+    }
+
     /// Returns the holding at which the function is evaluated for `holding`, which may have drifted beyond the highest
     /// action.
     pub fn within(self, holding: f64) -> f64 {

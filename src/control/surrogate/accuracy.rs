@@ -116,8 +116,13 @@ impl Checks {
         Checks { weighted }
     }
 
+    /// Returns checks of `count` states that all weigh alike.
+    pub fn evenly(count: usize) -> Self {
+        Checks { weighted: (0..count).map(|state| (state, 1.0 / count as f64)).collect() }
+    }
+
     /// Returns the root mean square error of `served`, in basis points, from the states solved in the order of the
-    /// checks.
+    /// checks, at their holdings and halfway between.
     pub fn error<'a>(
         &self,
         served: &ValueSurrogate,
@@ -128,12 +133,16 @@ impl Checks {
         let dynamics = Dynamics::of(&specification.problem)[step];
         let squares = |point: &DesignPoint| {
             let predictions = served.prediction(&point.features);
-            let totals = served.holdings().nodes().map(|holding| dynamics.total(point.wealth, holding));
-            let of_holding = |((prediction, total), gain): ((f64, f64), &f64)| {
-                (served.clamped_gain(prediction, total) - gain).powi(2)
+            let unsold = dynamics.total(point.wealth, 0.0);
+            let holdings = served.holdings();
+            let error = |(holding, gain): (f64, &f64)| {
+                let total = dynamics.total(point.wealth, holding);
+                let largest = point.largest_gain + (unsold / total).ln();
+                served.clamped_gain(holdings.at(&predictions, holding), total, largest) - gain
             };
-            let squares = predictions.into_iter().zip(totals).zip(&point.floor_gains).map(of_holding);
-            squares.sum::<f64>() / point.floor_gains.len() as f64
+            let between = holdings.halved().nodes().skip(1).step_by(2).zip(&point.between);
+            let errors: Vec<f64> = holdings.nodes().zip(&point.floor_gains).chain(between).map(error).collect();
+            errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64
         };
         let mean: f64 = self.weighted.iter().zip(solved).map(|((_, weight), point)| weight * squares(point)).sum();
         BASIS_POINTS * mean.sqrt()

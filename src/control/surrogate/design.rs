@@ -4,10 +4,14 @@
 //! of the state, three times as many candidates as design points are simulated. A quarter of the design is used as
 //! drawn. The rest are the candidates that lie farthest apart, so that the design includes its edges. Candidates count
 //! as farther apart if the points drawn show that a surrogate errs there.
+//!
+//! One state in eight leaps beyond the record: one return on the way to it is spread evenly over the support, or over
+//! twice the worst and the best of the record. The adversary moves returns that far, and a session may report them, so
+//! the value there must be learned and not extrapolated.
 
 use rand::RngExt;
 
-use super::learning::Counts;
+use super::counts::{Counts, LEAPING};
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::problem::state::State;
@@ -15,17 +19,31 @@ use crate::control::request::completion::DEFAULT_COUNT;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, ProblemSpecification, Specification};
-use crate::control::request::support::Interval;
+use crate::control::request::support::{Interval, LawExtent, Support};
 use crate::control::uncertainty::centre::Centre;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::confidence_region::{self, ConfidenceRegion, NormalLaw};
 use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::moments::CentralMoments;
 use crate::numerics::machine::streams::stream;
 
 /// Largest number of states that set the guard: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;
+/// Share of leaps beyond each end of the range, which are moved to the end: the adversary goes there.
+const AT_THE_ENDS: f64 = 0.05;
+/// How far below the worst return the adversary may go in one period if every return is allowed, in log-return.
+const FREE_FALL: f64 = 1.2;
 /// Largest number of guards for each design point: in a small design more features would cost more than solving it.
 const GUARDS_PER_POINT: usize = 10;
+
+/// A return beyond the record on the way to a state.
+struct Leap {
+    period: usize,
+    /// Where in the range it goes, from 0 to 1.
+    place: f64,
+    /// True if the range is all that the adversary may use.
+    far: bool,
+}
 
 /// The states that a training may have to solve.
 pub struct Design {
@@ -84,11 +102,12 @@ impl Design {
         let design = self.count(step);
         let chosen = design > 1 && self.ladder.is_empty();
         let guards = if self.ladder.is_empty() { GUARDS.min(GUARDS_PER_POINT * design) } else { 0 };
-        Counts::new(design, chosen, guards)
+        Counts { leaps: chosen && step > 0, ..Counts::new(design, chosen, guards) }
     }
 
-    /// Returns state `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
-    /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O(history) a step.
+    /// Returns state `index` of `step`; those beyond the candidates are independent draws of the same law. Those from
+    /// [`LEAPING`] leap beyond the record in one of the periods. Streams: ("initial", 0, index) for the start,
+    /// ("design", t, index) for each step, ("leap", step, index) for the period of the leap. Cost O(history) a step.
     pub fn state(&self, step: usize, index: usize) -> State {
         let problem = &self.problem;
         if let Some(wealths) = self.ladder.get(index) {
@@ -103,16 +122,49 @@ impl Design {
         } else {
             self.history.clone()
         };
+        let leap = self.leap_to(step, index);
         let mut seen = Vec::with_capacity(step);
         for (earlier, dynamics) in self.periods[..step].iter().enumerate() {
             let mut generator = stream(self.seed, "design", earlier, index);
             let action = dynamics.highest_action(wealth, problem.action_interval[1]) * generator.random::<f64>();
-            let log_return = admissible(self.law.draw(&mut generator), problem);
+            let mut log_return = admissible(self.law.draw(&mut generator), problem);
+            if let Some(leap) = leap.as_ref().filter(|leap| leap.period == earlier) {
+                let mut known = law.clone();
+                known.extend(&seen);
+                log_return = admissible(self.leap(&known, leap), problem);
+            }
             (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
             seen.push(log_return);
         }
         law.extend(&seen);
         self.holding_half(wealth.max(self.periods[step].least_wealth()), law)
+    }
+
+    /// Returns the leap of a state that leaps.
+    fn leap_to(&self, step: usize, index: usize) -> Option<Leap> {
+        let number = index.checked_sub(LEAPING).filter(|_| step > 0)?;
+        let period = stream(self.seed, "leap", step, number).random_range(0..step);
+        // Multiples of the golden ratio are even in every range of numbers.
+        Some(Leap { period, place: (number as f64 * GOLDEN).fract(), far: !number.is_multiple_of(2) })
+    }
+
+    /// Returns the return of a leap after `law`. Leaps are spread evenly over the support, or over the support that a
+    /// record has by default; if that is not all, those that go far are spread over all, at distances that grow.
+    fn leap(&self, law: &EmpiricalDistribution, leap: &Leap) -> f64 {
+        let moments = CentralMoments::of(law);
+        let ends = [law.atoms().first(), law.atoms().last()].map(|end| end.copied().unwrap_or_default());
+        let extent = LawExtent { ends, mean: moments.mean(), variance: moments.variance() };
+        let usual = Support::default().around(|| extent).unwrap_or(Interval { min: ends[0], max: ends[1] });
+        let whole = self.problem.support_rule().around(|| extent);
+        let Interval { min, max } = whole.unwrap_or(Interval { min: usual.min - FREE_FALL, ..usual });
+        let place = ((1.0 + 2.0 * AT_THE_ENDS) * leap.place - AT_THE_ENDS).clamp(0.0, 1.0);
+        let near = Interval { min: usual.min.max(min), max: usual.max.min(max) };
+        if !leap.far || (near.min == min && near.max == max) {
+            return near.min + place * (near.max - near.min);
+        }
+        let scale = 0.5 * (usual.max - usual.min);
+        let [low, high] = [min, max].map(|end| ((end - extent.mean) / scale).asinh());
+        extent.mean + scale * (low + place * (high - low)).sinh()
     }
 
     /// Returns a state whose holding is one half: the band and the value are computed for every holding from any one,
@@ -168,6 +220,9 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
     };
     (0..count).map(|point| (0..problem.horizon).map(|step| ladder(point, step)).collect()).collect()
 }
+
+/// The golden ratio less 1.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Standard deviations of log wealth that the design covers if the state is wealth alone.
 const REACHED_DEVIATIONS: f64 = 5.0;

@@ -46,8 +46,12 @@ pub struct DesignPoint {
     pub action: f64,
     /// Log certainty equivalent over the all-bank floor, at the state's own holding.
     pub floor_gain: f64,
+    /// An upper bound on the floor gain with nothing held.
+    pub largest_gain: f64,
     /// The floor gain at every holding at which the value is needed; one if the holding does not matter.
     pub floor_gains: Vec<f64>,
+    /// The floor gains halfway between these holdings, if a fit is judged by the state.
+    pub between: Vec<f64>,
     /// The action, or either end of the band, continued past the bounds of the interval.
     pub policy_targets: Vec<f64>,
     /// The duality gap of the robust step, in log certainty equivalent.
@@ -210,7 +214,6 @@ impl Fitting<'_> {
             inputs: inputs.column_iter().map(|column| column.iter().copied().collect()).collect(),
             scaling: self.scaling.clone(),
             deviation_limit: quantile(&deviations, GUARDED_SHARE),
-            largest_gain: solved.iter().flat_map(|point| &point.floor_gains).copied().fold(0.0, f64::max),
             value: value.stored,
             policy: policy.stored,
         };

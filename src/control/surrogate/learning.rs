@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::accuracy::{Aim, Checks};
+use super::counts::{Counts, LEAPING, LEAPING_CHECKS, LEAPS};
 use super::features::Features;
 use super::fitting::{DesignPoint, Fitting, SurrogateFit};
 use super::scaling::Scaling;
@@ -43,53 +44,20 @@ pub trait Candidates: Sync {
     /// # Errors
     /// The stop signal; a solution that is not finite.
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError>;
+
+    /// Solves the robust step at a state by which a fit is judged, between the holdings also.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    fn solve_to_judge(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
+        self.solve(index, features)
+    }
 }
 
 /// Returns how many states have their features computed together, if laws have `values` values and their radii `paths`
 /// simulated paths.
 pub fn together(values: usize, paths: usize) -> usize {
     (BYTES_TOGETHER / (LAW_BYTES * values + size_of::<f64>() * paths).max(1)).clamp(1, MOST_TOGETHER)
-}
-
-/// Candidates simulated for each design point.
-pub const CANDIDATES_PER_POINT: usize = 3;
-/// One design point in this many is used as drawn.
-const AS_DRAWN: usize = 4;
-
-/// The number of states of each kind.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Counts {
-    /// Design points, N; the largest number if an accuracy is asked for.
-    pub design: usize,
-    /// True if they are chosen among candidates; otherwise they are all the candidates.
-    pub chosen: bool,
-    /// Fresh states that set the guard.
-    pub guards: Range<usize>,
-}
-
-impl Counts {
-    /// Counts the states with `guards` fresh states, which come after the candidates.
-    pub fn new(design: usize, chosen: bool, guards: usize) -> Self {
-        let counts = Counts { design, chosen, guards: 0..0 };
-        let first = counts.candidates(design);
-        Counts { guards: first..first + guards, ..counts }
-    }
-
-    /// Returns how many of `design` points are the first candidates as drawn.
-    pub fn as_drawn(&self, design: usize) -> usize {
-        if self.chosen { design.div_ceil(AS_DRAWN) } else { design }
-    }
-
-    /// Returns the number of candidates for `design` points.
-    pub fn candidates(&self, design: usize) -> usize {
-        if self.chosen { CANDIDATES_PER_POINT * design } else { design }
-    }
-
-    /// Returns the fresh states of a round; each round has its own.
-    fn guards(&self, round: usize) -> Range<usize> {
-        let start = self.guards.start + round * self.guards.len();
-        start..start + self.guards.len()
-    }
 }
 
 /// The fitting of the surrogates of one step.
@@ -115,6 +83,8 @@ struct StepData {
     features: Vec<Features>,
     /// Candidates that are design points.
     chosen: Vec<usize>,
+    /// How many leaping states are design points.
+    leaping: usize,
     /// The solved candidates, and the states that earlier fits were judged by.
     solved: Vec<DesignPoint>,
 }
@@ -177,6 +147,7 @@ impl DesignFitting<'_> {
     ) -> Result<(f64, Vec<DesignPoint>), TrainError> {
         let JudgedFit { served, deviations, limit, before } = found;
         let (mut errors, mut numbers, mut solved) = (Vec::with_capacity(SETS), Vec::new(), Vec::new());
+        let mut leaping = Vec::new();
         let last = *before >= self.counts.design;
         for set in 0..SETS {
             let checks = Checks::of(deviations, *limit, self.specification.seed, self.step, SETS * round + set);
@@ -185,11 +156,12 @@ impl DesignFitting<'_> {
             let new: Vec<usize> = drawn.iter().copied().filter(|state| !numbers.contains(state)).collect();
             let some = new.iter().map(|&state| (fresh.start + state, guards[state].clone())).collect();
             let done = before + solved.len();
-            solved.extend(self.solve(states, some, done, done + new.len())?);
+            solved.extend(self.judges(states, some, done)?);
             numbers.extend(new);
             let place = |state: &usize| numbers.iter().position(|number| number == state);
             let points = drawn.iter().filter_map(place).map(|place| &solved[place]);
             let error = checks.error(served, self.specification, self.step, points);
+            let error = self.with_leaps(states, served, error, SETS * round + set, &mut leaping)?;
             errors.push(error);
             if !last && !aim.is_met_by(error) {
                 break;
@@ -197,7 +169,30 @@ impl DesignFitting<'_> {
         }
         let mean_square = || errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64;
         let own = if last { mean_square().sqrt() } else { errors.iter().copied().fold(0.0, f64::max) };
+        solved.extend(leaping);
         Ok((own, solved))
+    }
+
+    /// Returns the error over all states, given that over those that do not leap: one state in [`LEAPS`] does. Solves
+    /// the leaping states of a set, and adds them to `solved`.
+    fn with_leaps(
+        &self,
+        states: &impl Candidates,
+        served: &ValueSurrogate,
+        error: f64,
+        set: usize,
+        solved: &mut Vec<DesignPoint>,
+    ) -> Result<f64, TrainError> {
+        if !self.counts.leaps {
+            return Ok(error);
+        }
+        let range = self.counts.leaping_checks(set);
+        let some = range.clone().zip(self.features(states, range)?).collect();
+        let points = self.judges(states, some, 0)?;
+        let leaping = Checks::evenly(LEAPING_CHECKS).error(served, self.specification, self.step, points.iter());
+        solved.extend(points);
+        let share = 1.0 / LEAPS as f64;
+        Ok(((1.0 - share) * error * error + share * leaping * leaping).sqrt())
     }
 
     /// Solves as many more design points as are wanted, and fits both surrogates to all. `before` are surrogates for a
@@ -210,12 +205,17 @@ impl DesignFitting<'_> {
         before: Option<&StepSurrogates>,
         guards: &[Features],
     ) -> Result<SurrogateFit, TrainError> {
-        let StepData { features, chosen, solved } = known;
+        let StepData { features, chosen, leaping, solved } = known;
         features.extend(self.features(states, features.len()..self.counts.candidates(wanted))?);
         let scaling = Scaling::of(features);
         let (specification, names, step, watch) = (self.specification, self.names, self.step, self.watch);
         let fitting = Fitting { specification, names, step, scaling: &scaling, watch };
         let named = |index: &usize| (*index, features[*index].clone());
+        let leaps = wanted.saturating_sub(solved.len()).min(self.counts.leaping(wanted).saturating_sub(*leaping));
+        let range = LEAPING + *leaping..LEAPING + *leaping + leaps;
+        let some = range.clone().zip(self.features(states, range)?).collect();
+        solved.extend(self.solve(states, some, solved.len(), wanted)?);
+        *leaping += leaps;
         let left = wanted.saturating_sub(solved.len());
         let drawn = (0..self.counts.as_drawn(wanted)).filter(|index| !chosen.contains(index)).take(left);
         let drawn: Vec<usize> = drawn.collect();
@@ -252,10 +252,32 @@ impl DesignFitting<'_> {
         Ok(found?.concat())
     }
 
-    /// Solves the robust step at states by number, with their features, if `before` of `total` are solved already.
+    /// Solves the robust step at design points by number, with their features, if `before` of `total` are solved
+    /// already.
     fn solve(
         &self,
         states: &impl Candidates,
+        some: Vec<(usize, Features)>,
+        before: usize,
+        total: usize,
+    ) -> Result<Vec<DesignPoint>, TrainError> {
+        self.solve_by(|index, features| states.solve(index, features), some, before, total)
+    }
+
+    /// Solves the robust step at states by which a fit is judged, if `before` are solved already.
+    fn judges(
+        &self,
+        states: &impl Candidates,
+        some: Vec<(usize, Features)>,
+        before: usize,
+    ) -> Result<Vec<DesignPoint>, TrainError> {
+        let total = before + some.len();
+        self.solve_by(|index, features| states.solve_to_judge(index, features), some, before, total)
+    }
+
+    fn solve_by(
+        &self,
+        solve: impl Fn(usize, Features) -> Result<DesignPoint, TrainError> + Sync,
         some: Vec<(usize, Features)>,
         before: usize,
         total: usize,
@@ -265,7 +287,7 @@ impl DesignFitting<'_> {
         self.report(before, total);
         let solve = |(index, features): (usize, Features)| {
             self.watch.go_on()?;
-            let solved = states.solve(index, features)?;
+            let solved = solve(index, features)?;
             let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
             if finished.is_multiple_of(every) || finished == total {
                 self.report(finished, total);

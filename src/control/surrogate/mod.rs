@@ -1,6 +1,7 @@
 //! The regression behind the value and the action (paper, section 3.1): features of a state, the design, the fits.
 
 pub mod accuracy;
+pub mod counts;
 pub mod design;
 pub mod features;
 pub mod fitting;

@@ -37,8 +37,6 @@ pub struct StepSurrogates {
     /// The surrogate of the policy target, an action: one function, or the lower and the upper end of the band if
     /// trading costs.
     pub policy: StoredSurrogate,
-    /// Largest floor gain on the design: predictions are clamped to it.
-    pub largest_gain: f64,
     /// The guard: states whose predicted standard deviation of the value target exceeds this, in units of the value's
     /// `scale`, lie outside the design. It is the 99.5 % quantile of the deviations at fresh states of the design's own
     /// law, if the law is part of the state. Otherwise it is that quantile of the leave-one-out deviations at the

@@ -41,8 +41,6 @@ pub struct ValueSurrogate {
     pub scaling: Scaling,
     /// The surrogate of the target, not yet clamped.
     pub surrogate: Surrogate,
-    /// Upper clamp of the predicted floor gains.
-    pub largest_gain: f64,
     /// The map from targets to floor gains.
     pub target: TargetMap,
     holdings: Holdings,
@@ -54,7 +52,6 @@ impl ValueSurrogate {
         ValueSurrogate {
             scaling: stored.scaling.clone(),
             surrogate: Surrogate::new(stored, &stored.value),
-            largest_gain: stored.largest_gain,
             target: TargetMap::new(specification, step),
             holdings: Holdings::new(stored.value.weights.len(), specification.problem.action_interval[1]),
         }
@@ -88,22 +85,17 @@ impl ValueSurrogate {
         wealths.flat_map(at).collect()
     }
 
-    /// Converts a deviation of the target to one of the floor gain, around `prediction` at total wealth. Returns the
-    /// largest gain if it leads out of the target's range.
+    /// Converts a deviation of the target to one of the floor gain, around `prediction` at total wealth. It is infinite
+    /// if it leads out of the target's range.
     pub fn gain_spread(&self, prediction: f64, deviation: f64, total: f64) -> f64 {
         let gain = |target| self.target.gain(target, total);
         let spread = 0.5 * (gain(prediction + deviation) - gain(prediction - deviation)).abs();
-        if spread.is_finite() { spread } else { self.largest_gain }
+        if spread.is_nan() { f64::INFINITY } else { spread }
     }
 
-    /// Returns the excess of the predicted floor gain over the largest one solved; 0 if there is none.
-    pub fn beyond_solved(&self, prediction: f64, total: f64) -> f64 {
-        (self.target.gain(prediction, total) - self.largest_gain).max(0.0)
-    }
-
-    /// Returns the floor gain of a predicted target at total wealth, clamped to its true lower bound 0 and the largest
-    /// one solved.
-    pub fn clamped_gain(&self, prediction: f64, total: f64) -> f64 {
-        self.target.gain(prediction, total).clamp(0.0, self.largest_gain)
+    /// Returns the floor gain of a predicted target at total wealth, between its lower bound 0 and the upper bound
+    /// `largest`.
+    pub fn clamped_gain(&self, prediction: f64, total: f64, largest: f64) -> f64 {
+        self.target.gain(prediction, total).clamp(0.0, largest.max(0.0))
     }
 }

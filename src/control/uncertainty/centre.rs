@@ -140,10 +140,10 @@ impl Centring {
         Centre::gathered(atoms.into_iter().map(|atom| atom.clamp(min, max)).zip(masses))
     }
 
-    /// Returns an upper bound on the returns of the centre while `periods` more returns are learned, each of them at
-    /// most the bound before it.
-    pub fn highest(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
-        let seen = law.atoms().last().copied().unwrap_or(self.accepted.max);
+    /// Returns an upper bound on the returns of the centre of `law` with `log_return`, while `periods` more returns are
+    /// learned, each of them at most the bound before it.
+    pub fn highest(&self, law: &EmpiricalDistribution, log_return: f64, periods: usize) -> f64 {
+        let seen = law.atoms().last().copied().unwrap_or(self.accepted.max).max(log_return);
         let step = self.nodes.last().map_or(0.0, |node| node.0);
         let spread = if step > 0.0 { (seen + periods as f64 * step).min(self.accepted.max).max(seen) } else { seen };
         self.assumed.iter().fold(spread, |highest, (atom, _)| highest.max(*atom))

@@ -145,10 +145,15 @@ impl Laws {
     /// Returns an upper bound on the returns of the centre while `periods` more returns are learned, each of them at
     /// most the bound before it. For estimates that are learned, it is the best return accepted.
     pub fn best_return(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
+        self.best_return_with(law, f64::NEG_INFINITY, periods)
+    }
+
+    /// Returns the bound of [`Self::best_return`] after `log_return` has been learned as well.
+    pub fn best_return_with(&self, law: &EmpiricalDistribution, log_return: f64, periods: usize) -> f64 {
         match (self.learns, self.framework.is_parametric()) {
             (false, _) => self.fixed().set.best_return(),
             (true, true) => LOG_RETURN,
-            (true, false) => self.centring.highest(law, periods),
+            (true, false) => self.centring.highest(law, log_return, periods),
         }
     }
 

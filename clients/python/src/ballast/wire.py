@@ -419,10 +419,9 @@ ConstantMix: TypeAlias = float
 
 class ExpectedError(TypedDict):
     """
-    Root mean square errors of the value of a step, in basis points of the certainty equivalent: over the design's own
-    law of its states, at the holdings it was solved at. They do not cover states that this law seldom visits, such as
-    those after a return beyond the record, where the value may be off by a hundred times as much. Nor do they cover the
-    first step of a design that starts at one law.
+    Root mean square errors of the value of a step, in basis points of the certainty equivalent, at any holding. They
+    are over the design's own law of its states, of which one in eight leaps beyond the record: one return on the way to
+    it may be anything within the support.
     """
 
     own: float
