@@ -323,8 +323,9 @@ async fn what_the_bank_paid_and_what_was_added_count_in_their_period_alone() {
 async fn nobody_puts_right_what_is_not_his() {
     let mut app = opened().await;
     assert_eq!(app.observe(1, 0.01).await.0, 200);
-    let (owner, stranger) = (app.key("default", "read,operate").await, app.key("south", "read,operate").await);
-    let reader = app.key("default", "read").await;
+    let (stranger, reader) = (app.key("south", "read,operate").await, app.key("default", "read").await);
+    // The key made last: once it is known, all are.
+    let owner = app.key("default", "read,operate").await;
     app.enter(&owner).await;
     let apply_correction = json!({ "period": 1, "log_return": 0.02 });
     for (key, status) in [(&stranger, 404), (&reader, 403), (&owner, 200)] {

@@ -330,7 +330,8 @@ impl App {
         self.send(Method::DELETE, path, None).await.0
     }
 
-    /// Waits until keys created beside the service are in force, and sends this one from then on.
+    /// Waits until keys created beside the service are in force, and sends this one from then on. Of several keys, the one
+    /// created last must be entered first: the others are known by then.
     pub async fn enter(&mut self, key: &str) {
         for (shown, is_turned_away) in [("", true), (key, false)] {
             self.hold(shown);
