@@ -193,6 +193,24 @@ def certainty_equivalent(utility, value):
     return (1 + (1 - a) * value) ** (1 / (1 - a))
 
 
+def largest_gain(problem, question):
+    """G, of frameworks that learn the law of the returns seen; the others are far from theirs."""
+    if problem["framework"] not in ("adaptive", "plug_in"):
+        return math.inf
+    periods, centre = problem["horizon"] - question["step"], problem.get("centre", {"kind": "empirical"})
+    best = max(question["returns"])
+    if centre["kind"] == "smoothed":
+        best += periods * centre["bandwidth"] * math.sqrt(5 + math.sqrt(10))
+    if centre["kind"] == "mixed":
+        best = max(best, *centre["history"])
+    best = min(best, (problem.get("support") or {}).get("max", 5.0)) if centre["kind"] == "smoothed" else best
+    highest = 1.0 if any(contributions(problem)) else problem["action_interval"][1]
+    growth = periods * math.log1p(highest * max(math.exp(best) / (1 + problem["rate_per_step"]) - 1, 0.0))
+    later = to_come(problem, question["step"])[0]
+    sold = question["wealth"] * (1 - problem["trading_cost"] * question["holding"])
+    return growth + math.log((question["wealth"] + later) / (sold + later))
+
+
 def evaluate(policy, question):
     specification, step = policy["specification"], question["step"]
     problem, holding = specification["problem"], question["holding"]
@@ -205,10 +223,10 @@ def evaluate(policy, question):
     in_hand = (liquidated - later) / liquidated
     kept = (1 - cost * (holding - known)) * (1 - cost * known) / (1 - cost * holding)
     beyond = math.log(in_hand * kept + 1 - in_hand)
-    solution = policy["steps"][step]["solution"]
+    solution, most = policy["steps"][step]["solution"], largest_gain(problem, question)
     bank = (1 + problem["rate_per_step"]) ** (problem["horizon"] - step)
     if solution["kind"] == "single":
-        gain = max(at_holding(solution["floor_gains"], known / highest), 0.0) + beyond
+        gain = min(max(at_holding(solution["floor_gains"], known / highest), 0.0) + beyond, most)
         allocation = into(solution["band"], holding)
         return {"allocation": allocation, "floor_gain": gain, "certainty_equivalent": liquidated * bank * math.exp(gain)}
     found, scaling = features(specification, question), solution["scaling"]
@@ -220,7 +238,7 @@ def evaluate(policy, question):
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
         unit = 1.0 if sees_wealth(problem) else wealth
         value = math.log(certainty_equivalent(problem["utility"], value) * unit / (wealth * bank))
-    gain = max(value, 0.0) + beyond
+    gain = min(min(max(value, 0.0), most) + beyond, most)
     free = 1 - reserve / (question["wealth"] * (1 - cost))
     low, high = 0.0, max(0.0, min(problem["action_interval"][1], free))
     share = question["wealth"] / (question["wealth"] + later)

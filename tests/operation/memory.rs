@@ -44,7 +44,7 @@ fn larger_than_memory() -> Value {
     let history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008];
     let problem = json!({ "horizon": 2, "rate_per_step": 0.002,
             "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": history, "radius": { "rule": "fixed", "radius": 0.001 } });
-    json!({ "problem": problem, "design": { "count": 6000 } })
+    json!({ "problem": problem, "design": { "count": 9000 } })
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -59,7 +59,7 @@ async fn a_job_larger_than_memory_is_refused_and_the_service_lives() {
     let (status, refused) = app.post("/evaluate", &evaluation).await;
     assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("design.count")), "{refused}");
     let returns: Vec<f64> = (0..40).map(|k| 0.02 + 0.03 * (1.7 * f64::from(k)).sin()).collect();
-    let walk = json!({ "log_returns": returns, "rate": 0.002, "periods_per_year": 4, "window": 20, "count": 6000 });
+    let walk = json!({ "log_returns": returns, "rate": 0.002, "periods_per_year": 4, "window": 20, "count": 9000 });
     let (status, refused) = app.post("/backtest", &walk).await;
     assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("count")), "{refused}");
     app.train(&crate::support::specification(2)).await;

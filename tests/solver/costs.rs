@@ -100,9 +100,9 @@ fn a_cost_never_raises_the_value_and_widens_the_band() {
         for holding in [0.0, 0.3, 0.6, 1.0] {
             let advices = policies.each_ref().map(|solved| advice(solved, 0, holding));
             for pair in advices.windows(2) {
-                // Rounding, and the surrogate of the second step.
+                // Rounding, and the surrogate of the second step: a twentieth of a basis point.
                 let grown = pair[1].certainty_equivalent / pair[0].certainty_equivalent - 1.0;
-                assert!(grown < 2e-6, "{utility} {holding}: a cost raises the value by {grown:e}");
+                assert!(grown < 5e-6, "{utility} {holding}: a cost raises the value by {grown:e}");
                 assert!(pair[1].band.low <= pair[0].band.low + 1e-3, "{utility} {holding}: {pair:?}");
                 assert!(pair[1].band.high >= pair[0].band.high - 1e-3, "{utility} {holding}: {pair:?}");
             }

@@ -39,7 +39,7 @@ const GUARDS_PER_POINT: usize = 10;
 /// A return beyond the record on the way to a state.
 struct Leap {
     period: usize,
-    /// Where in the range it goes, from 0 to 1.
+    /// Its place in the range, from 0 to 1.
     place: f64,
     /// True if the range is all that the adversary may use.
     far: bool,

@@ -1168,7 +1168,7 @@ class SurrogateDiagnostics(TypedDict):
     log_likelihood_per_point: float
     """Log likelihood of the scaled targets, at the hyperparameters found."""
     leave_one_out_error: float
-    """Root mean square of the leave-one-out errors, in the target's own unit."""
+    """Root mean square of the leave-one-out errors of up to 500 design points, in the target's own unit."""
     jitter: float
     """Diagonal added to the covariance matrix to factorise it, relative to its diagonal."""
     search: str
