@@ -13,8 +13,7 @@ let careful, bold, one, other;
 
 before(async () => {
   const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
-  // For any record: the picture of what is held moves the average return alone.
-  const design = { count: 60, initial_laws: "resampled" };
+  const design = { count: 40 };
   careful = await trained(ballast.url, { problem, design });
   bold = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, scale: 0.05 }, trading_cost: 0.003 }, design });
   [one, other] = await Promise.all([careful, bold].map(async (policy) => (await call(ballast.url, "/sessions", { policy })).session));
@@ -145,8 +144,8 @@ test("two policies ticked are told by what differs, and by what they hold", asyn
   const low = /A ([\d.]+) %, B ([\d.]+) %/.exec(await at()).slice(1).map(Number);
   await chart.press("End");
   const high = /A ([\d.]+) %, B ([\d.]+) %/.exec(await at()).slice(1).map(Number);
-  // The bold one holds more at either end, and the careful one more where the average return is higher.
-  assert.ok(low[1] > low[0] && high[1] > high[0] && high[0] > low[0], `${low} to ${high}`);
+  // The bold one holds more at either end, and more where the average return is higher.
+  assert.ok(low[1] > low[0] && high[1] > high[0] && high[1] > low[1], `${low} to ${high}`);
 });
 
 test("an address that names no two says how to come by them", async () => {
