@@ -232,9 +232,14 @@ pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
     let strategies = request.frameworks.len() + request.mixes().len();
     let lived = product(&[request.problem.horizon, request.frameworks.len(), LIVED_BYTES]);
     let outcomes = product(&[paths, strategies * ENDED_BYTES + lived + PATH_BYTES]);
+    // With one policy nothing but its design can be less.
+    let (field, value) = match trainings.as_slice() {
+        [(_, sizes, _)] => ("design.count", sizes.count),
+        _ => ("frameworks", request.frameworks.len()),
+    };
     most.cloned()
         .unwrap_or_else(|| Footprint::of("paths", request.paths, LEAST))
-        .and("frameworks", request.frameworks.len(), policies.fold(kept_by_evaluation(request), usize::saturating_add))
+        .and(field, value, policies.fold(kept_by_evaluation(request), usize::saturating_add))
         .and("paths", request.paths, outcomes)
 }
 
