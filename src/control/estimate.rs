@@ -228,15 +228,10 @@ pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
     // Policies frozen at a history are trained on every thread at once.
     let at_once = |framework: Framework| if request.one_policy_for_all(framework) { 1 } else { threads };
     let policies = trainings.iter().map(|(framework, sizes, _)| sizes.policy().saturating_mul(at_once(*framework)));
-    let paths = request.history_count().saturating_mul(request.paths);
     let strategies = request.frameworks.len() + request.mixes().len();
     let lived = product(&[request.problem.horizon, request.frameworks.len(), LIVED_BYTES]);
-    let outcomes = product(&[paths, strategies * ENDED_BYTES + lived + PATH_BYTES]);
-    // With one policy nothing but its design can be less.
-    let (field, value) = match trainings.as_slice() {
-        [(_, sizes, _)] => ("design.count", sizes.count),
-        _ => ("frameworks", request.frameworks.len()),
-    };
+    let outcomes = product(&[request.history_count(), request.paths, strategies * ENDED_BYTES + lived + PATH_BYTES]);
+    let (field, value) = trainings.first().map_or(("frameworks", 0), |(_, sizes, _)| ("design.count", sizes.count));
     most.cloned()
         .unwrap_or_else(|| Footprint::of("paths", request.paths, LEAST))
         .and(field, value, policies.fold(kept_by_evaluation(request), usize::saturating_add))
