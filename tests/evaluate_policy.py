@@ -200,10 +200,10 @@ def largest_gain(problem, question):
     periods, centre = problem["horizon"] - question["step"], problem.get("centre", {"kind": "empirical"})
     best = max(question["returns"])
     if centre["kind"] == "smoothed":
-        best += periods * centre["bandwidth"] * math.sqrt(5 + math.sqrt(10))
+        step = centre["bandwidth"] * math.sqrt(5 + math.sqrt(10))
+        best = min(best + periods * step, (problem.get("support") or {}).get("max", 5.0))
     if centre["kind"] == "mixed":
         best = max(best, *centre["history"])
-    best = min(best, (problem.get("support") or {}).get("max", 5.0)) if centre["kind"] == "smoothed" else best
     highest = 1.0 if any(contributions(problem)) else problem["action_interval"][1]
     growth = periods * math.log1p(highest * max(math.exp(best) / (1 + problem["rate_per_step"]) - 1, 0.0))
     later = to_come(problem, question["step"])[0]

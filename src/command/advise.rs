@@ -8,6 +8,7 @@ use std::fmt;
 use ballast::control::error::FieldError;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::learning::Learning;
+use ballast::control::request::rules::HISTORY_LENGTH;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advice::advise::Advise;
 use ballast::service::advice::advise_assets::AdviseAssets;
@@ -96,7 +97,8 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
 fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
     let holding = arguments.one_holding()?;
     let answer = |returns: &Returns| arguments.question(returns, holding).answer();
-    let advised = answer(returns).map_err(|error| by_option(error, arguments.record.source()))?;
+    let named = |error| by_option(error, returns.rows().len(), arguments.record.source());
+    let advised = answer(returns).map_err(named)?;
     let text = || {
         let coarser: Vec<(&str, Result<f64, FieldError>)> = (returns.coarser().iter())
             .map(|returns| (returns.noun(), answer(returns).map(|advised| advised.advice.allocation)))
@@ -123,7 +125,8 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
         holdings: Some(arguments.holdings_of(&returns.record.assets)?),
         seed: arguments.seed,
     };
-    let advised = question.answer().map_err(|error| by_option(error, arguments.record.source()))?;
+    let named = |error| by_option(error, returns.record.rows.len(), arguments.record.source());
+    let advised = question.answer().map_err(named)?;
     let (noun, periods) = (returns.record.frequency.noun(), returns.record.periods_per_year as f64);
     let text = || words::describe_several(&advised, arguments.wealth, noun, periods);
     Ok(show(&returns.sentence, arguments.json, &advised, text)?)
@@ -179,14 +182,14 @@ impl AdviseArgs {
     }
 }
 
-/// Renames the field of an error to the option that the user knows; `source` determines how many returns are used.
-fn by_option(error: FieldError, source: &'static str) -> FieldError {
+/// Renames the field of an error about `count` returns to the option that the user knows; `source` determines how many
+/// are used.
+fn by_option(mut error: FieldError, count: usize, source: &'static str) -> FieldError {
     if error.field == "problem.history" {
-        return FieldError {
-            field: source.into(),
-            rule: format!("{}; --window keeps the last ones", error.rule),
-            ..error
-        };
+        if count > *HISTORY_LENGTH.end() {
+            error.rule.push_str("; --window keeps the last ones");
+        }
+        return FieldError { field: source.into(), ..error };
     }
     if let Some(column) = error.field.strip_prefix("holdings.") {
         return FieldError { value: format!("{column}={}", error.value), field: "--holding".into(), ..error };

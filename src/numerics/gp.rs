@@ -12,13 +12,13 @@ pub mod fit;
 pub mod likelihood;
 pub mod matern;
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::numerics::gp::cholesky::{Cholesky, Singular, factor_with_jitter};
+use crate::numerics::gp::likelihood::log_likelihood;
 
 /// Hyperparameters of a Gaussian process: l_i in the units of input i, s2 and noise in the units of the target squared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -189,7 +189,7 @@ impl GaussianProcess {
     /// Conditions the process on the first of `targets`, with the signal variance that `signal_variance` returns for the
     /// sum of y^T A^-1 y over all of them. Returns it with the log likelihood of all.
     ///
-    ///   K = s2 A,   ln p = -sum y^T A^-1 y / (2 s2) - p ln det A / 2 - p n ln(2 pi s2) / 2
+    ///   K = s2 A
     ///
     /// `unit` holds the length scales, the signal variance 1 and the ratio of noise to signal. Jitter and cost are as in
     /// [`GaussianProcess::condition`], and n^2 more for each target.
@@ -199,7 +199,7 @@ impl GaussianProcess {
         unit: &Hyperparameters,
         signal_variance: impl FnOnce(f64) -> f64,
     ) -> Result<(GaussianProcess, f64), Singular> {
-        let (values, scaled) = (inputs.nrows() as f64 * targets.len() as f64, unit.scale(inputs));
+        let scaled = unit.scale(inputs);
         let (cholesky, jitter) = factor_with_jitter(|| kernel(&scaled, unit))?;
         let squares = |values: &Vec<f64>| {
             let whitened = cholesky.solve_lower(values);
@@ -207,9 +207,8 @@ impl GaussianProcess {
         };
         let squares: f64 = targets.iter().map(squares).sum();
         let signal_variance = signal_variance(squares);
-        let log_likelihood = -0.5 * squares / signal_variance
-            - 0.5 * targets.len() as f64 * cholesky.log_determinant()
-            - 0.5 * values * (TAU * signal_variance).ln();
+        let counts = [targets.len(), inputs.nrows()];
+        let log_likelihood = log_likelihood(squares, signal_variance, cholesky.log_determinant(), counts);
         let hyper =
             Hyperparameters { signal_variance, noise_variance: unit.noise_variance * signal_variance, ..unit.clone() };
         let cholesky = cholesky.times(signal_variance.sqrt());

@@ -273,8 +273,7 @@ impl Fitting<'_> {
     ) -> Result<Fitted, TrainError> {
         let Fit { process, log_likelihood, outcome, .. } =
             self.search(surrogate, inputs, &targets.scaled, Some(start))?;
-        let (points, left_out) = (inputs.nrows(), inputs.nrows().min(LEFT_OUT));
-        let left_out: Vec<usize> = (0..left_out).map(|k| k * points / left_out).collect();
+        let left_out = fit::evenly_spaced(LEFT_OUT, inputs.nrows());
         Ok(Fitted {
             left_out: process.leave_one_out(&targets.scaled, &left_out),
             log_likelihood_per_point: log_likelihood / targets.scaled.iter().map(Vec::len).sum::<usize>() as f64,

@@ -186,8 +186,7 @@ impl DesignFitting<'_> {
         if !self.counts.leaps {
             return Ok(error);
         }
-        let range = self.counts.leaping_checks(set);
-        let some = range.clone().zip(self.features(states, range)?).collect();
+        let some = self.numbered(states, self.counts.leaping_checks(set))?;
         let points = self.judges(states, some, 0)?;
         let leaping = Checks::evenly(LEAPING_CHECKS).error(served, self.specification, self.step, points.iter());
         solved.extend(points);
@@ -212,8 +211,7 @@ impl DesignFitting<'_> {
         let fitting = Fitting { specification, names, step, scaling: &scaling, watch };
         let named = |index: &usize| (*index, features[*index].clone());
         let leaps = wanted.saturating_sub(solved.len()).min(self.counts.leaping(wanted).saturating_sub(*leaping));
-        let range = LEAPING + *leaping..LEAPING + *leaping + leaps;
-        let some = range.clone().zip(self.features(states, range)?).collect();
+        let some = self.numbered(states, LEAPING + *leaping..LEAPING + *leaping + leaps)?;
         solved.extend(self.solve(states, some, solved.len(), wanted)?);
         *leaping += leaps;
         let left = wanted.saturating_sub(solved.len());
@@ -238,6 +236,11 @@ impl DesignFitting<'_> {
             chosen.extend(more);
         }
         fitting.surrogates(solved, &start, guards)
+    }
+
+    /// Returns states with their numbers and features.
+    fn numbered(&self, states: &impl Candidates, some: Range<usize>) -> Result<Vec<(usize, Features)>, TrainError> {
+        Ok(some.clone().zip(self.features(states, some)?).collect())
     }
 
     fn features(&self, states: &impl Candidates, some: Range<usize>) -> Result<Vec<Features>, TrainError> {

@@ -39,7 +39,7 @@ pub struct StepSurrogates {
     pub policy: StoredSurrogate,
     /// The guard: states whose predicted standard deviation of the value target exceeds this, in units of the value's
     /// `scale`, lie outside the design. It is the 99.5 % quantile of the deviations at fresh states of the design's own
-    /// law, if the law is part of the state. Otherwise it is that quantile of the leave-one-out deviations at the
+    /// law, if the law is part of the state. Otherwise it is that quantile of the leave-one-out deviations at up to 500
     /// design points.
     pub deviation_limit: f64,
 }

@@ -48,9 +48,12 @@ const PATHS: usize = 64;
 
 /// Returns the log-returns of a fund that is rebalanced to the shares `fund` every period: `ln sum_i theta_i e^(z_i)`.
 pub fn fund_returns(rows: &[Vec<f64>], fund: &[f64]) -> Vec<f64> {
-    let of =
-        |row: &Vec<f64>| row.iter().zip(fund).map(|(log_return, share)| share * log_return.exp()).sum::<f64>().ln();
-    rows.iter().map(of).collect()
+    rows.iter().map(|row| growth(row.iter().map(|log_return| log_return.exp()), fund).ln()).collect()
+}
+
+/// Returns `sum_i theta_i e^(z_i)`, the growth of a fund in a period in which its assets grow by these factors.
+fn growth(growths: impl Iterator<Item = f64>, fund: &[f64]) -> f64 {
+    growths.zip(fund).map(|(growth, share)| share * growth).sum()
 }
 
 /// Bridges of all funds of the assets with log-returns `rows`, one row a date, at least two dates.
@@ -195,21 +198,20 @@ impl<'a> FundBridges<'a> {
 
 /// The returns of a fund in order.
 struct SortedFund {
-    /// `sum_i theta_i e^(z_i)` of each date.
+    /// Its [`growth`] on each date, and the log-return, the log of that.
     growths: Vec<f64>,
-    /// Log-returns of the dates, ascending, with their dates.
-    order: Vec<usize>,
     zeta: Vec<f64>,
+    /// The dates, ascending by log-return.
+    order: Vec<usize>,
 }
 
 impl SortedFund {
     fn new(growths: &[Vec<f64>], fund: &[f64]) -> Self {
-        let of = |row: &Vec<f64>| row.iter().zip(fund).map(|(growth, share)| share * growth).sum::<f64>();
-        let growths: Vec<f64> = growths.iter().map(of).collect();
+        let growths: Vec<f64> = growths.iter().map(|row| growth(row.iter().copied(), fund)).collect();
         let zeta: Vec<f64> = growths.iter().map(|growth| growth.ln()).collect();
         let mut order: Vec<usize> = (0..zeta.len()).collect();
         order.sort_by(|&left, &right| zeta[left].total_cmp(&zeta[right]));
-        SortedFund { growths, order, zeta }
+        SortedFund { growths, zeta, order }
     }
 
     /// Returns the dates but the last, ascending by log-return, each with the gap to the next.

@@ -107,12 +107,9 @@ pub fn fit(
         curvature_of_a_row = search.curvature_of_a_row(&point);
     }
     shorten(&mut point, inputs.ncols());
-    let (some_inputs, some_targets) = evenly(n.min(SEARCHED), inputs, targets);
+    let (some_inputs, some_targets) = evenly(SEARCHED, inputs, targets);
     let search = LikelihoodSearch { inputs: &some_inputs, targets: &some_targets, bounds, stop };
     let minimum = search.run(&point, curvature_of_a_row.as_ref())?;
-    if stop.load(Ordering::Relaxed) {
-        return Err(FitError::Stopped);
-    }
     let unit = hyperparameters(&minimum.point, 1.0);
     let values = n * targets.len();
     let signal_variance = |squares: f64| bounds.signal_variance(unit.noise_variance, squares / values as f64);
@@ -120,9 +117,15 @@ pub fn fit(
     Ok(Fit { process, log_likelihood, evaluations: evaluations + minimum.evaluations, outcome: minimum.outcome })
 }
 
-/// Returns so many evenly spaced rows, with the targets there.
+/// Returns the numbers of `count` evenly spaced ones of `all` rows, ascending; all of them if there are no more.
+pub fn evenly_spaced(count: usize, all: usize) -> Vec<usize> {
+    let count = count.min(all);
+    (0..count).map(|k| k * all / count).collect()
+}
+
+/// Returns up to so many evenly spaced rows, with the targets there.
 fn evenly(rows: usize, inputs: &DMatrix<f64>, targets: &[Vec<f64>]) -> (DMatrix<f64>, Vec<Vec<f64>>) {
-    let chosen: Vec<usize> = (0..rows).map(|k| k * inputs.nrows() / rows).collect();
+    let chosen = evenly_spaced(rows, inputs.nrows());
     let some = |values: &Vec<f64>| chosen.iter().map(|&row| values[row]).collect();
     (inputs.select_rows(&chosen), targets.iter().map(some).collect())
 }

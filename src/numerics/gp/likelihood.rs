@@ -23,16 +23,27 @@ pub fn log_likelihood_and_gradient(
     Some((at.log_likelihood, at.gradient))
 }
 
+/// Returns the log likelihood of p targets y of n values each, given the sum of y^T A^-1 y over them and ln det A:
+///
+///   ln p = -sum y^T A^-1 y / (2 s2) - p ln det A / 2 - p n ln(2 pi s2) / 2,   K = s2 A
+///
+/// Source: Rasmussen and Williams 2006, eq. (2.30).
+/// Checked by: tests/solver/gp.rs, gradients_equal_those_of_scikit_learn.
+pub(super) fn log_likelihood(squares: f64, signal_variance: f64, log_determinant: f64, [p, n]: [usize; 2]) -> f64 {
+    let (p, n) = (p as f64, n as f64);
+    -0.5 * squares / signal_variance - 0.5 * p * log_determinant - 0.5 * p * n * (TAU * signal_variance).ln()
+}
+
 /// Returns the likelihood for the signal variance s2 = `signal_variance(sum y^T A^-1 y)`, with sums over the p targets
 /// y.
 ///
-///   ln p = -sum y^T A^-1 y / (2 s2) - p ln det A / 2 - p n ln(2 pi s2) / 2,     K = s2 A,  A = R(l) + nu I
+///   K = s2 A,   A = R(l) + nu I
 ///   d ln p / d theta = (1/2) sum_ij W_ij dA_ij / d theta,   W = sum alpha alpha^T - p A^-1,   alpha = A^-1 y / s
 ///   dk / d log l_i = (5/3) (1 + r) exp(-r) ((x_i - y_i) / l_i)^2,   r = sqrt(5) scaled distance
 ///
 /// `unit` holds the length scales l, the signal variance 1 and the noise ratio nu. `None` if A is singular to working
 /// precision. Needs one factorisation and one inverse: cost O(n^3), and O(n^2 d) for the contraction.
-/// Source: Rasmussen and Williams 2006, eqs. (2.30) and (5.9).
+/// Source: Rasmussen and Williams 2006, eq. (5.9).
 /// Checked by: tests/solver/gp.rs, gradients_equal_those_of_scikit_learn.
 pub(in crate::numerics) fn likelihood(
     inputs: &DMatrix<f64>,
@@ -41,15 +52,13 @@ pub(in crate::numerics) fn likelihood(
     signal_variance: impl FnOnce(f64) -> f64,
     matrices: &mut Matrices,
 ) -> Option<Likelihood> {
-    let (n, p) = (inputs.nrows() as f64, targets.len() as f64);
+    let (n, p) = (inputs.nrows(), targets.len());
     let scaled = unit.scale(inputs);
     let factor = matrices.factor(&scaled, unit)?;
     let mut weights: Vec<Vec<f64>> = targets.iter().map(|values| factor.solve(values)).collect();
     let squares = targets.iter().zip(&weights).map(|(values, weights)| matern::dot(values, weights)).sum();
     let signal_variance = signal_variance(squares);
-    let log_likelihood = -0.5 * squares / signal_variance
-        - 0.5 * p * factor.log_determinant()
-        - 0.5 * p * n * (TAU * signal_variance).ln();
+    let log_likelihood = log_likelihood(squares, signal_variance, factor.log_determinant(), [p, n]);
     let root = signal_variance.sqrt();
     weights.iter_mut().flatten().for_each(|weight| *weight /= root);
     factor.inverse_lower(&mut matrices.inverse);
