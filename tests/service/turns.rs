@@ -1,6 +1,6 @@
 //! Tenants take turns: whatever the others queue, a job at the head of its tenant's queue waits for one claim of each.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::support::place::Place;
 use crate::support::random;
@@ -129,23 +129,25 @@ fn many(numbers: &str) -> [String; 3] {
     ]
 }
 
-/// Claims in turn with [`MANY`] jobs queued; seconds a claim.
-async fn claims(place: &Place) -> f64 {
+/// Claims jobs of two tenants in turn, [`MANY`] of one, and returns the seconds of the fastest claim: what else the machine
+/// does, does not slow down all of them.
+async fn fastest_claim(place: &Place) -> f64 {
     const CLAIMS: usize = 40;
     let store = place.open().await;
     for job in 0..CLAIMS / 2 {
         queue(&store, format!("job_{job}"), 0).await;
     }
-    let started = Instant::now();
-    let mut own = 0;
+    let (mut own, mut fastest) = (0, Duration::MAX);
     for _ in 0..CLAIMS {
+        let started = Instant::now();
         let claimed = store.claim_job("worker", 30, 0).await.unwrap().unwrap();
         own += usize::from(claimed.row.tenant == tenant(0));
         let outcome = JobOutcome::Failed { reason: "enough".into() };
         assert!(store.finish_job(&claimed.row.job, claimed.attempt, outcome, 1).await.unwrap());
+        fastest = fastest.min(started.elapsed());
     }
     assert_eq!(own, CLAIMS / 2, "every other claim");
-    started.elapsed().as_secs_f64() / CLAIMS as f64
+    fastest.as_secs_f64()
 }
 
 /// The queue's length must not show: a claim that reads the queue takes a hundred times this.
@@ -164,7 +166,7 @@ async fn a_claim_costs_little_however_much_is_queued_over_a_folder() {
         sqlx::query(AssertSqlSafe(statement)).execute(&mut connection).await.unwrap();
     }
     connection.close().await.unwrap();
-    let seconds = claims(&place).await;
+    let seconds = fastest_claim(&place).await;
     println!("{:.2} ms to claim and end one of {MANY} jobs over a folder", 1000.0 * seconds);
     assert!(seconds < LONGEST, "{seconds} s");
 }
@@ -177,7 +179,7 @@ async fn a_claim_costs_little_however_much_is_queued_over_a_database() {
     for statement in many(&format!("WITH numbers (n) AS (SELECT generate_series(1, {MANY}))")) {
         crate::support::postgres::execute(url, &statement).await;
     }
-    let seconds = claims(&place).await;
+    let seconds = fastest_claim(&place).await;
     println!("{:.2} ms to claim and end one of {MANY} jobs over a database", 1000.0 * seconds);
     assert!(seconds < LONGEST, "{seconds} s");
 }
