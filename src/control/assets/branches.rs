@@ -8,7 +8,7 @@
 //! only these points and the atom in place.
 
 use super::PortfolioStep;
-use crate::control::problem::utility::RelativeUtility;
+use super::centred::CentredUtility;
 use crate::numerics::machine::interruption;
 use crate::numerics::transport::water_filling::{FillingPhase, Levelling};
 
@@ -97,7 +97,7 @@ impl Branches {
     }
 
     /// Adds the branch that leaves the atom in place.
-    fn leave(&mut self, utility: RelativeUtility, allocation: &[f64], growths: &[f64]) {
+    fn leave(&mut self, utility: CentredUtility, allocation: &[f64], growths: &[f64]) {
         let start = self.excesses.len();
         self.excesses.extend(growths.iter().map(|growth| growth - 1.0));
         let row = &self.excesses[start..];
@@ -180,7 +180,7 @@ struct Inside {
 /// no minimum because the payoff falls without bound.
 fn local_minima(
     phases: &[FillingPhase],
-    utility: RelativeUtility,
+    utility: CentredUtility,
     price: f64,
     mut slope: f64,
     last: &mut Inside,
@@ -227,10 +227,10 @@ fn local_minima(
 
 /// Returns the y below `peak` at which `U'(b + y) y / rate` is the price. Newton's method in ln y runs from the left on
 /// the logarithms, whose difference is concave there.
-fn inside(phase: &FillingPhase, utility: RelativeUtility, price: f64, peak: f64) -> f64 {
+fn inside(phase: &FillingPhase, utility: CentredUtility, price: f64, peak: f64) -> f64 {
     let &FillingPhase { fixed, speed, rate, low, .. } = phase;
     let target = price * rate;
-    let mut moving = if matches!(utility, RelativeUtility::Log) {
+    let mut moving = if utility.is_log() {
         // y / (b + y) = target.
         return (target * fixed / (1.0 - target)).min(peak);
     } else {

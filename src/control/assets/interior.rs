@@ -23,9 +23,10 @@ use super::cuts::{Cut, Cuts, dot};
 use super::trading::Tangent;
 use crate::numerics::machine::interruption;
 
-/// Largest number of calls of the adversary, and of steps between two.
+/// Largest number of calls of the adversary, of steps between two, and of all steps: most searches need 30 to 120.
 const ROUNDS: usize = 60;
 const STEPS: usize = 60;
+const ALL_STEPS: usize = 400;
 /// The next barrier, as a share of the last one and of the gap to the adversary's answer.
 const REDUCTION: f64 = 0.1;
 const OF_UNKNOWN: f64 = 0.1;
@@ -47,8 +48,6 @@ const TOP_STEPS: usize = 30;
 const TOP_TOLERANCE: f64 = 1e-10;
 /// Smallest radius used in the search.
 const LEAST_RADIUS: f64 = 1e-9;
-/// Multipliers are kept within this factor of the central path.
-const OFF_CENTRE: f64 = 100.0;
 /// Weight of the default start in a warm start, which keeps it inside the bounds.
 const DRAWN_INSIDE: f64 = 0.002;
 /// Above the least sum allowed, the shares of a start sum to at most this over the risk aversion.
@@ -98,6 +97,8 @@ pub(super) struct Interior<'a> {
     /// The tangent of the law with the lowest upper bound; none if no law gave a bound.
     pub tangent: Option<Tangent>,
     pub evaluations: usize,
+    /// Newton steps so far.
+    steps: usize,
 }
 
 /// Returns t with `sum 1 / (f_m - t) = 1 / barrier`, by Newton's method on its reciprocal, which is concave.
@@ -134,7 +135,7 @@ impl<'a> Interior<'a> {
         let lowest = step.total.lowest.min(highest - LEAST_ROOM);
         // Halfway between the bounds of the sum, or at a sum whose total loss still weighs little. Further inside,
         // utilities of a risk aversion of 20 and more are so large that rounding exceeds the gain of a step.
-        let weighs_little = SHARE_AT_START / step.utility.relative_risk_aversion();
+        let weighs_little = SHARE_AT_START / step.utility.risk_aversion();
         let middle = (0.5 * (lowest + highest)).min(lowest + weighs_little);
         let even = middle / assets as f64;
         let mut point = vec![even; assets];
@@ -181,6 +182,7 @@ impl<'a> Interior<'a> {
             upper: f64::INFINITY,
             tangent: None,
             evaluations: 0,
+            steps: 0,
         };
         interior.open();
         interior.ask();
@@ -230,22 +232,29 @@ impl<'a> Interior<'a> {
             let unknown = self.known() - self.ask();
             self.cuts.follow(self.step, &self.point);
             self.update_upper_bound();
-            let found = self.upper - self.lower < tolerance || !self.entering.is_empty();
+            let found = self.upper - self.lower < tolerance;
             if found || !goes_on || self.barrier < LEAST_BARRIER {
                 return;
             }
             self.go_back(unknown);
+            if !self.entering.is_empty() {
+                return;
+            }
             self.learn();
             self.barrier = (REDUCTION * self.barrier).max((OF_UNKNOWN * unknown.abs()).min(self.barrier));
         }
     }
 
     /// Brings the point to the optimum of the known problem, up to the barrier. Returns false if no step can be
-    /// computed.
+    /// computed, or no more are allowed.
     fn solve_known(&mut self) -> bool {
         let mut merit = self.merit();
         self.tame();
         for _ in 0..STEPS {
+            self.steps += 1;
+            if self.steps > ALL_STEPS {
+                return false;
+            }
             interruption::checkpoint();
             let Some(direction) = self.direction() else { return false };
             let next = self.go(&direction, merit);
@@ -329,20 +338,5 @@ impl<'a> Interior<'a> {
             merit += mass * (top + barrier * logarithms);
         }
         merit
-    }
-
-    /// Clamps multipliers that are far off the central path to within a factor of it.
-    fn tame(&mut self) {
-        let near = |multiplier: f64, central: f64| multiplier.max(central / OFF_CENTRE).min(central * OFF_CENTRE);
-        for (atom, mass) in self.step.masses.iter().enumerate() {
-            let of = self.cuts.of(atom);
-            for cut in &mut self.cuts.all[of] {
-                cut.multiplier = near(cut.multiplier, self.barrier * mass / cut.slack);
-            }
-        }
-        for bound in &mut self.bounds {
-            let central = self.barrier * self.bound_weight / bound.slack(&self.point);
-            bound.multiplier = near(bound.multiplier, central);
-        }
     }
 }

@@ -21,6 +21,7 @@
 pub mod advice;
 pub mod advising;
 mod branches;
+mod centred;
 mod certificate;
 pub mod composition;
 mod cuts;
@@ -31,8 +32,10 @@ mod trading;
 pub mod worst;
 
 use self::branches::Branches;
+use self::centred::CentredUtility;
 use self::interior::Interior;
 use self::trading::{Tangent, Trading};
+use self::worst::RobustValue;
 use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
@@ -47,9 +50,10 @@ const CONTENT: f64 = 1e-7;
 /// Relative rounding of a mean of utilities. If a utility hardly grows any more, inverting a value rounded up would
 /// give infinity.
 const ROUNDING: f64 = 1e-14;
-/// First barriers of successive searches, in relative utility, and the barrier of a warm start.
+/// First barriers of successive searches, in relative utility; of a warm start; and of one from half the risk aversion.
 const BARRIERS: [f64; 4] = [1e-3, 1e-4, 1e-2, 1e-1];
 const BARRIER_NEAR: f64 = 1e-6;
+const BARRIER_CONTINUED: f64 = 1e-2;
 /// Smaller shares are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 
@@ -64,7 +68,7 @@ pub struct PortfolioStep {
     least_growths: Vec<f64>,
     ground: GroundMetric,
     radius: f64,
-    utility: RelativeUtility,
+    utility: CentredUtility,
     total: ActionInterval,
     trading: Trading,
 }
@@ -98,6 +102,18 @@ pub struct AssetsSolution {
 }
 
 impl AssetsSolution {
+    /// True if nothing is gained by searching on.
+    fn is_certified(&self) -> bool {
+        self.bound - self.value < CONTENT
+    }
+
+    /// Returns the better of two solutions, with the lower bound and the evaluations of both.
+    fn or(self, other: AssetsSolution) -> Self {
+        let (bound, evaluations) = (self.bound.min(other.bound), self.evaluations + other.evaluations);
+        let better = if other.value > self.value || self.value.is_nan() { other } else { self };
+        AssetsSolution { bound, evaluations, ..better }
+    }
+
     /// Warns if the search ended before its bounds met.
     pub fn caution(&self) -> Option<Caution> {
         Caution::not_certified(self.bound - self.value)
@@ -123,7 +139,7 @@ impl PortfolioStep {
             least_growths: law.floors.iter().map(|floor| floor.exp() / bank).collect(),
             ground,
             radius: law.radius,
-            utility,
+            utility: utility.into(),
             total,
             trading: Trading::default(),
         }
@@ -131,22 +147,42 @@ impl PortfolioStep {
 
     /// Solves for the best allocation. `near` is a warm start: the solution of a similar step.
     ///
-    /// If a search leaves its bounds apart, others follow from starts further inside or out; bounds of all of them
-    /// hold. Cost: at most 5 searches, each with some 10 to 40 evaluations of O(n d ln d), and 30 to 120 steps of
-    /// O(n d^2), d the number of assets in the search.
+    /// If a search leaves its bounds apart, others follow from starts further inside or out, and then from the
+    /// solutions at lower risk aversions; bounds of all of them hold. Cost: 1 search, and up to 12 if they fail, each
+    /// with some 10 to 40 evaluations of O(n d ln d), and 30 to 120 steps of O(n d^2), d the number of assets in the
+    /// search.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
         let barrier = if near.is_some() { BARRIER_NEAR } else { BARRIERS[0] };
         let (mut best, _) = self.search(self.first_held(near), near, barrier);
         for barrier in BARRIERS.into_iter().skip(usize::from(near.is_none())) {
-            if best.bound - best.value < CONTENT {
+            if best.is_certified() {
                 break;
             }
-            let (next, _) = self.search((0..self.assets).collect(), None, barrier);
-            let (bound, evaluations) = (best.bound.min(next.bound), best.evaluations + next.evaluations);
-            let better = if next.value > best.value { next } else { best };
-            best = AssetsSolution { bound, evaluations, ..better };
+            best = best.or(self.search((0..self.assets).collect(), None, barrier).0);
+        }
+        if !best.is_certified() {
+            best = self.continue_from_milder(best);
         }
         self.at_least_the_bank(best)
+    }
+
+    /// Solves at a low risk aversion, and follows the solution while it is doubled up to this one, each time around the
+    /// wealth that the last solution is worth.
+    fn continue_from_milder(&self, failed: AssetsSolution) -> AssetsSolution {
+        let mut utilities: Vec<CentredUtility> =
+            std::iter::successors(Some(self.utility), |utility| utility.milder()).skip(1).collect();
+        let Some(mildest) = utilities.pop() else { return failed };
+        let with = |utility: CentredUtility| PortfolioStep { utility, ..self.clone() };
+        let (mut near, _) = with(mildest).search(self.first_held(None), None, BARRIERS[0]);
+        for utility in utilities.into_iter().rev().chain([self.utility]) {
+            let log_wealth = with(utility.around(near.value)).worth(&near.allocation).value;
+            let step = with(utility.around(log_wealth));
+            let RobustValue { value, multiplier, .. } = step.worth(&near.allocation);
+            let start = AssetsSolution { value, bound: f64::INFINITY, multiplier, ..near };
+            let (found, _) = step.search(step.first_held(Some(&start)), Some(&start), BARRIER_CONTINUED);
+            near = start.or(found);
+        }
+        failed.or(near)
     }
 
     /// Returns the assets that a search begins with: those held or in the warm start; if there are none, the one of

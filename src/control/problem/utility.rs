@@ -144,9 +144,12 @@ impl RelativeUtility {
     }
 
     /// Returns the log gain whose utility is `value`: the log certainty equivalent over the floor. It is minus infinity
-    /// if no wealth above 0 has so low a utility.
+    /// if no wealth above 0 has so low a utility, and infinity if no wealth has so high a one.
+    /// Checked by: `tests::no_wealth_has_a_utility_beyond_the_highest`.
     pub fn inverse(self, value: f64) -> f64 {
         match self {
+            RelativeUtility::Exponential { k } if value >= 1.0 / k => f64::INFINITY,
+            RelativeUtility::Power { eta } if value >= 1.0 / (eta - 1.0) => f64::INFINITY,
             RelativeUtility::Exponential { k } => (-(-k * value).ln_1p() / k).max(-1.0).ln_1p(),
             RelativeUtility::Power { eta } => ((1.0 - eta) * value).ln_1p() / (1.0 - eta),
             RelativeUtility::Log => value,
@@ -204,6 +207,20 @@ pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The highest utilities are 1 / k and 1 / (eta - 1).
+    #[test]
+    fn no_wealth_has_a_utility_beyond_the_highest() {
+        for (utility, highest) in
+            [(RelativeUtility::Exponential { k: 140.7 }, 1.0 / 140.7), (RelativeUtility::Power { eta: 3.7 }, 1.0 / 2.7)]
+        {
+            for value in [highest, 1.1 * highest, f64::INFINITY] {
+                assert_eq!(utility.inverse(value), f64::INFINITY);
+            }
+            assert!(utility.inverse(0.999 * highest).is_finite());
+        }
+        assert_eq!(RelativeUtility::Exponential { k: 2.0 }.inverse(f64::NEG_INFINITY), f64::NEG_INFINITY);
+    }
 
     #[test]
     fn many_values_equal_one_by_one() {

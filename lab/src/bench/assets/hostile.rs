@@ -69,8 +69,8 @@ mod tests {
     fn a_hundred_hostile_steps_are_certified_or_warn_and_the_bank_replaces_no_failed_search() {
         let answers: Vec<Answer> = (0..100).map(|number| answer(&hostile(number))).collect();
         assert!(answers.iter().all(|answer| answer.is_honest && !answer.is_bank));
-        // Nine warn that they are not certified. More would be a step back.
+        // Five warn that they are not certified. More would be a step back.
         let open = answers.iter().filter(|answer| answer.gap > CERTIFIED).count();
-        assert!(open <= 9, "{open} of 100 are not certified");
+        assert!(open <= 5, "{open} of 100 are not certified");
     }
 }

@@ -12,10 +12,12 @@ use crate::numerics::machine::dispatch::dispatched;
 const TO_BOUND: f64 = 0.95;
 /// A move with a smaller share of its atom's mass is left out of the matrix.
 const NO_MASS: f64 = 1e-13;
+/// Multipliers are kept within this factor of the central path.
+const OFF_CENTRE: f64 = 100.0;
 /// Rows of the matrix start at multiples of this.
 const ROW_START: usize = 4;
-/// Largest rounding error of a pivot, as a share of the diagonal.
-const ROUNDING: f64 = 1e-11;
+/// Shares of the diagonal that are added to it until all pivots are above rounding. A damped step is still uphill.
+const DAMPINGS: [f64; 4] = [1e-11, 1e-8, 1e-5, 1e-2];
 
 /// A step of everything but the tops t_j, and how much of it keeps bounds and multipliers positive.
 pub(super) struct Direction {
@@ -37,21 +39,24 @@ struct System {
 }
 
 impl System {
-    /// Adds `weight v v'`.
+    /// Adds `weight v v'`, from the diagonal on, or a little before it to fill whole registers.
     #[inline(always)]
     fn add(&mut self, weight: f64, vector: &[f64]) {
-        self.add_rows(weight, vector, vector);
-    }
-
-    /// Adds `weight v w'` in the rows of v, from the diagonal on, or a little before it to fill whole registers.
-    #[inline(always)]
-    fn add_rows(&mut self, weight: f64, rows: &[f64], vector: &[f64]) {
         let size = vector.len();
-        for (index, (row, entry)) in self.matrix.chunks_exact_mut(size).zip(rows).enumerate() {
+        for (index, (row, entry)) in self.matrix.chunks_exact_mut(size).zip(vector).enumerate() {
             let from = index - index % ROW_START;
             let scaled = weight * entry;
             row[from..].iter_mut().zip(&vector[from..]).for_each(|(sum, value)| *sum += scaled * value);
         }
+    }
+
+    /// Returns the solution with its diagonal raised by a share; `None` if it is not positive definite even then.
+    fn solve(&self, damping: f64) -> Option<Vec<f64>> {
+        let mut matrix = DMatrix::from_column_slice(self.size, self.size, &self.matrix);
+        for index in 0..self.size {
+            matrix[(index, index)] *= 1.0 + damping;
+        }
+        Some(Cholesky::factor(matrix)?.solve(&self.right))
     }
 }
 
@@ -67,7 +72,7 @@ impl Interior<'_> {
     ///
     /// the right-hand side being the gradient of the barrier function: at the best t_j the sum of q is p_j.
     ///
-    /// `None` if the matrix is not positive definite to working precision. Cost O(n d^2) for n moves.
+    /// `None` if the matrix is not positive definite even if damped. Cost O(n d^2) for n moves.
     pub(super) fn direction(&self) -> Option<Direction> {
         let size = self.step.assets() + 1;
         let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
@@ -89,11 +94,7 @@ impl Interior<'_> {
             system.right.iter_mut().zip(&bound.direction).for_each(|(sum, part)| *sum += target * part);
             system.add(bound.multiplier / slack, &bound.direction);
         }
-        for diagonal in system.matrix.iter_mut().step_by(system.size + 1) {
-            *diagonal *= 1.0 + ROUNDING;
-        }
-        let matrix = DMatrix::from_vec(system.size, system.size, system.matrix);
-        let point = Cholesky::factor(matrix)?.solve(&system.right);
+        let point = DAMPINGS.iter().find_map(|damping| system.solve(*damping))?;
         let gain = dot(&system.right, &point);
         let atoms = stiffnesses.iter().zip(gradients.chunks_exact(size));
         let tops: Vec<f64> = atoms.map(|(stiffness, gradient)| dot(gradient, &point) / stiffness).collect();
@@ -118,37 +119,45 @@ impl Interior<'_> {
 
     /// Adds the contribution of the moves of an atom, with its t eliminated. Returns the sum of theta, and puts that of
     /// theta g into `whole`.
+    ///
+    /// The bracket is summed as `sum theta (g - m)(g - m)'`, m the mean of the g weighted by theta: a difference of two
+    /// sums would be rounding alone where the slopes of the moves differ by orders of magnitude. Two moves give
+    /// `theta_1 theta_2 / (theta_1 + theta_2) (g_1 - g_2)(g_1 - g_2)'`.
     #[inline(always)]
     fn add_atom(&self, atom: usize, whole: &mut [f64], system: &mut System) -> f64 {
-        let (last, mass) = (system.size - 1, self.step.masses[atom]);
-        let mut along = [0.0; MOST_ASSETS + 1];
+        let (mass, of) = (self.step.masses[atom], self.cuts.of(atom));
+        let theta = |cut: usize| self.cuts.all[cut].multiplier / self.cuts.all[cut].slack;
         let mut stiffness = 0.0;
-        for cut in self.cuts.of(atom) {
-            let (found, gradient) = (&self.cuts.all[cut], self.cuts.gradient(cut));
-            let (theta, target) = (found.multiplier / found.slack, self.barrier * mass / found.slack);
+        for cut in of.clone() {
+            let (theta, target) = (theta(cut), self.barrier * mass / self.cuts.all[cut].slack);
             stiffness += theta;
-            for ((entry, sum), right) in gradient.iter().zip(whole.iter_mut()).zip(&mut system.right) {
+            for ((entry, sum), right) in self.cuts.gradient(cut).iter().zip(whole.iter_mut()).zip(&mut system.right) {
                 *sum += theta * entry;
                 *right += target * entry;
             }
+        }
+        let mut difference = [0.0; MOST_ASSETS + 1];
+        let difference = &mut difference[..whole.len()];
+        if of.len() == 2 {
+            let gradients = self.cuts.gradient(of.start).iter().zip(self.cuts.gradient(of.start + 1));
+            difference.iter_mut().zip(gradients).for_each(|(entry, (left, right))| *entry = left - right);
+            system.add(theta(of.start) * theta(of.start + 1) / stiffness, difference);
+        }
+        for cut in of.clone() {
+            let found = &self.cuts.all[cut];
             if found.multiplier < NO_MASS * mass {
                 continue;
             }
-            let curvature = found.multiplier * found.curvature;
+            if of.len() > 2 {
+                let gradients = difference.iter_mut().zip(self.cuts.gradient(cut)).zip(whole.iter());
+                gradients.for_each(|((entry, gradient), sum)| *entry = gradient - sum / stiffness);
+                system.add(theta(cut), difference);
+            }
+            system.add(found.multiplier * found.curvature, self.cuts.still(cut));
             if let Some(following) = found.follows {
-                system.add(theta, gradient);
-                system.add(curvature, self.cuts.still(cut));
                 self.add_moving(found.multiplier * following.slope, self.cuts.moving(cut), system);
-            } else {
-                // Except for the price, the gradient is proportional to the excess growth of the fixed move.
-                let both = theta * found.slope * found.slope + curvature;
-                along[..last].copy_from_slice(self.cuts.excess(cut));
-                along[last] = theta * found.slope * found.cost / both;
-                system.add_rows(both, &along[..last], &along[..=last]);
-                system.matrix[last * system.size + last] += theta * found.cost * found.cost;
             }
         }
-        system.add(-1.0 / stiffness, whole);
         stiffness
     }
 
@@ -203,5 +212,20 @@ impl Interior<'_> {
         });
         let bounds = bounds.collect();
         Direction { point, multipliers, bounds, length, dual_length, gain }
+    }
+
+    /// Clamps multipliers that are far off the central path to within a factor of it.
+    pub(super) fn tame(&mut self) {
+        let near = |multiplier: f64, central: f64| multiplier.max(central / OFF_CENTRE).min(central * OFF_CENTRE);
+        for (atom, mass) in self.step.masses.iter().enumerate() {
+            let of = self.cuts.of(atom);
+            for cut in &mut self.cuts.all[of] {
+                cut.multiplier = near(cut.multiplier, self.barrier * mass / cut.slack);
+            }
+        }
+        for bound in &mut self.bounds {
+            let central = self.barrier * self.bound_weight / bound.slack(&self.point);
+            bound.multiplier = near(bound.multiplier, central);
+        }
     }
 }
