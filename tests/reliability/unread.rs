@@ -171,7 +171,7 @@ pub fn log_return(number: usize) -> f64 {
 }
 
 /// A training whose sessions may go on without an end, with so many bridge paths.
-pub fn unending(paths: usize) -> Value {
+fn unending(paths: usize) -> Value {
     let mut training = specification(2);
     training["problem"]["radius"]["paths"] = json!(paths);
     training["problem"]["learning"] = json!({ "kind": "decay", "half_life": 1 });

@@ -10,44 +10,40 @@ use crate::neighbours::{ANSWERED, Attack, attack_time, until};
 use crate::scene::{Outcome, Tally, import};
 use crate::server::Site;
 use crate::support::patience::{patience, within};
-use crate::support::trained;
+use crate::support::{specification, trained};
 use crate::tenants::{Pulse, Tenants};
-use crate::unread::{imported, log_return, made_of, unending};
+use crate::unread::{imported, made_of};
 
 pub async fn batches(trials: usize) -> Outcome {
     Tenants::attacked(Site::limited(&["--memory-limit", "256MB"]), trials, Attack::Batch).await
 }
 
-/// Clients with batches of as many reports as one may have: threads and memory stay within what they may be.
+/// A client with batches of as many reports as one may have: threads and memory stay within what they may be.
 pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
-    const CLIENTS: usize = 4;
-    const SESSIONS: usize = 250;
-    const RETURNS: usize = 600;
-    const PATHS: usize = 2000;
+    const SESSIONS: usize = 1000;
+    const PATHS: usize = 20_000;
+    const HORIZON: usize = 4;
     const MOST_THREADS: usize = 64;
     const MOST_MB: usize = 300;
     let caller = &tenants.neighbour;
-    // Each client reports to sessions of its own, so that every report is recorded, and their records are so long that
-    // the radius after a report is work for another thread.
-    let opening = json!({ "policy": imported(caller, &trained(&unending(PATHS))).await?, "rolling": true,
-        "history": (0..RETURNS).map(log_return).collect::<Vec<_>>() });
-    let opening = (0..CLIENTS).map(|_| open(caller, &opening, SESSIONS));
-    let sessions = join_all(opening).await;
+    // After the first report of a period, the radius of the next one is work for another thread, for which all reports
+    // of the batch wait.
+    let mut training = specification(HORIZON);
+    training["problem"]["radius"]["paths"] = json!(PATHS);
+    let opening = json!({ "policy": imported(caller, &trained(&training)).await? });
+    let sessions = open(caller, &opening, SESSIONS).await;
     let pulse = tenants.pulse("").await?;
     let (end, mut threads) = (Instant::now() + attack_time(), 0);
-    let reporting = join_all(sessions.iter().map(async |sessions| {
+    let reporting = async {
         let (caller, mut reports) = (caller.another(), 0);
-        for period in 1.. {
-            if Instant::now() > end {
-                break;
-            }
+        for period in (1..=HORIZON).take_while(|_| Instant::now() < end) {
             let report = |session: &String| json!({ "session": session, "period": period, "log_return": 0.001 });
             let batch: Vec<Value> = sessions.iter().map(report).collect();
             caller.post("/observe", &Value::Array(batch)).await;
             reports += 1;
         }
         reports
-    }));
+    };
     let watching = async {
         while Instant::now() < end {
             threads = threads.max(tenants.server.threads());
@@ -57,7 +53,6 @@ pub async fn batch(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String
     let (calls, ()) = tokio::join!(reporting, watching);
     pulse.stop().await.report(within(ANSWERED), tally);
     let peak = tenants.server.peak_mb();
-    let calls = calls.into_iter().sum();
     tally.note += &format!(", {calls} batches, {threads} threads, {peak} MB resident at most");
     if threads >= MOST_THREADS || peak > MOST_MB {
         tally.complain(tally.note.clone());
