@@ -16,7 +16,7 @@ use crate::numerics::machine::dispatch::dispatched;
 /// A move found before is kept while it has this share of its atom's mass.
 const LEAST_MASS: f64 = 0.01;
 /// Moves whose costs and growths differ by no more than this share are the same.
-const SAME: f64 = 0.02;
+const SAME: f64 = 0.003;
 
 /// One move of an atom, and the pair of slack and multiplier of `t_j <= payoff`.
 #[derive(Debug, Clone, Copy)]
