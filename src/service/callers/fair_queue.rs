@@ -440,11 +440,13 @@ mod tests {
         let all: Vec<_> = (0..LONG_WAITING).map(|number| busy(&bounded, &name(number), u64::MAX)).collect();
         // All of them have had a turn in each stage, 100 checkpoints and less each.
         until(|| all.iter().all(|(passed, _)| passed.load(Ordering::Relaxed) > 200)).await;
+        let of_all = || all.iter().map(|(passed, _)| passed.load(Ordering::Relaxed)).sum::<u64>();
         for _ in 0..5 {
-            let started = Instant::now();
+            let before = of_all();
             assert!(busy(&bounded, "south", 150).1.await.unwrap().is_ok());
-            // 150 checkpoints of a millisecond and more, and one turn of another; in turn over all it would be some seconds.
-            assert!(started.elapsed() < Duration::from_millis(1000), "{:?}", started.elapsed());
+            // About as many checkpoints beside it, and one turn of another; in turn over all it would be some thousands.
+            let passed = of_all() - before;
+            assert!(passed < 1000, "{passed}");
         }
         all.iter().for_each(|(_, done)| done.abort());
         all_free(&bounded, [1, 1]).await;
