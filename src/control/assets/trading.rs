@@ -89,7 +89,7 @@ impl PortfolioStep {
         let mut step = self.clone();
         step.trading = Trading { holdings: holdings.to_vec(), price: cost };
         let mut best = step.without_assets(cost);
-        let (mut barriers, mut near, mut evaluations) = (BARRIERS.into_iter(), near.cloned(), 0);
+        let (mut barriers, mut near) = (BARRIERS.into_iter(), near.cloned());
         for _ in 0..SEARCHES {
             let barrier = match &near {
                 Some(_) => Some(BARRIER_NEAR),
@@ -97,20 +97,17 @@ impl PortfolioStep {
             };
             let Some(barrier) = barrier else { break };
             let (found, tangent) = step.search(step.first_held(near.as_ref()), near.as_ref(), barrier);
-            evaluations += found.evaluations;
             let found = step.less_cost(found, tangent, cost);
-            let bound = best.bound.min(found.bound);
             let price = step.price_of_trading(&found, cost);
             let stands = (price - step.trading.price).abs() < PRICE_STANDS * price;
             near = (!stands).then(|| found.clone());
-            let better = if found.value > best.value { found } else { best };
-            best = AssetsSolution { bound, ..better };
-            if best.bound - best.value < CONTENT {
+            best = best.or(found);
+            if best.is_certified() {
                 break;
             }
             step.trading.price = price;
         }
-        AssetsSolution { bound: best.bound.max(best.value), evaluations, ..best }
+        AssetsSolution { bound: best.bound.max(best.value), ..best }
     }
 
     /// Returns the solution that sells everything, if that is allowed; nothing is worth more than the best growth seen.
