@@ -67,7 +67,9 @@ test("those that need care are counted among all, and shown without a wait", asy
     await visitQuiet(page, `${ballast.url}/#/`);
     await page.getByText("100 of 10,000 sessions need care: 100 are overdue.").waitFor();
   };
-  await taking(t, overview, '[...document.querySelectorAll("button")].find(({ textContent }) => textContent === "Show them").click()', 'document.querySelector(".foot .note").textContent === "50 of 100"');
+  const show = '[...document.querySelectorAll("button")].find(({ textContent }) => textContent === "Show them").click()';
+  await taking(t, overview, show, '[...document.querySelectorAll("tbody tr")].filter(({ textContent }) => textContent.includes("overdue by")).length === 50');
+  await page.getByText("50 of 100", { exact: true }).waitFor();
   assert.match(page.url(), /state=care/);
   await page.getByRole("button", { name: "Show more" }).click();
   await page.getByText("100 of 100", { exact: true }).waitFor();

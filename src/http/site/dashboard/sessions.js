@@ -30,7 +30,7 @@ export async function view(_, leaving) {
   const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
   const first = await read(chosen, null, leaving);
   const title = "Overview";
-  if (first.total === 0 && !filtered(chosen)) {
+  if (isEmpty(first) && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
     const who = await holderWords(leaving);
     if (policies.length > 0) return { title, actions, body: [lead(), who] };
@@ -54,10 +54,18 @@ const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 /** Returns the entries of `chosen` that differ from the defaults. */
 const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
 
-/** Reads a page of matching sessions; the first one also counts them. */
+const isEmpty = ({ sessions, damaged }) => sessions.length + damaged.length === 0;
+
+/** Reads a page of matching sessions, without counting them: rows are shown before all sessions are read. */
 function read(chosen, after, signal) {
-  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), after === null ? ["count", "care"] : ["after", after]]);
+  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
   return get(`/sessions?${query}`, signal);
+}
+
+/** Counts the matching sessions. */
+async function readTotal({ sort, ...which }, signal) {
+  const { total } = await get(`/sessions?${new URLSearchParams([["limit", 1], ["count", "total"], ...differing(which)])}`, signal);
+  return total;
 }
 
 function overview(chosen, first, leaving) {
@@ -73,7 +81,7 @@ function overview(chosen, first, leaving) {
     remove: (id) => remove(`/sessions/${id}`),
     removed: async () => {
       await Promise.all([ask({}), judgeAll()]);
-      if (page.total === 0 && !filtered(chosen)) dispatchEvent(new HashChangeEvent("hashchange"));
+      if (isEmpty(page) && !filtered(chosen)) dispatchEvent(new HashChangeEvent("hashchange"));
     },
   });
   const tags = h("datalist", { id: "tags" });
@@ -81,7 +89,7 @@ function overview(chosen, first, leaving) {
   const holder = h("div", { class: "listing" });
   const line = h("p", { class: "note", role: "status" });
   const more = h("button", { class: "quiet" }, "Show more");
-  let [entries, damaged, page, asking] = [[], [], first, new AbortController()];
+  let [entries, damaged, page, total, asking] = [[], [], first, null, new AbortController()];
   leaving.addEventListener("abort", () => asking.abort());
   const tellBeyond = () => (beyond.textContent = outsideWords(entries.filter(advice.isOutside).length));
   const sort = (column) => {
@@ -91,16 +99,25 @@ function overview(chosen, first, leaving) {
     ask({ sort: chosen.sort === one ? other : one }).then(() => kept && holder.querySelector("[aria-sort] button")?.focus());
   };
   const add = (now) => {
-    page = { ...now, total: now.total ?? page.total };
+    page = now;
     entries.push(...page.sessions);
     damaged.push(...page.damaged);
     for (const tag of page.sessions.flatMap(({ tags }) => tags)) known.add(tag);
     tags.replaceChildren(...[...known].sort().map((value) => h("option", { value })));
     holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: chosen.sort, sort }) : h("p", {}, "No session matches."));
-    more.hidden = entries.length + damaged.length >= page.total || page.next === null;
+    more.hidden = page.next === null;
     tellBeyond();
-    line.textContent = `${count(entries.length)} of ${count(page.total)}${damagedWords(damaged)}`;
+    tellTotal();
   };
+  const tellTotal = () => {
+    if (total !== null) more.hidden ||= entries.length + damaged.length >= total;
+    line.textContent = `${count(entries.length)} of ${total === null ? "\u2026" : count(total)}${damagedWords(damaged)}`;
+  };
+  const countAll = (signal) =>
+    readTotal(chosen, signal).then((all) => {
+      total = all;
+      tellTotal();
+    }, failed);
   const failed = (error) => {
     if (error.name !== "AbortError") line.textContent = error.message;
   };
@@ -115,9 +132,9 @@ function overview(chosen, first, leaving) {
     try {
       const now = await read(chosen, null, signal);
       advice.forget();
-      entries = [];
-      damaged = [];
+      [entries, damaged, total] = [[], [], null];
       add(now);
+      countAll(signal);
     } catch (error) {
       failed(error);
     }
@@ -140,8 +157,8 @@ function overview(chosen, first, leaving) {
   };
   // The counts of all sessions, independent of the search.
   const judgeAll = () => get("/sessions?limit=1&count=care", leaving).then(({ care }) => judge(care), failed);
-  if (filtered({ ...chosen, state: "" })) judgeAll();
-  else judge(first.care);
+  // One after the other, because each reads all sessions.
+  countAll(asking.signal).then(judgeAll);
   return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
 }
 
