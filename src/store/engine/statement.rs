@@ -69,7 +69,7 @@ impl Statement {
     }
 
     /// Adds a part in which each `?` stands for the next value.
-    pub(in crate::store) fn and<const N: usize>(&mut self, part: &str, values: [Value; N]) {
+    pub(in crate::store) fn and(&mut self, part: &str, values: impl IntoIterator<Item = Value>) {
         let mut values = values.into_iter();
         for (index, piece) in part.split('?').enumerate() {
             if index > 0 {

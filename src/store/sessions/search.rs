@@ -5,17 +5,18 @@
 //! alone decides about a row. The index of [`crate::store::sessions::words`] selects the rows to test:
 //!
 //! - among the words of the search, the list uses the one that the fewest sessions have, counted in the index up to a
-//!   bound;
+//!   bound, and beyond it among the newest and the oldest sessions;
 //! - if they are many, it first tests the sessions next in the list, which suffices unless the matches were opened
 //!   together long ago; then some that the index finds; then all of those.
 //!
 //! Cost: for a rare word, an index lookup for each session that has it; for a common word, [`WINDOW`] rows, and if
-//! those are not enough, one pass over the rows of the index. Checked by: `tests/service/search.rs`,
-//! `tests/operation/lists.rs`.
+//! those are not enough, one pass over the rows of the index, for the beginning of a word over all that begin so. A pass
+//! over the sessions of a word follows only if every word is common and few sessions have all. Checked by:
+//! `tests/service/search.rs`, `tests/operation/lists.rs`.
 
 use crate::store::engine::error::Failure;
 use crate::store::engine::query::{Query, StoreRow, Value};
-use crate::store::engine::statement::Statement;
+use crate::store::engine::statement::{Statement, TABLES};
 use crate::store::sessions::words::{self, Labelled};
 use crate::store::tenants::tenant::Tenant;
 use crate::store::{Store, StoreError};
@@ -23,7 +24,9 @@ use crate::store::{Store, StoreError};
 /// The number of sessions tested before more are.
 const WINDOW: i64 = 500;
 /// The sessions of a word are counted up to this bound.
-const COUNTED: i64 = 100_000;
+const COUNTED: i64 = 10_000;
+/// Words that reach the bound are compared among so many of the newest sessions and as many of the oldest.
+const SAMPLED: i64 = 100;
 /// The most policies that a word may belong to; beyond this it does not narrow the search.
 const MOST_POLICIES: i64 = 100;
 /// The most words of a search that are compared by how many sessions have them; the longest are used.
@@ -80,13 +83,20 @@ impl Store {
         if narrowing.is_empty() {
             return Ok(None);
         }
-        let count = |rows: &[StoreRow]| {
+        let of_each = |rows: &[StoreRow]| -> Result<Vec<i64>, Failure> {
             let Some(row) = rows.first() else { return Ok(Vec::new()) };
-            (0..narrowing.len()).map(|place| row.get::<i64>(&format!("word_{place}"))).collect()
+            (0..narrowing.len()).map(|place| row.get(&format!("word_{place}"))).collect()
         };
-        let counts = self.list("counting words", counting(tenant, &narrowing), count).await?;
-        let rarest = narrowing.into_iter().zip(counts).min_by_key(|(_, count)| *count);
-        Ok(rarest.map(|(found, count)| Rarest { found, count }))
+        let counts = self.list("counting words", counting(tenant, &narrowing), of_each).await?;
+        let ranks = match narrowing.len() {
+            2.. if counts.iter().all(|&count| count == COUNTED) => {
+                self.list("sampling words", sampling(tenant, &narrowing), of_each).await?
+            }
+            _ => counts.clone(),
+        };
+        let ranked = narrowing.into_iter().zip(counts).zip(ranks);
+        let rarest = ranked.min_by_key(|(_, rank)| *rank);
+        Ok(rarest.map(|((found, count), _)| Rarest { found, count }))
     }
 }
 
@@ -147,56 +157,63 @@ impl Among {
         }
         // Neither engine can use an index on an expression, so none replaces the index that narrows.
         statement.and(" WHERE sessions.tenant || '' = ? AND sessions.sequence IN (", [tenant.as_str().into()]);
-        let window = |limit: i64| -> (String, [Value; 2]) {
-            (format!(" sequence {beyond} ? ORDER BY sequence {order} LIMIT ?)"), [start.into(), limit.into()])
+        let next = |statement: &mut Statement, limit: i64| {
+            let next = format!(" AND sequence {beyond} ? ORDER BY sequence {order} LIMIT ?");
+            statement.and(&next, [start.into(), limit.into()]);
         };
         match self {
             Among::All => {}
             Among::Next(limit) => {
-                let (part, values) = window(*limit);
-                statement.and("SELECT sequence FROM sessions WHERE tenant = ? AND", [tenant.as_str().into()]);
-                statement.and(&part, values);
+                statement.and("SELECT sequence FROM sessions WHERE tenant = ?", [tenant.as_str().into()]);
+                next(statement, *limit);
             }
-            Among::Of(found, limit) => {
-                if let Some(limit) = limit {
-                    let (part, values) = window(*limit);
-                    statement.and("SELECT sequence FROM (", []);
-                    found.sequences(statement, tenant);
-                    statement.and(") AS found WHERE", []);
-                    statement.and(&part, values);
-                } else {
-                    found.sequences(statement, tenant);
-                    statement.and(")", []);
-                }
+            Among::Of(found, None) => found.sequences(statement, tenant, &|_| ()),
+            Among::Of(found, Some(limit)) => {
+                statement.and("SELECT sequence FROM (", []);
+                found.sequences(statement, tenant, &|statement| next(statement, *limit));
+                statement.and(") AS found WHERE 1 = 1", []);
+                next(statement, *limit);
             }
         }
+        statement.and(")", []);
     }
 }
 
 impl IndexedWord {
     /// Adds the statement that selects the sessions that the index finds, including those that have since left a
-    /// policy.
-    fn sequences(&self, statement: &mut Statement, tenant: &Tenant) {
-        statement.and("SELECT sequence FROM words", []);
-        of_beginning(statement, tenant, Labelled::Session, &self.beginning);
+    /// policy. `bounded` ends each of its parts: the word itself, whose sessions the index has in order; the words that
+    /// it begins; and the policies.
+    fn sequences(&self, statement: &mut Statement, tenant: &Tenant, bounded: &dyn Fn(&mut Statement)) {
+        let owner = || Value::from(tenant.as_str());
+        let word = |end: &[&str]| -> Vec<Value> {
+            let words = end.iter().map(|end| format!("{}{end}", self.beginning).into());
+            [owner(), Labelled::Session.as_str().into()].into_iter().chain(words).collect()
+        };
+        let of_words = "SELECT sequence FROM words WHERE tenant = ? AND kind = ? AND word";
+        let mut part = |select: &str, values: Vec<Value>, name: &str, following: &str| {
+            statement.and(&format!("SELECT sequence FROM ({select}"), values);
+            bounded(statement);
+            statement.and(&format!(") AS {name}{following}"), []);
+        };
+        let union = " UNION ALL ";
+        part(&format!("{of_words} = ?"), word(&[""]), "exact", union);
+        let of_policies = if self.policies.is_empty() { "" } else { union };
+        part(&format!("{of_words} > ? AND word < ?"), word(&["", &LAST.to_string()]), "longer", of_policies);
         if self.policies.is_empty() {
             return;
         }
-        statement.and(" UNION ALL SELECT sequence FROM sessions WHERE tenant || '' = ? AND ", [tenant.as_str().into()]);
-        self.of_policies(statement);
-        statement.and(
-            " UNION ALL SELECT owned.sequence FROM renewals JOIN sessions AS owned ON owned.session = renewals.session
-              WHERE owned.tenant || '' = ? AND renewals.",
-            [tenant.as_str().into()],
+        let marks = vec!["?"; self.policies.len()].join(", ");
+        let held = || {
+            let policies = self.policies.iter().map(|policy| Value::from(policy.as_str()));
+            [owner()].into_iter().chain(policies).collect::<Vec<_>>()
+        };
+        let first = format!("SELECT sequence FROM sessions WHERE tenant || '' = ? AND policy IN ({marks})");
+        part(&first, held(), "held_first", union);
+        let later = format!(
+            "SELECT owned.sequence FROM renewals JOIN sessions AS owned ON owned.session = renewals.session
+             WHERE owned.tenant || '' = ? AND renewals.policy IN ({marks})"
         );
-        self.of_policies(statement);
-    }
-
-    fn of_policies(&self, statement: &mut Statement) {
-        for (place, policy) in self.policies.iter().enumerate() {
-            statement.and(if place == 0 { "policy IN (?" } else { ", ?" }, [policy.as_str().into()]);
-        }
-        statement.and(")", []);
+        part(&later, held(), "held_later", "");
     }
 }
 
@@ -240,9 +257,33 @@ fn counting(tenant: &Tenant, narrowing: &[IndexedWord]) -> Query {
     for (place, found) in narrowing.iter().enumerate() {
         statement.and(if place == 0 { " (" } else { ", (" }, []);
         statement.and("SELECT count(*) FROM (SELECT 1 AS one FROM (", []);
-        found.sequences(&mut statement, tenant);
+        found.sequences(&mut statement, tenant, &|_| ());
         statement.and(&format!(") AS each_word LIMIT ?) AS counted) AS word_{place}"), [COUNTED.into()]);
     }
+    statement.query()
+}
+
+/// Counts the newest and the oldest sessions that each of these finds.
+fn sampling(tenant: &Tenant, narrowing: &[IndexedWord]) -> Query {
+    let mut statement = Statement::of("SELECT");
+    for (place, found) in narrowing.iter().enumerate() {
+        let comma = if place == 0 { "" } else { "," };
+        let part = format!("% {}%", found.beginning);
+        let matched = "CASE WHEN labels.words LIKE ? OR called.words LIKE ? THEN 1 ELSE 0 END";
+        let column = format!("{comma} coalesce(sum({matched}), 0) AS word_{place}");
+        statement.and(&column, [part.as_str().into(), part.as_str().into()]);
+    }
+    statement.and(
+        &format!(" {TABLES} WHERE sessions.tenant || '' = ? AND sessions.sequence IN ("),
+        [tenant.as_str().into()],
+    );
+    for (name, order) in [("SELECT sequence FROM (", "DESC"), (" UNION ALL SELECT sequence FROM (", "ASC")] {
+        let end = format!(
+            "{name}SELECT sequence FROM sessions WHERE tenant = ? ORDER BY sequence {order} LIMIT ?) AS end_{order}"
+        );
+        statement.and(&end, [tenant.as_str().into(), SAMPLED.into()]);
+    }
+    statement.and(")", []);
     statement.query()
 }
 
