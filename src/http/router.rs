@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, Method, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, Method, Uri, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
@@ -176,8 +176,8 @@ struct Surroundings {
     limit: Duration,
 }
 
-/// Admits a request, bounds its time, answers if it panics, and records it. This is one layer, because each layer costs
-/// every request the clones and allocations of all below it.
+/// Admits a request, bounds its time, answers if it panics, forbids browsers to store the answer or to guess its type,
+/// and records it. This is one layer, because each layer costs every request the clones and allocations of all below it.
 async fn answered(State(around): State<Surroundings>, request: Request, next: Next) -> Response {
     let recording = telemetry::Recording::start(&request);
     let service = around.gate.service.clone();
@@ -185,10 +185,13 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
         let response = within_time(around.limit, access::admit(State(around.gate), request, next)).await;
         bodies::budgeted(&service, response).await
     };
-    let response = match AssertUnwindSafe(answering.instrument(recording.span())).catch_unwind().await {
+    let mut response = match AssertUnwindSafe(answering.instrument(recording.span())).catch_unwind().await {
         Ok(response) => response,
         Err(_) => ProblemDocument::new(ProblemKind::Internal, "the cause is in the log").into_response(),
     };
+    let headers = response.headers_mut();
+    headers.entry(header::X_CONTENT_TYPE_OPTIONS).or_insert(HeaderValue::from_static("nosniff"));
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     recording.end(&response);
     response
 }

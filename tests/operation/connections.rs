@@ -345,6 +345,23 @@ async fn without_keys_only_own_names_are_answered_to() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn without_keys_pages_of_other_origins_change_nothing_and_answers_are_not_stored() {
+    let app = App::start().await;
+    let cancel = app.client.post(format!("{}/jobs/job_0/cancel", app.url));
+    let of_page = |site| cancel.try_clone().unwrap().header("sec-fetch-site", site).send();
+    for (site, status) in [("cross-site", 400), ("same-site", 400), ("same-origin", 404), ("none", 404)] {
+        let answer = of_page(site).await.unwrap();
+        assert_eq!(answer.status(), status, "{site}");
+        assert_eq!(answer.headers()["x-content-type-options"], "nosniff");
+        assert_eq!(answer.headers()["cache-control"], "no-store");
+    }
+    assert_eq!(cancel.send().await.unwrap().status(), 404, "a program says nothing of pages");
+    let listed =
+        app.client.get(format!("{}/jobs", app.url)).header("sec-fetch-site", "cross-site").send().await.unwrap();
+    assert_eq!(listed.status(), 200);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_log_is_not_filled_by_who_shows_no_key() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("log");

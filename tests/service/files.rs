@@ -97,6 +97,18 @@ async fn a_backup_copied_over_the_database_ends_the_service() {
     assert_eq!(served.ended().await, Some(STORE_FAILED));
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn nobody_else_reads_the_files() {
+    let served = Served::new();
+    assert_eq!(served.1.get("/sessions").await.0, 200);
+    let files: Vec<_> = std::fs::read_dir(served.file("")).unwrap().map(Result::unwrap).collect();
+    assert!(files.len() >= 3, "{files:?}");
+    for file in files {
+        let mode = std::os::unix::fs::MetadataExt::mode(&file.metadata().unwrap());
+        assert_eq!(mode & 0o077, 0, "{file:?} has mode {mode:o}");
+    }
+}
+
 /// The exit code of a service that may not have `data`, and what it said.
 fn refused(data: &Path) -> (Option<i32>, String) {
     let served = process::try_serve(|command| {

@@ -154,7 +154,8 @@ fn addressed(gate: &Gate, request: &Request) -> Result<(), ProblemDocument> {
         return Ok(());
     }
     let local = request.extensions().get::<LocalAddress>().map(|LocalAddress(local)| local.ip());
-    gate.hosts.refuse_foreign(request.headers(), request.uri(), local)
+    gate.hosts.refuse_foreign(request.headers(), request.uri(), local)?;
+    hosts::refuse_other_pages(request.headers(), request.method())
 }
 
 fn admitted(

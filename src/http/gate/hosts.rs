@@ -2,12 +2,13 @@
 //!
 //! A request must have exactly one `Host`. A service without keys could also be reached by a web page whose name was
 //! made to resolve to it. So it accepts only the names of loopback, the address of the connection, and those that the
-//! operator gives. Such a page sends its own name and is refused.
+//! operator gives. Such a page sends its own name and is refused. A page of another origin may address the service by
+//! its own name; its browser says so, and such a call changes nothing.
 
 use std::net::IpAddr;
 
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, Uri, header};
+use axum::http::{HeaderMap, Method, Uri, header};
 
 use crate::http::problem::{ProblemDocument, ProblemKind};
 
@@ -47,6 +48,22 @@ impl Hosts {
             Ok(address) if local.is_some_and(|local| local.to_canonical() == address) => true,
             _ => host == "localhost" || self.0.contains(&host),
         }
+    }
+}
+
+/// Rejects a request of a web page of another origin, unless it only reads.
+///
+/// # Errors
+/// The browser says in `Sec-Fetch-Site` that the page is not the service's own.
+pub fn refuse_other_pages(headers: &HeaderMap, method: &Method) -> Result<(), ProblemDocument> {
+    let site = headers.get("sec-fetch-site").map(|site| site.to_str().unwrap_or_default());
+    match site {
+        Some(site) if !method.is_safe() && !["same-origin", "none"].contains(&site) => {
+            let detail = "a service without keys is changed by no web page but its own";
+            let problem = ProblemDocument::new(ProblemKind::InvalidHeader, detail);
+            Err(problem.naming("Sec-Fetch-Site", site, "must be same-origin or none"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -117,6 +134,21 @@ mod tests {
             assert!(!answers(foreign, "/jobs"), "{foreign}");
         }
         assert!(answers("localhost", "http://localhost/jobs") && !answers("localhost", "http://evil.example/jobs"));
+    }
+
+    #[test]
+    fn a_page_of_another_origin_only_reads() {
+        let passes = |site, method: Method| {
+            refuse_other_pages(&headers(&[(HeaderName::from_static("sec-fetch-site"), site)]), &method).is_ok()
+        };
+        for site in ["cross-site", "same-site", ""] {
+            assert!(
+                passes(site, Method::GET) && !passes(site, Method::POST) && !passes(site, Method::DELETE),
+                "{site}"
+            );
+        }
+        assert!(passes("same-origin", Method::POST) && passes("none", Method::POST));
+        assert!(refuse_other_pages(&headers(&[]), &Method::POST).is_ok(), "programs send no such header");
     }
 
     #[test]
