@@ -218,7 +218,7 @@ pub(super) async fn put(
     let before = stored(connection, of.tenant, object).await?;
     let (grown, former) = (-before.bytes(), before.words());
     let labels = before.after(change);
-    let (words, own) = (labels.words(), words::digits(object));
+    let words = labels.words();
     let write = query(
         "INSERT INTO labels (tenant, object, name, notes, tags, folded_name, words)
          VALUES ($1, $2, $3, $4, $5, $6, $7)
@@ -235,7 +235,7 @@ pub(super) async fn put(
         .bind(labels.name.to_lowercase())
         .bind(words::column(&words));
     connection.execute(write).await?;
-    words::remove(connection, of, former.difference(&words).map(String::as_str).filter(|word| *word != own)).await?;
+    words::remove(connection, of, former.difference(&words).map(String::as_str)).await?;
     words::add(connection, of, words.difference(&former).map(String::as_str)).await?;
     let grown = grown + labels.bytes();
     Ok((labels, Usage::of_bytes(grown)))
@@ -250,8 +250,8 @@ pub(super) async fn remove(
     let labels = stored(connection, of.tenant, object).await?;
     let delete = query("DELETE FROM labels WHERE tenant = $1 AND object = $2");
     connection.execute(delete.bind(of.tenant.as_str()).bind(object)).await?;
-    let words = labels.words();
-    words::remove(connection, of, words.iter().map(String::as_str).chain([words::digits(object)])).await?;
+    let (words, own) = (labels.words(), words::identifying(object));
+    words::remove(connection, of, words.iter().map(String::as_str).chain([own.as_str()])).await?;
     Ok(Usage::of_bytes(labels.bytes()))
 }
 

@@ -181,7 +181,7 @@ pub(super) async fn insert(
     let new = connection.row(own.bind(tenant.as_str()).bind(id).bind(created_ms)).await?;
     if let Some(row) = &new {
         let of = Worded { tenant, kind: Labelled::Policy, sequence: row.get("sequence")? };
-        words::add(connection, of, [words::digits(id)]).await?;
+        words::add(connection, of, [words::identifying(id).as_str()]).await?;
         quotas::take(connection, tenant, bytes, quotas).await?;
     }
     Ok(new.is_some())

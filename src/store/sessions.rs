@@ -180,7 +180,7 @@ async fn create(
         return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
     }
     let of = Worded { tenant: &row.tenant, kind: Labelled::Session, sequence };
-    words::add(connection, of, [words::digits(&row.session)]).await?;
+    words::add(connection, of, [words::identifying(&row.session).as_str()]).await?;
     let start_bytes = quotas::length(&encode_reals(&row.initial_history)) + quotas::length(row.plan_json.as_bytes());
     let mut usage = Usage::of_session(start_bytes, to_sql(row.horizon), to_sql(row.assets));
     if !labels.is_empty() {

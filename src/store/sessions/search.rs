@@ -31,7 +31,7 @@ const SAMPLED: i64 = 100;
 const MOST_POLICIES: i64 = 100;
 /// The most words of a search that are compared by how many sessions have them; the longest are used.
 const MOST_WORDS: usize = 8;
-/// The fewest digits that find an identifier; fewer are more likely the beginning of a number in a name.
+/// The fewest characters that find an identifier; fewer are more likely the beginning of a word of a name.
 const SHORTEST_IDENTIFIER: usize = 8;
 /// Sorts above every character of a word.
 const LAST: char = char::MAX;
@@ -182,45 +182,43 @@ impl Among {
 impl IndexedWord {
     /// Adds the statement that selects the sessions that the index finds, including those that have since left a
     /// policy. `bounded` ends each of its parts: the word itself, whose sessions the index has in order; the words that
-    /// it begins; and the policies.
+    /// it begins; the identifiers; and the policies.
     fn sequences(&self, statement: &mut Statement, tenant: &Tenant, bounded: &dyn Fn(&mut Statement)) {
-        let owner = || Value::from(tenant.as_str());
-        let word = |end: &[&str]| -> Vec<Value> {
-            let words = end.iter().map(|end| format!("{}{end}", self.beginning).into());
-            [owner(), Labelled::Session.as_str().into()].into_iter().chain(words).collect()
+        let of_word = |condition: &str, words: Vec<String>| -> (String, Vec<String>) {
+            let select = format!("SELECT sequence FROM words WHERE tenant = ? AND kind = ? AND {condition}");
+            let owner = [tenant.as_str(), Labelled::Session.as_str()].map(str::to_owned);
+            (select, owner.into_iter().chain(words).collect())
         };
-        let of_words = "SELECT sequence FROM words WHERE tenant = ? AND kind = ? AND word";
-        let mut part = |select: &str, values: Vec<Value>, name: &str, following: &str| {
-            statement.and(&format!("SELECT sequence FROM ({select}"), values);
-            bounded(statement);
-            statement.and(&format!(") AS {name}{following}"), []);
-        };
-        let union = " UNION ALL ";
-        part(&format!("{of_words} = ?"), word(&[""]), "exact", union);
-        let of_policies = if self.policies.is_empty() { "" } else { union };
-        part(&format!("{of_words} > ? AND word < ?"), word(&["", &LAST.to_string()]), "longer", of_policies);
-        if self.policies.is_empty() {
-            return;
+        let mut parts = vec![
+            of_word("word = ?", vec![self.beginning.clone()]),
+            of_word("word > ? AND word < ?", begun(self.beginning.clone())),
+        ];
+        if self.beginning.len() >= SHORTEST_IDENTIFIER {
+            parts.push(of_word("word >= ? AND word < ?", begun(words::identifying(&self.beginning))));
         }
-        let marks = vec!["?"; self.policies.len()].join(", ");
-        let held = || {
-            let policies = self.policies.iter().map(|policy| Value::from(policy.as_str()));
-            [owner()].into_iter().chain(policies).collect::<Vec<_>>()
-        };
-        let first = format!("SELECT sequence FROM sessions WHERE tenant || '' = ? AND policy IN ({marks})");
-        part(&first, held(), "held_first", union);
-        let later = format!(
-            "SELECT owned.sequence FROM renewals JOIN sessions AS owned ON owned.session = renewals.session
-             WHERE owned.tenant || '' = ? AND renewals.policy IN ({marks})"
-        );
-        part(&later, held(), "held_later", "");
+        if !self.policies.is_empty() {
+            let marks = vec!["?"; self.policies.len()].join(", ");
+            let held = || [tenant.as_str().to_owned()].into_iter().chain(self.policies.clone()).collect();
+            let first = format!("SELECT sequence FROM sessions WHERE tenant || '' = ? AND policy IN ({marks})");
+            let later = format!(
+                "SELECT owned.sequence FROM renewals JOIN sessions AS owned ON owned.session = renewals.session
+                 WHERE owned.tenant || '' = ? AND renewals.policy IN ({marks})"
+            );
+            parts.extend([(first, held()), (later, held())]);
+        }
+        for (place, (select, values)) in parts.into_iter().enumerate() {
+            let union = if place == 0 { "" } else { " UNION ALL " };
+            statement.and(&format!("{union}SELECT sequence FROM ({select}"), values.into_iter().map(Value::from));
+            bounded(statement);
+            statement.and(&format!(") AS part_{place}"), []);
+        }
     }
 }
 
-fn of_beginning(statement: &mut Statement, tenant: &Tenant, kind: Labelled, beginning: &str) {
-    let (tenant, kind, end) = (tenant.as_str().into(), kind.as_str().into(), format!("{beginning}{LAST}"));
-    let range = " WHERE words.tenant = ? AND words.kind = ? AND words.word >= ? AND words.word < ?";
-    statement.and(range, [tenant, kind, beginning.into(), end.into()]);
+/// Returns a word of the index, and a text above all words that begin with it.
+fn begun(word: String) -> Vec<String> {
+    let end = format!("{word}{LAST}");
+    vec![word, end]
 }
 
 /// Selects the policies that the index finds by each of these beginnings, up to one more than the limit.
@@ -233,7 +231,14 @@ fn policies(tenant: &Tenant, sought: &[String]) -> Query {
              JOIN policy_owners ON policy_owners.sequence = words.sequence"
         );
         statement.and(&found, []);
-        of_beginning(&mut statement, tenant, Labelled::Policy, word);
+        let range = " WHERE words.tenant = ? AND words.kind = ? AND (words.word >= ? AND words.word < ?";
+        let owned = [tenant.as_str(), Labelled::Policy.as_str()].map(str::to_owned);
+        statement.and(range, owned.into_iter().chain(begun(word.clone())).map(Value::from));
+        if word.len() >= SHORTEST_IDENTIFIER {
+            let identifiers = begun(words::identifying(word)).into_iter().map(Value::from);
+            statement.and(" OR words.word >= ? AND words.word < ?", identifiers);
+        }
+        statement.and(")", []);
         statement.and(&format!(" LIMIT ?) AS found_{place}"), [(MOST_POLICIES + 1).into()]);
     }
     statement.query()

@@ -1,7 +1,7 @@
 //! The words by which sessions and policies are found, each in a row of an index.
 //!
 //! A word is a run of letters and digits, in lower case. The words of a session or a policy are those of its name and
-//! its tags, and its identifier without the prefix. A row is written and deleted with the thing it finds. A missing row
+//! its tags, and its identifier without the prefix, marked by a character that no word has. A row is written and deleted with the thing it finds. A missing row
 //! would hide a session from a search, and do nothing else.
 
 use std::collections::BTreeSet;
@@ -30,9 +30,10 @@ pub(in crate::store) fn words(text: &str) -> BTreeSet<String> {
     lower.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
 }
 
-/// Returns the word of an identifier: its digits.
-pub(in crate::store) fn digits(identifier: &str) -> &str {
-    identifier.rsplit_once('_').map_or(identifier, |(_, digits)| digits)
+/// Returns the row's word for an identifier, or for its beginning: its digits behind a mark. A search of few letters,
+/// which finds no identifier, need not pass over them all.
+pub(in crate::store) fn identifying(identifier: &str) -> String {
+    format!("#{}", identifier.rsplit_once('_').map_or(identifier, |(_, digits)| digits))
 }
 
 /// Encodes words for their column: a space before each, so that a substring search finds the beginning of a word.
@@ -110,6 +111,6 @@ mod tests {
         assert_eq!(found(" -'\u{2605}"), [""; 0]);
         assert_eq!(column(&words("b a")), " a b");
         assert_eq!(bytes(&words("b ab")), 2 * " ab b".len() as i64 + 2 * ROW_BYTES);
-        assert_eq!([digits("session_0a"), digits("1b")], ["0a", "1b"]);
+        assert_eq!([identifying("session_0a"), identifying("1b")], ["#0a", "#1b"]);
     }
 }
