@@ -11,14 +11,12 @@ use crate::numerics::search::minimise::{Minimum, SearchOutcome, minimise_bounded
 use crate::numerics::search::quasi_newton::{curvature_at, minimise_from};
 
 const ITERATION_LIMIT: usize = 100;
-/// The most rows of a search that starts without a known curvature.
-const FEW_ROWS: usize = 400;
-/// The rows of the first search if there are more. Both the optimum and the curvature of a subset are close to those of
-/// all rows.
-const FIRST_SEARCH: usize = 300;
-/// The most rows of the search that follows. The length scales of more rows than these gain nothing that the errors of
-/// the surrogates show (`docs/measurements.md`), and an evaluation on 4,000 rows costs three hundred times as much.
-const SEARCHED: usize = 600;
+/// The most rows of a search. The length scales of more rows than these gain nothing that the errors of the surrogates
+/// show (`docs/measurements.md`), and an evaluation on 4,000 rows costs a thousand times as much.
+const SEARCHED: usize = 400;
+/// The rows of the first search if there are more than those. Both the optimum and the curvature of a subset are close
+/// to those of all rows. With 150 rows some surrogates of the paper's problem had twice the error.
+const FIRST_SEARCH: usize = 200;
 /// A search from a known curvature ends if a step predicts an improvement of ln p below this, far below the 1/2 by
 /// which the hyperparameters are uncertain.
 const TOLERANCE: f64 = 1e-3;
@@ -79,8 +77,8 @@ pub enum FitError {
 ///
 /// The search is over natural logarithms in the box, with the signal variance profiled out. It starts from `start`
 /// (clamped to the bounds) or from the spread of the data, and runs L-BFGS-B on all of up to 400 rows. With more rows
-/// it runs on 300 evenly spaced rows. The curvature found there, which grows with the number of rows, then guides about
-/// six quasi-Newton steps on up to 600 rows. The length scales and the noise ratio found are those of all rows, whose
+/// it runs on 200 evenly spaced rows. The curvature found there, which grows with the number of rows, then guides about
+/// six quasi-Newton steps on 400 rows. The length scales and the noise ratio found are those of all rows, whose
 /// signal variance is then computed from one factorisation. If the kernel matrix at the start is singular, the search
 /// is retried with the greatest noise allowed, and returns `Singular` if that also fails. It returns `Stopped` within
 /// one evaluation of `stop` being set. Cost O(n^3 / 3), beside the searches. Source: Rasmussen and Williams 2006,
@@ -97,7 +95,7 @@ pub fn fit(
     let mut point = point_of(&start.cloned().unwrap_or_else(|| start_from_spread(inputs, targets)));
     let mut evaluations = 1;
     let mut curvature_of_a_row = None;
-    if n > FEW_ROWS {
+    if n > SEARCHED {
         shorten(&mut point, inputs.ncols());
         let (some_inputs, some_targets) = evenly(FIRST_SEARCH, inputs, targets);
         let search = LikelihoodSearch { inputs: &some_inputs, targets: &some_targets, bounds, stop };
