@@ -10,6 +10,8 @@ import { ballast, page } from "./scene.js";
 
 const { ordinal } = await dashboardModule("verdict.js");
 
+/** A walk takes some seconds of an idle processor, and other programs may use it. */
+const JOB_TIMEOUT = 120_000;
 const QUARTERS = 56;
 const WINDOW = 8;
 /** Quarters from March 2004 on, the newest first, in percent. */
@@ -70,7 +72,7 @@ test("what is asked for is the record as it was read, and few choices", async ()
 });
 
 test("it is followed to its end, and what it says comes first", async () => {
-  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
+  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor({ timeout: JOB_TIMEOUT });
   const job = page.url().split("/").at(-1);
   assert.equal(await page.locator("h1").textContent(), "Backtest of stocks, March 2006 to December 2017");
   await page.locator(`header.page [title="${job}"]`).getByText(/^Requested on \d+ \w+ \d{4}/).waitFor();
@@ -169,7 +171,7 @@ test("on paper the months of a year stand beside each other in its width", async
   const log_returns = dates.map((_, k) => 0.008 + 0.25 * Math.sin(1.7 * k));
   const { job } = await call(ballast.url, "/backtest", { log_returns, dates, rate: 0.002, window: 24, alpha: [0.5], count: 10 });
   await visitQuiet(page, `${ballast.url}/#/backtests/${job}`);
-  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
+  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor({ timeout: JOB_TIMEOUT });
   assert.doesNotMatch(await main(), /most of what the asset can do|false/);
   await page.getByLabel("Strategy", { exact: true }).selectOption("All in stocks");
   await page.emulateMedia({ media: "print" });
@@ -206,7 +208,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   const request = (await asked).postDataJSON();
   assert.deepEqual([request.assets, request.strategies, request.windows, request.alpha, request.log_returns.length], [["fund", "bonds"], ["one_step"], [8, null], 0.1, QUARTERS]);
-  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor();
+  await page.getByRole("heading", { name: "Results of each strategy" }).waitFor({ timeout: JOB_TIMEOUT });
   const told = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
   assert.equal(await page.locator("h1").textContent(), "Backtest of fund and bonds, March 2006 to December 2017");
   const words = await main();
