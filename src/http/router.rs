@@ -190,7 +190,7 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
         Err(_) => ProblemDocument::new(ProblemKind::Internal, "the cause is in the log").into_response(),
     };
     let headers = response.headers_mut();
-    headers.entry(header::X_CONTENT_TYPE_OPTIONS).or_insert(HeaderValue::from_static("nosniff"));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     recording.end(&response);
     response

@@ -62,8 +62,8 @@ async fn a_list_of_large_jobs_is_quick_small_and_in_nobodys_way() {
     are_quick_small_and_in_nobodys_way(app, ACTION_BESIDE_A_DATABASE).await;
 }
 
-/// Sessions of one tenant beside the one that is opened over HTTP; `BALLAST_LISTED_SESSIONS` sets another number, as for the table
-/// of `docs/capacity.md`. A tenant's quota allows 999,999.
+/// Sessions of one tenant beside the one that is opened over HTTP. `BALLAST_LISTED_SESSIONS` sets another number, as for
+/// the table of `docs/capacity.md`; a tenant's quota allows 999,999.
 const SESSIONS: usize = 20_000;
 /// The time limit of a list and of a search in the order of opening.
 const PAGE: Duration = Duration::from_millis(100);

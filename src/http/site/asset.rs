@@ -57,11 +57,10 @@ impl Asset {
         let known = headers.get(header::IF_NONE_MATCH).and_then(|tags| tags.to_str().ok());
         let unchanged =
             known.is_some_and(|tags| tags.split(',').any(|tag| tag.trim().trim_start_matches("W/") == self.tag));
-        let fixed: [(HeaderName, &str); 5] = [
+        let fixed: [(HeaderName, &str); 4] = [
             (header::CONTENT_TYPE, self.media),
             (header::CACHE_CONTROL, "no-cache"),
             (header::CONTENT_SECURITY_POLICY, policy),
-            (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
             (header::REFERRER_POLICY, "no-referrer"),
         ];
         let tag = [(header::ETAG, self.tag.as_str())];

@@ -130,9 +130,8 @@ pub(in crate::store) fn matches(statement: &mut Statement, search: &str) {
         statement.and(" AND 1 = 0", []);
     }
     for word in beginnings {
-        let part = format!("% {word}%");
-        let labels = " AND (labels.words LIKE ? OR called.words LIKE ?";
-        statement.and(labels, [part.as_str().into(), part.as_str().into()]);
+        statement.and(" AND (", []);
+        labelled(statement, &word);
         if word.len() >= SHORTEST_IDENTIFIER {
             let (session, policy) = (format!("session\\_{word}%"), format!("{word}%"));
             let identifiers = r" OR sessions.session LIKE ? ESCAPE '\'
@@ -141,6 +140,12 @@ pub(in crate::store) fn matches(statement: &mut Statement, search: &str) {
         }
         statement.and(")", []);
     }
+}
+
+/// Adds the condition that the name or a tag of the session or of its policy has a word that begins so.
+fn labelled(statement: &mut Statement, word: &str) {
+    let part = format!("% {word}%");
+    statement.and("labels.words LIKE ? OR called.words LIKE ?", [part.as_str().into(), part.as_str().into()]);
 }
 
 impl Among {
@@ -273,10 +278,9 @@ fn sampling(tenant: &Tenant, narrowing: &[IndexedWord]) -> Query {
     let mut statement = Statement::of("SELECT");
     for (place, found) in narrowing.iter().enumerate() {
         let comma = if place == 0 { "" } else { "," };
-        let part = format!("% {}%", found.beginning);
-        let matched = "CASE WHEN labels.words LIKE ? OR called.words LIKE ? THEN 1 ELSE 0 END";
-        let column = format!("{comma} coalesce(sum({matched}), 0) AS word_{place}");
-        statement.and(&column, [part.as_str().into(), part.as_str().into()]);
+        statement.and(&format!("{comma} coalesce(sum(CASE WHEN "), []);
+        labelled(&mut statement, &found.beginning);
+        statement.and(&format!(" THEN 1 ELSE 0 END), 0) AS word_{place}"), []);
     }
     statement.and(
         &format!(" {TABLES} WHERE sessions.tenant || '' = ? AND sessions.sequence IN ("),

@@ -1,8 +1,8 @@
 //! The words by which sessions and policies are found, each in a row of an index.
 //!
 //! A word is a run of letters and digits, in lower case. The words of a session or a policy are those of its name and
-//! its tags, and its identifier without the prefix, marked by a character that no word has. A row is written and deleted with the thing it finds. A missing row
-//! would hide a session from a search, and do nothing else.
+//! its tags, and its identifier without the prefix, marked by a character that no word has. A row is written and deleted
+//! with the thing it finds. A missing row would hide a session from a search, and do nothing else.
 
 use std::collections::BTreeSet;
 
