@@ -10,8 +10,8 @@ const SESSIONS = 10_000;
 /** The service takes so many reports in one call. */
 const AT_ONCE = 1000;
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
-/** Within this many milliseconds a change of the page is seen without a wait; on a slow machine in so many times as many. */
-const SOON = 300 * Number(process.env.BALLAST_TEST_PATIENCE ?? 1);
+/** Within this many milliseconds a change of the page is seen without a wait. */
+const SOON = 300;
 /** What else the machine does lengthens a round and never shortens one, so the shortest of so many tells what the page takes. */
 const ROUNDS = 5;
 const DAY = 86_400_000;
