@@ -1,10 +1,8 @@
 //! The memory that a job or a policy takes, estimated before it begins.
 //!
-//! Upper estimates from the sizes in a request alone. Every large object of a training is in one of a few classes. The
-//! constants below are the bytes of one object of each class, measured by counting allocator requests
-//! (`tests/estimates.rs` checks the estimates).
+//! Upper estimates from the sizes in a request alone. Every large object of a training is in one of a few classes; the
+//! constants below are the bytes of one of each, found by counting allocator requests. Checked by: `tests/estimates.rs`.
 
-use super::assets::advising::FACTOR_PATHS;
 use super::bellman::problem::Problem;
 use super::evaluation::assets::AssetsBacktest;
 use super::evaluation::backtest::Backtest;
@@ -20,6 +18,7 @@ use super::surrogate::counts::CANDIDATES_PER_POINT;
 use super::surrogate::design::GUARDS;
 use super::surrogate::learning::{LAW_BYTES, together};
 use super::surrogate::stored::Solution;
+use super::uncertainty::joint::joint_bytes;
 use crate::numerics::bridge::grown;
 use crate::numerics::gp::GaussianProcess;
 
@@ -173,7 +172,8 @@ impl Sizes {
 /// Returns the footprint of a training of a completed specification on so many threads.
 pub fn training(specification: &Specification, threads: usize) -> Footprint {
     let sizes = Sizes::of(specification);
-    let solving = sizes.solving(threads).saturating_add(LEAST);
+    let fund = specification.fund.as_ref().map_or(0, |fund| joint_bytes(fund.history.len()));
+    let solving = sizes.solving(threads).saturating_add(LEAST).saturating_add(fund);
     Footprint::of("design.count", sizes.count, sizes.fit())
         .and("problem.horizon", sizes.horizon, sizes.policy())
         .and("problem.radius.paths", sizes.paths, training_keeps(&sizes).saturating_add(sizes.statistics(threads)))
@@ -297,7 +297,7 @@ pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, thread
     let books = product(&[backtest.lived().len(), strategies, DECIDED_BYTES]);
     let known = backtest.choices.windows.iter().map(|window| window.unwrap_or(periods)).max().unwrap_or_default();
     let steps = product(&[threads, known, backtest.record.assets.len(), STEP_NUMBERS, NUMBER]);
-    let bridges = product(&[threads, known, FACTOR_PATHS, NUMBER]);
+    let bridges = product(&[threads, joint_bytes(known)]);
     let record = held.saturating_add(books).saturating_add(LEAST);
     let solved = Footprint::of(field, periods, record).and(
         "windows",

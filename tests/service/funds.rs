@@ -55,8 +55,9 @@ async fn a_session_of_several_assets_is_lived_by_their_names(mut app: App) {
     let advisor = trained(&request(4));
     let policy = app.get(&format!("/policies/{}", app.policy)).await.1;
     let of: &FundSpecification = advisor.specification().fund.as_deref().unwrap();
-    assert_eq!(number(&policy["specification"]["fund"]["radius_factor"]), of.radius_factor);
-    assert!(of.radius_factor > 1.0);
+    let factor = of.radius_factor.unwrap();
+    assert_eq!(number(&policy["specification"]["fund"]["radius_factor"]), factor);
+    assert!(factor > 1.0);
     let mut fund = Fund::at(rows(), vec![0.2, 0.1, 0.0]);
     let start = State::new(&fund.returns(), 1000.0, Learning::default()).unwrap().with_holding(0.3).unwrap();
     let (state, _) = fund.compose(&advisor, of, 0, &start);
@@ -396,7 +397,7 @@ fn identical_columns_are_one_asset() {
     let (one, mut several) = (ROWS.map(|row| row[0]), request(3));
     several["problem"]["history"] = json!(one.map(|z| [z, z, z]));
     let fund = trained(&several);
-    assert!((fund.specification().fund.as_ref().unwrap().radius_factor - 1.0).abs() < 1e-8);
+    assert!((fund.specification().fund.as_ref().unwrap().radius_factor.unwrap() - 1.0).abs() < 1e-8);
     let mut single = several.clone();
     single["problem"].as_object_mut().unwrap().remove("assets");
     single["problem"]["history"] = json!(one);
@@ -561,7 +562,7 @@ fn a_policy_of_a_fund_is_what_its_assets_give() {
     };
     assert_eq!(refused(&|other| other.problem.history[3] += 0.001), "problem.history[3]");
     assert_eq!(refused(&|other| other.design.initial_laws = InitialLaws::Given), "design.initial_laws");
-    assert_eq!(refused(&|other| other.fund.as_mut().unwrap().radius_factor = 0.5), "fund.radius_factor");
+    assert_eq!(refused(&|other| other.fund.as_mut().unwrap().radius_factor = Some(0.5)), "fund.radius_factor");
     assert_eq!(refused(&|other| other.problem.learning = Learning::Decay { half_life: 9.0 }), "problem.learning");
     assert_eq!(refused(&|other| other.fund.as_mut().unwrap().history[0][0] = 9.0), "fund.history[0][0]");
 }

@@ -12,26 +12,12 @@ use crate::control::request::annualised::premium;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::caution::{CautionLevel, CautionLevels};
 use crate::control::request::fund::CompositionRule;
-use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{LawExtent, Support};
-use crate::numerics::bridge::funds::FundBridges;
+use crate::control::uncertainty::joint::radius_factor;
 
-/// Paths of the joint factor: its relative standard error is then a hundredth.
-pub const FACTOR_PATHS: usize = 1000;
 /// Returns up to which the allocation at each level is also solved: a fraction of a second.
 const SOLVED_BY_LEVEL: usize = 6000;
-
-/// Returns the radius that holds for all funds at once over that of one. It is 1 for a single asset, and under rules
-/// that use the sample size alone.
-pub fn radius_factor(problem: &AssetsProblem, fund: &ProblemSpecification, seed: u64) -> f64 {
-    match fund.radius_rule() {
-        RadiusRule::Bridge { alpha, .. } | RadiusRule::Calibrated { alpha, .. } if problem.assets.len() > 1 => {
-            FundBridges::simulate(&problem.history, FACTOR_PATHS, seed).joint_factor(alpha).value
-        }
-        _ => 1.0,
-    }
-}
 
 /// Returns the utility of the investor, relative to what the bank makes of their wealth.
 pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
@@ -89,7 +75,7 @@ impl FundsBall {
     /// # Errors
     /// The history of the fund breaks a rule, which a completed one does not.
     pub fn of(problem: &AssetsProblem, fund: &OnePeriod) -> Result<Self, FieldError> {
-        let radius_factor = radius_factor(problem, fund.problem(), fund.seed());
+        let radius_factor = radius_factor(&problem.history, fund.problem().radius_rule(), fund.seed());
         let fund = fund.within(radius_factor).resolved();
         // A rule without levels has no share of its radius to act on.
         let whole = if fund.problem().takes_levels() { fund.at(CautionLevel::Paper) } else { fund };

@@ -13,7 +13,7 @@
 //! staying.
 
 use super::advice::{OneStep, named, worst_means};
-use super::advising::{floors, radius_factor};
+use super::advising::floors;
 use super::composition::accept_if_no_worse;
 use super::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use crate::control::error::FieldError;
@@ -24,9 +24,7 @@ use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
-use crate::control::request::specification::{
-    DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification,
-};
+use crate::control::request::specification::{DesignSpecification, InitialLaws, Specification, SurrogateSpecification};
 use crate::numerics::bridge::funds::fund_returns;
 use crate::numerics::transport::water_filling::inverse_volatility;
 
@@ -44,7 +42,7 @@ pub struct Fund {
 }
 
 impl AssetsProblem {
-    /// Returns the training of a policy for a fund of these assets.
+    /// Returns the training of a policy for a fund of these assets. The training finds the joint factor of the radius.
     ///
     /// # Errors
     /// A field breaks a rule.
@@ -55,19 +53,15 @@ impl AssetsProblem {
         seed: u64,
     ) -> Result<Specification, FieldError> {
         self.check()?;
-        let plain = Specification { design, surrogate, ..Specification::of(self.of_fund(), seed) }.completed()?;
-        let radius_factor = radius_factor(self, &plain.problem, seed);
-        let radius = Some(plain.problem.radius_rule().scaled(radius_factor));
         let fund = FundSpecification {
             assets: self.assets.clone(),
             ground_norm: self.ground_norm,
             composition: self.composition.clone(),
-            radius_factor,
+            radius_factor: None,
             history: self.history.clone(),
         };
-        let design = DesignSpecification { initial_laws: InitialLaws::Resampled, ..plain.design };
-        let problem = ProblemSpecification { radius, ..plain.problem };
-        Specification { problem, design, fund: Some(Box::new(fund)), ..plain }.completed()
+        let design = DesignSpecification { initial_laws: InitialLaws::Resampled, ..design };
+        Specification { problem: self.of_fund(), fund: Some(Box::new(fund)), design, surrogate, seed }.completed()
     }
 
     /// Returns the problem that a policy was trained for, with `history` as its record; `None` if it has one asset.
@@ -87,7 +81,7 @@ impl AssetsProblem {
             contributions: problem.contributions.clone(),
             risk_aversion: None,
             utility: problem.utility,
-            radius: Some(problem.radius_rule().scaled(fund.radius_factor.recip())),
+            radius: Some(problem.radius_rule().scaled(fund.radius_factor.unwrap_or(1.0).recip())),
             caution: problem.caution,
             support: problem.support,
             history,

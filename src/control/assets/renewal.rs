@@ -8,8 +8,7 @@ use crate::control::request::support::Interval;
 impl Specification {
     /// Returns the specification of the next policy: the same, with the returns `record`, date after date, and the last
     /// observed `rate`. If the problem depends on wealth, present wealth replaces initial wealth and the design interval
-    /// is scaled with it. Renewals of sessions and walk-forwards of several assets call it. Cost: the joint factor of
-    /// several assets.
+    /// is scaled with it. Renewals of sessions and walk-forwards of several assets call it.
     ///
     /// # Errors
     /// The record breaks a rule.

@@ -273,7 +273,9 @@ pub(super) fn check_fund(
     check_names("fund.assets", &fund.assets)?;
     check_rows("fund.history", &fund.history, &fund.assets, problem.support)?;
     check_composition("fund.composition", &fund.composition, fund.assets.len())?;
-    rules::within("fund.radius_factor", fund.radius_factor, FACTOR.0, FACTOR.1)?;
+    if let Some(factor) = fund.radius_factor {
+        rules::within("fund.radius_factor", factor, FACTOR.0, FACTOR.1)?;
+    }
     let returns = fund_returns(&fund.history, &inverse_volatility(&fund.history));
     let differs = |(index, (given, of_fund)): (usize, (&f64, f64))| {
         ((given - of_fund).abs() > ROUNDING).then_some((index, *given, of_fund))

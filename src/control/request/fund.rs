@@ -16,9 +16,11 @@ pub struct FundSpecification {
     pub ground_norm: GroundNorm,
     /// How the shares of the assets within the risky holdings are chosen.
     pub composition: CompositionRule,
-    /// Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100. The scale
-    /// of the problem's radius includes it. It is 1 under rules that depend on the sample size alone.
-    pub radius_factor: f64,
+    /// Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100; the
+    /// training finds it if it is left out. The scale of the problem's radius includes it. It is 1 under rules that depend
+    /// on the sample size alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_factor: Option<f64>,
     /// Log-returns by date, oldest first; each date has one value for each asset.
     pub history: Vec<Vec<f64>>,
 }

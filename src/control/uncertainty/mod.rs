@@ -6,6 +6,7 @@
 
 pub mod centre;
 mod correction;
+pub mod joint;
 pub mod laws;
 pub mod radius;
 pub mod shared_summaries;

@@ -23,10 +23,10 @@ use crate::http::routes::advise::{ProblemShape, peek_shape};
 use crate::http::routes::page::{self, Page};
 use crate::http::routes::wire;
 use crate::service::Service;
+use crate::service::error::ServiceError;
 use crate::service::jobs::Accepted;
 use crate::service::process::memory::Large;
-use crate::service::sessions::Sessions;
-use crate::store::{Relabel, Tenant};
+use crate::store::Relabel;
 
 /// A training: its specification, and the labels of its policy, which are no part of the specification.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
@@ -77,7 +77,7 @@ pub async fn train(
 ) -> Result<Response, ProblemDocument> {
     let key = idempotency_key(&headers)?;
     let (specification, labels) = match body.decoded(question).await? {
-        TrainQuestion::Assets(request) => request.specified(&service.sessions, &caller.tenant).await?,
+        TrainQuestion::Assets(request) => request.specified().map_err(ServiceError::from)?,
         TrainQuestion::Asset(request) => request.specified(),
     };
     Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
@@ -130,14 +130,9 @@ impl Train {
 }
 
 impl TrainAssets {
-    async fn specified(
-        self,
-        sessions: &Sessions,
-        tenant: &Tenant,
-    ) -> Result<(Specification, Relabel), ProblemDocument> {
+    fn specified(self) -> Result<(Specification, Relabel), FieldError> {
         let TrainAssets { problem, design, surrogate, seed, name, notes, tags } = self;
-        let trained = sessions.training(tenant, problem, (design, surrogate, seed)).await?;
-        Ok((trained, Relabel { name, notes, tags }))
+        Ok((problem.training(design, surrogate, seed)?, Relabel { name, notes, tags }))
     }
 }
 

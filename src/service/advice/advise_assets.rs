@@ -13,9 +13,7 @@ use crate::control::policy::one_period::OnePeriod;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::rules;
-use crate::control::request::specification::{
-    DesignSpecification, Specification, SurrogateSpecification, default_seed,
-};
+use crate::control::request::specification::{Specification, default_seed};
 use crate::control::request::warnings::Warning;
 use crate::service::error::ServiceError;
 use crate::service::sessions::Sessions;
@@ -53,20 +51,6 @@ pub struct AssetsAdvised {
 }
 
 impl Sessions {
-    /// Builds the training request for several assets, and finds the joint radius from their funds.
-    ///
-    /// # Errors
-    /// A field breaks a rule, or no permit to solve became free.
-    pub async fn training(
-        &self,
-        tenant: &Tenant,
-        problem: AssetsProblem,
-        (design, surrogate, seed): (DesignSpecification, SurrogateSpecification, u64),
-    ) -> Result<Specification, ServiceError> {
-        let training = move || problem.training(design, surrogate, seed);
-        Ok(self.resolving.run(tenant, training).await??)
-    }
-
     /// Answers the request.
     ///
     /// # Errors

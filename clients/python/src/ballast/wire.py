@@ -1775,10 +1775,11 @@ class FundSpecification(TypedDict):
     """Distance that sets the adversary's cost of moving a law."""
     composition: CompositionRule
     """How the shares of the assets within the risky holdings are chosen."""
-    radius_factor: float
+    radius_factor: NotRequired[float | None]
     """
-    Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100. The scale
-    of the problem's radius includes it. It is 1 under rules that depend on the sample size alone.
+    Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100; the
+    training finds it if it is left out. The scale of the problem's radius includes it. It is 1 under rules that depend
+    on the sample size alone.
     """
     history: list[HistoryItem2]
     """Log-returns by date, oldest first; each date has one value for each asset."""

@@ -32,6 +32,7 @@ use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::annualised::premium;
 use crate::control::request::frontier::FrontierQuestion;
+use crate::control::uncertainty::joint::radius_factor;
 use crate::control::uncertainty::radius::RadiusEstimator;
 use crate::numerics::bridge::funds::fund_returns;
 use crate::numerics::law::empirical::EmpiricalDistribution;
@@ -71,7 +72,7 @@ impl Frontier {
     /// Prepares the answer, with the cache `kept`.
     pub fn new(question: FrontierQuestion, kept: Cache) -> Self {
         let fund = &question.fund.problem;
-        let factor = advising::radius_factor(&question.assets, fund, question.request.seed);
+        let factor = radius_factor(&question.assets.history, fund.radius_rule(), question.request.seed);
         let utility = advising::utility(fund);
         let radii = RadiusEstimator::new(&question.fund.clone().resolved(&kept), kept);
         Frontier { radii, factor, utility, question }
