@@ -66,6 +66,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(policies::list))
         .routes(routes!(policies::get, policies::delete, labels::of_policy))
         .routes(routes!(policies::export))
+        .routes(routes!(policies::surface))
         .routes(routes!(policies::import))
         .routes(routes!(sessions::open, overview::list))
         .routes(routes!(sessions::get, sessions::delete, labels::of_session))

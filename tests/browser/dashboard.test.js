@@ -163,38 +163,6 @@ test("a report whose answer is lost is sent again and counts once", async () => 
   assert.equal(observations.length, 2);
 });
 
-test("the surface is what the service advises", async () => {
-  // A session of its own, at the last step, whose features follow from the returns and the radius alone.
-  const { session } = await call(ballast.url, "/sessions", { policy });
-  for (const period of [1, 2, 3]) await call(ballast.url, "/observe", { session, period, log_return: 0.01 * period });
-  const action = await call(ballast.url, `/action?session=${session}`);
-  const history = await call(ballast.url, `/sessions/${session}/history`);
-  const { wealth } = await call(ballast.url, `/sessions/${session}`);
-  const document_ = await call(ballast.url, `/policies/${policy}/export`);
-  const atoms = [...history.history, ...history.observations.map(({ log_return }) => log_return)];
-  const { rate_per_step: rate, utility, initial_wealth } = document_.specification.problem;
-  assert.equal(utility.kind, "exponential");
-  const riskAversion = utility.risk_aversion * initial_wealth;
-  const step = document_.steps[history.observations.length];
-  const drawn = await page.evaluate(
-    async ({ state, step }) => {
-      const [{ allocation, feature }, { Shape }] = await Promise.all([
-        import("/dashboard/surface.js"),
-        import("/dashboard/laws.js"),
-      ]);
-      const law = new Shape(state.atoms).law();
-      return allocation(
-        step.solution,
-        step.diagnostics.policy.features.map((name) => feature(name, { ...state, law })),
-        1,
-      );
-    },
-    { state: { wealth, atoms, rate, riskAversion, radius: action.radius }, step },
-  );
-  assert.equal(action.source, "policy_surrogate", "the state must lie in the design for this comparison");
-  assert.ok(Math.abs(drawn - action.allocation) < 1e-6, `${drawn} against ${action.allocation}`);
-});
-
 test("a long training is cancelled", async () => {
   await call(ballast.url, "/train", {
     problem: { horizon: 60, rate_per_step: 0.002, history: RETURNS.map((value) => value / 100) },

@@ -129,6 +129,7 @@ impl Store {
             }
             "get /policies/{id}" => large(&of_policy),
             "get /policies/{id}/export" => large(&format!("{of_policy}/export")),
+            "get /policies/{id}/surface" => get(&format!("{of_policy}/surface")),
             "post /returns" => (
                 "/returns".into(),
                 Some(

@@ -34,6 +34,7 @@ mod sessions;
 mod solve_turns;
 mod store;
 mod store_model;
+mod surface;
 mod traces;
 mod turns;
 mod what_if;

@@ -270,6 +270,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     own.delete()
     assert policy.id in [entry["policy"] for entry in ballast.policies()]
     policy.detail()
+    assert policy.surface(across="deviation")["step"] == 0
     ballast.import_policy(policy.export())
     policy.delete()
     assert training.id in [job["job"] for job in ballast.jobs()]

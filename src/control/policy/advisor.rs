@@ -34,7 +34,7 @@ pub enum AdviceMode {
 /// A policy with everything prepared for its evaluation. Cheap to share behind an `Arc`; all methods are pure.
 pub struct Advisor {
     policy: Policy,
-    problem: Problem,
+    pub(super) problem: Problem,
     prepared: Vec<OnceLock<PreparedStep>>,
     kept: Cache,
 }
@@ -53,11 +53,11 @@ pub struct OutsideDesign {
 }
 
 /// The predictions of the surrogates for a state.
-struct Prediction {
-    band: Band,
+pub(super) struct Prediction {
+    pub(super) band: Band,
     floor_gain: f64,
     deviation: f64,
-    in_design: bool,
+    pub(super) in_design: bool,
 }
 
 impl Advisor {
@@ -274,7 +274,7 @@ impl Advisor {
         }
     }
 
-    fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
+    pub(super) fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
         // An imported policy may contain any number.
         let largest = self.problem.largest_gain(step, state);
         let (dynamics, highest) = (self.problem.dynamics(step), self.problem.actions(step, state).highest);

@@ -8,6 +8,8 @@ pub mod levels;
 pub mod one_period;
 pub mod prepared_step;
 pub mod sensitivity;
+pub mod surface;
+pub mod surface_states;
 pub mod walk;
 pub mod what_if;
 pub mod worst_case;

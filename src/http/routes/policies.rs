@@ -6,12 +6,15 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
 
+use crate::control::error::FieldError;
 use crate::control::policy::Policy;
+use crate::control::policy::surface::{Surface, SurfaceAxis};
 use crate::http::gate::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
 use crate::http::gate::extract::{Id, JsonBytes, Parameters};
 use crate::http::gate::{bodies, decode};
-use crate::http::problem::ProblemDocument;
+use crate::http::problem::{ProblemDocument, ProblemKind};
 use crate::http::routes::page::{self, Page};
 use crate::http::routes::wire;
 use crate::service::Service;
@@ -62,6 +65,44 @@ pub async fn get(
         specification,
     };
     bodies::written(&service, Large::from(detail)).await
+}
+
+/// Query of a surface.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceQuery {
+    step: Option<String>,
+    across: Option<SurfaceAxis>,
+}
+
+impl SurfaceQuery {
+    fn step(&self) -> Result<usize, ProblemDocument> {
+        let Some(text) = &self.step else { return Ok(0) };
+        text.parse().map_err(|_| {
+            let error = FieldError::new("step", text, "must be a whole number, 0 or more");
+            ProblemDocument::of_field(ProblemKind::InvalidQuery, error)
+        })
+    }
+}
+
+/// Returns what a policy holds after records like its own, shifted and stretched.
+#[utoipa::path(get, path = "/policies/{id}/surface", tag = "policies",
+    params(("id" = String, Path, description = "The policy."),
+           ("step" = Option<usize>, Query, minimum = 0, maximum = 519, description = "Number of periods observed, below the policy's horizon; default 0."),
+           ("across" = inline(Option<SurfaceAxis>), Query, description = "Direction of the columns; if it is left out or the states of the step do not differ in it, the first of the answer's `axes`.")),
+    responses(
+        (status = 200, description = "The allocations.", body = Surface),
+        (status = 400, description = "A parameter breaks a rule.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
+        (status = 422, description = "The policy has no such step.", body = ProblemDocument, content_type = "application/problem+json")))]
+pub async fn surface(
+    State(service): State<Arc<Service>>,
+    CallerOf(caller, _): CallerOf<HeavyCalls>,
+    Id(id): Id,
+    Parameters(ask): Parameters<SurfaceQuery>,
+) -> Result<Response, ProblemDocument> {
+    let surface = service.sessions.surface(&caller.tenant, &id, ask.step()?, ask.across).await?;
+    bodies::written(&service, Large::from(surface)).await
 }
 
 /// Returns the portable document of a policy; its SHA-256 is the policy's identifier.

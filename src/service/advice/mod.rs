@@ -1,9 +1,11 @@
-//! Questions that record nothing: the advice of a session, advice without a session, and hypotheses.
+//! Questions that record nothing: the advice of a session, advice without a session, hypotheses, and the surface of a
+//! policy.
 
 pub mod action;
 pub mod advise;
 pub mod advise_assets;
 pub mod explain;
 pub mod returns;
+pub mod surface;
 pub mod what_if;
 pub mod what_if_assets;

@@ -59,6 +59,15 @@ class _Policy(Labelled):
             raise DamagedPolicy(f"the SHA-256 of the exported bytes is {found}: must be {self.id}")
         return document
 
+    async def _surface(self, step: int = 0, across: wire.SurfaceAxis | None = None) -> wire.Surface:
+        """Returns what the policy holds after ``step`` periods over records like its own, shifted to other means.
+
+        The columns differ in ``across``, wealth or the standard deviation of the record. Rows and columns that the
+        surrogates were not trained for are marked by ``in_design``.
+        """
+        path, params = f"{self._path}/surface", {"step": step, "across": across}
+        return cast(wire.Surface, await self._transport.json("GET", path, params=params))
+
     async def _session(self, **opening: Unpack[Opening]) -> wire.Session:
         """Opens a session for an investor.
 
@@ -132,6 +141,7 @@ class Policy(_Policy):
 
     detail = Answering(wire.PolicyDetail).blocking(_Policy._detail)
     export = blocking(_Policy._export)
+    surface = Answering(wire.Surface).blocking(_Policy._surface)
     session = blocking_into(_Policy._session, Session)
     label = Answering(wire.Labels).blocking(_Policy._label)
     delete = blocking(_Policy._delete)
@@ -142,6 +152,7 @@ class AsyncPolicy(_Policy):
 
     detail = _Policy._detail
     export = _Policy._export
+    surface = _Policy._surface
     session = awaiting_into(_Policy._session, AsyncSession)
     label = _Policy._label
     delete = _Policy._delete

@@ -1154,6 +1154,21 @@ The log-returns that the laws in a ball may give mass to. They depend on the law
 """
 
 
+SurfaceAxis: TypeAlias = Literal["wealth", "deviation"]
+"""A direction in which the states of a step differ, beside the mean of the record's log-returns."""
+
+
+class SurfacePoint(TypedDict):
+    """The wealth of a state, and the mean and standard deviation of its record's log-returns."""
+
+    wealth: float
+    """Wealth, in the currency of the initial wealth."""
+    mean: float
+    """Mean log-return, with the weights of learning."""
+    deviation: float
+    """Standard deviation of the log-returns, with the weights of learning."""
+
+
 class SurrogateDiagnostics(TypedDict):
     """The figures of a fitted surrogate."""
 
@@ -2106,6 +2121,28 @@ class StepDiagnostics(TypedDict):
     policy: NotRequired[SurrogateDiagnostics | None]
 
 
+class SurfaceGrid(TypedDict):
+    """The states of a surface."""
+
+    step: int
+    """Number of periods observed."""
+    axes: list[SurfaceAxis]
+    """The directions in which the states of this step differ beside the mean."""
+    across: NotRequired[SurfaceAxis | None]
+    columns: list[float]
+    """Wealth or standard deviation of each column."""
+    means: list[float]
+    """Mean log-return of the whole record in each row; one row if the states of this step do not differ in it."""
+    observed_means: NotRequired[list[float] | None]
+    """The mean log-return since the start in each row, if all sessions start from the policy's record."""
+    design: list[list[float]]
+    """At most 300 design points, as the value of `across` and the mean."""
+    middle: SurfacePoint
+    """The middle of the design, whose value is kept by whatever no axis shows."""
+    own: SurfacePoint
+    """The policy's own record and initial wealth."""
+
+
 class SurrogateSpecification(TypedDict):
     """Settings of the surrogates."""
 
@@ -2835,6 +2872,20 @@ class StrategyReport(TypedDict):
     coverage: NotRequired[Coverage | None]
     resolved_share: NotRequired[float | None]
     """Share of steps whose advice was solved anew."""
+
+
+class Surface(SurfaceGrid):
+    """The allocations of a policy over states that differ in two directions."""
+
+    allocations: list[list[float]]
+    """
+    Share of wealth to hold from nothing held, by row and then column. Outside the design a session would solve the
+    step instead.
+    """
+    in_design: list[list[bool]]
+    """True where the surrogates were trained, by row and then column."""
+    advice: Advice
+    """The advice for the policy's own record and initial wealth."""
 
 
 class WhatIfPoint(Advice):

@@ -127,7 +127,7 @@ function curves(ids, both, leaving) {
   );
   return section(
     "What they hold",
-    h("p", { class: "note" }, "After the first period. Each policy\u2019s own record is shifted to that average log-return. Caution, wealth and deviation are in the middle of what the policy was trained for."),
+    h("p", { class: "note" }, "After the first period, by the average log-return of the whole record. Wealth and deviation are in the middle of what the policy was trained for."),
     holder,
   );
 }

@@ -1,5 +1,4 @@
-// Contributions and withdrawals: the amount of each period, the present value of all, and what a start earns in the
-// bank alone.
+// Contributions and withdrawals: the amount of each period, and what a start earns in the bank alone.
 
 import { wealth } from "./format.js";
 
@@ -34,17 +33,6 @@ export function banked(history, horizon) {
     held.push(held[period - 1] * (1 + rateIn(history, period)) + addedIn(history, period));
   }
   return held;
-}
-
-/** Returns `{toCome, reserve}` after `step` periods: the present value of later contributions, and what must stay in the bank for withdrawals. */
-export function flowsAfter(problem, step) {
-  const bank = 1 + problem.rate_per_step;
-  let [toCome, reserve] = [0, 0];
-  for (let period = problem.horizon; period > step; period--) {
-    const amount = added(problem, period);
-    [toCome, reserve] = [(amount + toCome) / bank, Math.max(0, (reserve - amount) / bank)];
-  }
-  return { toCome, reserve };
 }
 
 /** Says what is added or withdrawn at the end of a period; blank if nothing is. */

@@ -9,11 +9,12 @@ const LEGEND = 26;
 const COLOURS = 11;
 
 /**
- * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x;
+ * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x; `solved` has the same shape, and is false for
+ * pale cells;
  * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: the position of the record itself, or null. The
  * cell read first is that of the record, or the middle.
  */
-export function heatmap({ title, x, y, field, range, format, dots, own = null, note, name }) {
+export function heatmap({ title, x, y, field, solved, range, format, dots, own = null, note, name }) {
   const [columns, rows] = [x.values.length, y.values.length];
   const output = h("output", { class: "here", "aria-live": "polite" });
   const legend = h(
@@ -54,7 +55,7 @@ export function heatmap({ title, x, y, field, range, format, dots, own = null, n
     const [wide, high] = [across(2 * dx) - across(0), up(0) - up(2 * dy)];
     const cells = paths(
       field,
-      colour,
+      (value, c, r) => (solved[r][c] ? colour(value) : `${colour(value)} beyond`),
       (c, r) => [across(x.values[c] - dx), up(y.values[r] + dy)],
       wide + 0.6,
       high + 0.6,
@@ -131,7 +132,7 @@ function paths(field, colour, corner, wide, high) {
   for (const [r, values] of field.entries()) {
     for (const [c, value] of values.entries()) {
       const [left, top] = corner(c, r);
-      const name = colour(value);
+      const name = colour(value, c, r);
       drawn.set(name, `${drawn.get(name) ?? ""}M${left.toFixed(2)} ${top.toFixed(2)}${box}`);
     }
   }

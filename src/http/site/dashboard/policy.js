@@ -10,14 +10,6 @@ import { unitOf } from "./periods.js";
 import { FRAMEWORKS, inPaperWords, inWords, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
 
-/** Larger documents, in bytes, are fetched for the surface only on request. */
-const READY_BYTES = 15e6;
-/** Size of one number in the document, in bytes. */
-const NUMBER_BYTES = 20;
-/** Numbers stored for a design point besides its inputs: the value and the action, or the value at 17 holdings and both ends of the
- * band. */
-const FUNCTIONS = { free: 2, costly: 19 };
-
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics, annualised, warnings } = policy;
@@ -32,7 +24,7 @@ export async function view(id, leaving) {
       warningList(warnings, specification.problem),
     ),
     again(id),
-    surface(policy, told, leaving),
+    section("What it holds", surfaceView({ id, problem: specification.problem, leaving, told })),
     solved(specification, diagnostics),
   ];
   const evaluate = (await offers("/evaluate"))
@@ -82,7 +74,7 @@ function ofSeveral({ fund }) {
   return h("p", {}, `It is for ${fund.assets.slice(0, -1).join(", ")} and ${fund.assets.at(-1)}. Below, \u201cstocks\u201d means all of them together.`);
 }
 
-/** Returns `{element, told(now)}`: what the policy holds now, exactly once its document is read, and how often it holds nothing. */
+/** Returns `{element, told(now)}`: what the policy holds now, exactly once its surface is read, and how often it holds nothing. */
 function answer({ problem: { horizon, periods_per_year }, fund }, diagnostics) {
   const unit = unitOf(periods_per_year);
   const assets = fund ? "the assets" : "stocks";
@@ -108,19 +100,6 @@ function again(id) {
     " \u00b7 ",
     h("a", { href: `#/train?newer=${id}` }, "Retrain on newer returns"),
   );
-}
-
-function surface({ policy: id, specification, diagnostics }, told, leaving) {
-  const functions = specification.problem.trading_cost > 0 ? FUNCTIONS.costly : FUNCTIONS.free;
-  const size = diagnostics.reduce(
-    (sum, step) => sum + NUMBER_BYTES * step.design_count * (functions + (step.policy?.features.length ?? 0)),
-    0,
-  );
-  const holder = h("div", {});
-  const load = () => holder.replaceChildren(surfaceView({ id, problem: specification.problem, leaving, told }));
-  if (size <= READY_BYTES) load();
-  else holder.append(h("button", { onclick: load }, `Load the policy (about ${count(size / 1e6)} MB) and draw it`));
-  return section("What it holds", holder);
 }
 
 /** Shows one line for a manager, and the rest for the quant. */

@@ -1,124 +1,104 @@
-// The view of a policy's surface: the user chooses a period and a radius, and sees the allocation over two features.
+// The view of a policy's surface: the user chooses a period, and sees the allocation over two features.
 
+import { get } from "./api.js";
 import { lineChart } from "./chart.js";
 import { h } from "./dom.js";
 import { allocation, percent, percentFigures, percentTick, tick, wealth } from "./format.js";
 import { heatmap } from "./heatmap.js";
-import { shown } from "./key.js";
 import { unitOf } from "./periods.js";
-
-const WORKER = "/dashboard/surface_worker.js";
-/** Steps of the slider from the least radius of the design to the largest. */
-const RADII = 20;
 
 const AXES = {
   wealth: { label: "Wealth", format: wealth, tick },
   mean: { label: "Average return", format: (value) => percent(value, 2), tick: percentTick },
-  radius: { label: "Caution", format: (value) => percentFigures(value, 4), tick: percentTick },
+  observed: { label: "Average return since the start", format: (value) => percent(value, 2), tick: percentTick },
   deviation: { label: "Standard deviation", format: (value) => percent(value, 2), tick: percentTick },
 };
 
-let trusted;
+/** Resolves to the surface of policy `id` after `step` periods. */
+const surface = (id, { step, across = "" }, leaving) => get(`/policies/${id}/surface?step=${step}${across && `&across=${across}`}`, leaving);
 
-/** Returns the address of the page's only worker script, as a trusted type if the browser needs one; every other address is refused. */
-function workerAddress() {
-  if (!globalThis.trustedTypes) return WORKER;
-  trusted ??= trustedTypes.createPolicy("ballast-worker", {
-    createScriptURL: (address) => {
-      if (address !== WORKER) throw new TypeError(`${address} is not a worker of this page`);
-      return address;
-    },
-  });
-  return trusted.createScriptURL(WORKER);
-}
+/** Tells whether a step has one state. */
+const isSingle = ({ columns, means }) => columns.length * means.length === 1;
 
-/** Shows the surface of policy `id`, computed in a worker that lives until `leaving`; `told({band, isExact})` is called with what the policy holds now. */
+/** Shows the surface of policy `id`; `told({band, isExact})` is called with what the policy holds now. */
 export function surfaceView({ id, problem, leaving, told }) {
-  const status = h("p", { role: "status" }, "Reading the policy\u2026");
-  const holder = h("div", {}, status);
-  const worker = new Worker(workerAddress(), { type: "module" });
-  leaving.addEventListener("abort", () => worker.terminate());
-  const fail = (words) => holder.replaceChildren(h("p", { class: "error", role: "alert" }, words));
-  const { element, show, next } = explorer(problem, (wish) => worker.postMessage(wish));
-  worker.addEventListener("error", () => fail("The surface could not be computed."));
-  worker.addEventListener("message", ({ data }) => {
-    if (data.failed) return fail(data.failed);
-    if (data.ready) {
-      told(data.ready);
-      return next();
-    }
-    if (holder.firstChild === status) holder.replaceChildren(element);
-    show(data.picture);
-  });
-  worker.postMessage({ address: `/policies/${id}/export`, headers: shown() });
+  const holder = h("div", {}, h("p", { role: "status" }, "Reading the policy\u2026"));
+  const fail = (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error", role: "alert" }, error.message));
+  const ask = (wish) => surface(id, wish, leaving);
+  ask({ step: 0 }).then((first) => {
+    const { advice } = first;
+    told({ band: advice.band, isExact: isSingle(first) || advice.source !== "policy_surrogate" });
+    const { element, show, next } = explorer(problem, isSingle(first) ? Math.min(1, problem.horizon - 1) : 0, ask, fail);
+    holder.replaceChildren(element);
+    if (isSingle(first) && problem.horizon > 1) next();
+    else show(first);
+  }, fail);
   return holder;
 }
 
-/** Resolves to what policy `id` holds after `step` periods at each of `means`, with everything else in the middle of its design. */
-export function surfaceCurve(id, { step, means }, leaving) {
-  const worker = new Worker(workerAddress(), { type: "module" });
-  leaving.addEventListener("abort", () => worker.terminate());
-  return new Promise((resolve, reject) => {
-    const end = (settle, value) => (worker.terminate(), settle(value));
-    worker.addEventListener("error", () => end(reject, new Error("The policy could not be read.")));
-    worker.addEventListener("message", ({ data }) => {
-      if (data.failed) end(reject, new Error(data.failed));
-      else if (data.ready) worker.postMessage({ step, means });
-      else end(resolve, data.curve);
-    });
-    worker.postMessage({ address: `/policies/${id}/export`, headers: shown() });
+/** Resolves to what policy `id` holds after `step` periods at each of `means`, with everything else in the middle of its design; null outside the
+ * design. */
+export async function surfaceCurve(id, { step, means }, leaving) {
+  const { columns, means: solved, allocations } = await surface(id, { step }, leaving);
+  const held = allocations.map((row) => row[columns.length >> 1]);
+  if (solved.length === 1) return means.map(() => held[0]);
+  const grain = solved[1] - solved[0];
+  return means.map((mean) => {
+    const place = (mean - solved[0]) / grain;
+    const below = Math.min(Math.max(0, Math.floor(place)), solved.length - 2);
+    return place < 0 || place > solved.length - 1 ? null : held[below] + (place - below) * (held[below + 1] - held[below]);
   });
 }
 
 /** Returns the controls and the drawing. One request is pending at a time; the latest one made meanwhile follows it. */
-function explorer({ horizon, periods_per_year }, ask) {
+function explorer({ horizon, periods_per_year }, start, ask, fail) {
   const unit = unitOf(periods_per_year);
-  const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: Math.min(1, horizon - 1), step: 1 });
+  const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: start, step: 1 });
   const across = h("select", { id: "surface-across" });
-  const radius = h("input", { type: "range", id: "surface-radius", min: 0, max: RADII, value: RADII / 2, step: 1 });
-  const outputs = { step: h("output", { for: step.id }), radius: h("output", { for: radius.id }) };
+  const output = h("output", { for: step.id });
   const field = (label, control, output) =>
     h("p", { class: "field" }, h("label", { for: control.id }, label), control, output);
-  const fields = {
-    step: field(unit[0].toUpperCase() + unit.slice(1), step, outputs.step),
-    across: field("Across", across, null),
-    radius: field("Caution", radius, outputs.radius),
-  };
+  const choice = field("Across", across, null);
   const drawing = h("div", {});
   let [out, stale] = [false, false];
+  const say = () => {
+    output.textContent = `${Number(step.value) + 1} of ${horizon}`;
+    step.setAttribute("aria-valuetext", `${unit} ${output.textContent}`);
+  };
   const next = () => {
-    outputs.step.textContent = `${Number(step.value) + 1} of ${horizon}`;
-    step.setAttribute("aria-valuetext", `${unit} ${outputs.step.textContent}`);
+    say();
     stale = out;
     if (out) return;
     out = true;
-    ask({ step: Number(step.value), across: across.value, radius: Number(radius.value) / RADII });
+    ask({ step: Number(step.value), across: across.value }).then((found) => {
+      out = false;
+      show(found);
+      if (stale) next();
+    }, fail);
   };
-  const show = (picture) => {
-    out = false;
-    offer(picture);
-    drawing.replaceChildren(DRAWN[picture.kind](picture));
-    if (stale) next();
-  };
-  const offer = ({ choices = [], across: chosen, radius: value = null }) => {
-    fields.across.hidden = choices.length < 2;
-    fields.radius.hidden = value === null;
-    if ([...across.options].map(({ value }) => value).join() !== choices.join()) {
-      across.replaceChildren(...choices.map((axis) => h("option", { value: axis }, AXES[axis].label)));
+  const show = (found) => {
+    say();
+    choice.hidden = found.axes.length < 2;
+    if ([...across.options].map(({ value }) => value).join() !== found.axes.join()) {
+      across.replaceChildren(...found.axes.map((axis) => h("option", { value: axis }, AXES[axis].label)));
     }
-    if (chosen) across.value = chosen;
-    if (value === null) return;
-    outputs.radius.textContent = AXES.radius.format(value);
-    radius.setAttribute("aria-valuetext", outputs.radius.textContent);
+    if (found.across) across.value = found.across;
+    drawing.replaceChildren(drawn(found));
   };
-  for (const control of [step, across, radius]) control.addEventListener("input", next);
-  const element = h("div", {}, h("div", { class: "controls" }, Object.values(fields)), drawing);
+  for (const control of [step, across]) control.addEventListener("input", next);
+  const element = h("div", {}, h("div", { class: "controls" }, field(unit[0].toUpperCase() + unit.slice(1), step, output), choice), drawing);
   return { element, show, next };
 }
 
-const DRAWN = { single, line: alongOne, field: overTwo };
+function drawn(found) {
+  const { across, columns, means, observed_means, allocations } = found;
+  if (isSingle(found)) return single(found.advice);
+  if (means.length === 1) return alongOne(across, columns, allocations[0]);
+  if (across === null) return alongOne(observed_means ? "observed" : "mean", observed_means ?? means, allocations.map(([only]) => only));
+  return overTwo(found);
+}
 
-function single({ band: [low, high], floor_gain }) {
+function single({ band: [low, high], certainty_equivalent, floor }) {
   const here = "Here every session of this policy knows the same record: ";
   const [least, most] = [low, high].map(allocation);
   if (most === allocation(0)) return h("p", { class: "single" }, here, "hold ", h("strong", {}, "nothing"), " in stocks, because in the worst market nothing beats the bank.");
@@ -129,12 +109,12 @@ function single({ band: [low, high], floor_gain }) {
     "hold ",
     h("strong", {}, least === most ? least : [least, " to ", most]),
     " in stocks, worth ",
-    h("strong", {}, percentFigures(Math.expm1(floor_gain), 2)),
+    h("strong", {}, percentFigures(certainty_equivalent / floor - 1, 2)),
     " more than the bank even in the worst market, if you start in the bank.",
   );
 }
 
-function alongOne({ axis, values, allocations }) {
+function alongOne(axis, values, allocations) {
   const { label, format, tick } = AXES[axis];
   return lineChart({
     title: "Share held in stocks",
@@ -144,22 +124,29 @@ function alongOne({ axis, values, allocations }) {
   });
 }
 
-function overTwo({ across, xs, ys, cells, dots, own, rest }) {
+function overTwo({ axes, across, columns, means, observed_means, allocations, in_design, design, middle, own }) {
   const axis = (name, values) => ({ name: AXES[name].label, values, format: AXES[name].format, tick: AXES[name].tick });
-  const fixed = rest.map(([name, value]) => `${AXES[name].label.toLowerCase()} ${AXES[name].format(value)}`);
-  const stretched = across === "deviation" ? " and standard deviation" : "";
-  const marked = own ? " The cross is the history itself." : "";
-  const note = `Each cell is the history, shifted to that average${stretched}${fixed.length > 0 ? `; ${fixed.join(", ")}` : ""}.${marked} Beyond the situations solved, Ballast solves the step again. Returns here are log-returns.`;
+  const rest = axes.filter((name) => name !== across);
+  const fixed = rest.map((name) => `${AXES[name].label.toLowerCase()} ${AXES[name].format(middle[name])}`);
+  const others = fixed.length > 0 ? `; ${fixed.join(", ")}` : "";
+  // The rows are even in both.
+  const rows = observed_means ?? means;
+  const shown = (mean) => rows[0] + ((mean - means[0]) * (rows[1] - rows[0])) / (means[1] - means[0]);
+  const cell = observed_means
+    ? `Each cell is the history followed by returns of that average${others}. The cross is the history followed by its own oldest returns.`
+    : `Each cell is the history, shifted to that average${across === "deviation" ? " and standard deviation" : ""}${others}. The cross is the history itself.`;
+  const note = `${cell} Pale cells lie beyond the situations solved; there Ballast solves the step again. Returns here are log-returns.`;
   return heatmap({
     title: "Share held in stocks",
     name: "hold",
-    x: axis(across, xs),
-    y: axis("mean", ys),
-    field: cells,
-    range: rounded(cells.flat()),
+    x: axis(across, columns),
+    y: axis(observed_means ? "observed" : "mean", rows),
+    field: allocations,
+    solved: in_design,
+    range: rounded(allocations.flat()),
     format: (value) => percent(value, 0),
-    dots,
-    own,
+    dots: design.map(([value, mean]) => [value, shown(mean)]),
+    own: [own[across], shown(own.mean)],
     note,
   });
 }
