@@ -10,7 +10,7 @@ const COLOURS = 11;
 
 /**
  * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x; `solved` has the same shape, and is false for
- * pale cells;
+ * faded cells;
  * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: the position of the record itself, or null. The
  * cell read first is that of the record, or the middle.
  */

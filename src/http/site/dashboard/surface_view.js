@@ -121,6 +121,8 @@ function alongOne(axis, values, allocations) {
     x: { values, label, format, tick },
     y: { format: percent, tick: percentTick, also: [0] },
     series: [{ name: "Hold", kind: "line", values: allocations }],
+    start: values.length >> 1,
+    note: { observed: "At each point the history is followed by returns of that average, here log-returns.", mean: "At each point the history is shifted to that average log-return." }[axis],
   });
 }
 
@@ -135,7 +137,7 @@ function overTwo({ axes, across, columns, means, observed_means, allocations, in
   const cell = observed_means
     ? `Each cell is the history followed by returns of that average${others}. The cross is the history followed by its own oldest returns.`
     : `Each cell is the history, shifted to that average${across === "deviation" ? " and standard deviation" : ""}${others}. The cross is the history itself.`;
-  const note = `${cell} Pale cells lie beyond the situations solved; there Ballast solves the step again. Returns here are log-returns.`;
+  const note = `${cell} Faded cells lie beyond the situations solved; there Ballast solves the step again. Returns here are log-returns.`;
   return heatmap({
     title: "Share held in stocks",
     name: "hold",
