@@ -1,4 +1,5 @@
-//! The body of `POST /policies/import`: refused, or a policy that is written as it was read and gives a sane advice.
+//! The body of `POST /policies/import`: refused, or a policy that is written as it was read, gives a sane advice and is
+//! drawn.
 #![no_main]
 
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
@@ -16,5 +17,7 @@ fuzz_target!(|body: &[u8]| {
     for step in 0..advisor.policy().steps().len().min(2) {
         let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
         assert!((0.0..=1.0).contains(&advice.allocation), "{}", advice.allocation);
+        let drawn = advisor.surface_column(&advisor.surface_states(step, None), 0);
+        assert!(drawn.iter().all(|(allocation, _)| (0.0..=1.0).contains(allocation)), "{drawn:?}");
     }
 });

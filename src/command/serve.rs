@@ -115,7 +115,7 @@ struct LimitArgs {
     /// Advice, observations, and sessions opened or deleted, per second and tenant; 0: any number.
     #[arg(long, env = "BALLAST_RATE_LIVE", default_value_t = 50_000)]
     rate_live: u32,
-    /// Robust steps solved on request, jobs queued and policies imported, per second and tenant; 0: any number.
+    /// Robust steps solved on request, jobs queued, and policies imported or drawn, per second and tenant; 0: any number.
     #[arg(long, env = "BALLAST_RATE_HEAVY", default_value_t = 500)]
     rate_heavy: u32,
     /// Other calls, per second and tenant; 0: any number.

@@ -39,7 +39,7 @@ before(async () => {
 
 const map = () => page.getByRole("application", { name: /Share held in stocks/ });
 
-/** Opens the policy and moves the sliders as a person does; the long tasks since the page stood, in milliseconds. */
+/** Opens the policy and moves the slider as a person does; the long tasks since the page stood, in milliseconds. */
 async function walk() {
   await page.goto("about:blank");
   await page.goto(`${ballast.url}/#/policies/${policy}`);
@@ -58,7 +58,7 @@ async function walk() {
   return page.evaluate(() => [...longTasks]);
 }
 
-test("no task is long while the surface is drawn and its sliders move", async (t) => {
+test("no task is long while the surface is drawn and its slider moves", async (t) => {
   await page.addInitScript(() => {
     globalThis.longTasks = [];
     const keep = (list) => longTasks.push(...list.getEntries().map(({ duration }) => Math.round(duration)));

@@ -763,6 +763,7 @@ async fn unknown_things_are_refused() {
         ("/jobs/42/events", "job"),
         ("/policies/42", "policy"),
         ("/policies/42/export", "policy"),
+        ("/policies/42/surface", "policy"),
         ("/sessions/42", "session"),
         ("/sessions/42/history", "session"),
         ("/action?session=42", "session"),

@@ -299,9 +299,11 @@ async fn a_policy_of_several_assets_goes_out_and_comes_in_as_it_was(mut app: App
         assert_eq!(other.report(period, report.clone()).await.0, 200);
     }
     let mut forged = document;
-    forged["specification"]["fund"]["radius_factor"] = json!(0.5);
-    let (status, refused) = other.post("/policies/import", &forged).await;
-    assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("fund.radius_factor")), "{refused}");
+    for (factor, field) in [(json!(0.5), "fund.radius_factor"), (Value::Null, "specification.fund.radius_factor")] {
+        forged["specification"]["fund"]["radius_factor"] = factor;
+        let (status, refused) = other.post("/policies/import", &forged).await;
+        assert_eq!((status.as_u16(), &refused["field"]), (422, &json!(field)), "{refused}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -164,6 +164,7 @@ fn naming(job: &str, evaluation: &str, policy: &str, session: &str) -> Vec<(Meth
         get(format!("/jobs/{evaluation}/report")),
         get(format!("/policies/{policy}")),
         get(format!("/policies/{policy}/export")),
+        get(format!("/policies/{policy}/surface")),
         get(format!("/sessions/{session}")),
         get(format!("/sessions/{session}/history")),
         get(format!("/action?session={session}")),

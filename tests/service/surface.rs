@@ -85,6 +85,28 @@ async fn a_cell_is_what_a_session_with_that_record_is_advised() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn money_still_to_come_is_no_wealth() {
+    let (mut app, mut request) =
+        (App::start().await, any_record(json!({ "kind": "exponential", "risk_aversion": 0.01 })));
+    request["problem"]["contributions"] = json!(60.0);
+    request["design"]["wealth"] = json!({ "min": 20.0, "max": 400.0 });
+    app.train(&request).await;
+    let (drawn, shape) = (surface(&app, "across=wealth").await, shape(&request, 0));
+    let (columns, means) = (numbers(&drawn["columns"]), numbers(&drawn["means"]));
+    let grain = columns[1] - columns[0];
+    assert!(grain > 0.0 && columns[0] >= 1.0, "{columns:?}");
+    assert!(columns.windows(2).all(|pair| (pair[1] - pair[0] - grain).abs() < 1e-9), "{columns:?}");
+    let deviation = drawn["middle"]["deviation"].as_f64().unwrap();
+    for (row, column) in [(15, 1), (15, 10), (20, 15)] {
+        let advice = advised(&mut app, &shape, 0, (columns[column], means[row], deviation)).await;
+        assert_eq!(drawn["in_design"][row][column], advice["in_design"], "{advice}");
+        let [drawn, advised] =
+            [&drawn["allocations"][row][column], &advice["allocation"]].map(|value| value.as_f64().unwrap());
+        assert!(advice["in_design"] == false || (drawn - advised).abs() < ROUNDING, "{drawn} {advised}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn one_state_is_one_cell_and_the_policys_own_record_is_advised_as_a_session_is() {
     let mut app = App::start().await;
     app.train(&specification(2)).await;

@@ -56,8 +56,9 @@ const WORLDS: [f64; 3] = [0.0, 0.5, 1.0];
 
 impl Specification {
     /// Returns a completed specification with the results found from its record: the factor on the radius of several
-    /// assets, the correction of simulated radii, and its levels if its caution is one of them. Cost: the joint factor, and that of [`RadiusEstimator::found_correction`], 600 radii and
-    /// 43,200 sums over the returns, fewer for long records: 0.25 s at 240 returns.
+    /// assets, the correction of simulated radii, and its levels if its caution is one of them. Cost: the joint factor of
+    /// several assets, that of [`RadiusEstimator::found_correction`], 600 radii and 43,200 sums over the returns, fewer for
+    /// long records: 0.25 s at 240 returns of one asset.
     #[must_use]
     pub fn resolved(mut self, kept: &Cache) -> Self {
         if let Some(fund) = self.fund.as_mut().filter(|fund| fund.radius_factor.is_none()) {

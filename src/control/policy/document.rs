@@ -110,6 +110,10 @@ impl Policy {
             let rule = "must be present if the level of caution is found from the record, and absent otherwise";
             return Err(FieldError::new("specification.problem.levels", "null or an object", rule));
         }
+        if self.specification.fund.as_ref().is_some_and(|fund| fund.radius_factor.is_none()) {
+            let rule = "must be given in a policy";
+            return Err(FieldError::new("specification.fund.radius_factor", "null", rule));
+        }
         let horizon = self.specification.problem.horizon;
         if self.steps.len() != horizon {
             return Err(FieldError::new("steps", self.steps.len(), format!("must hold horizon = {horizon} steps")));

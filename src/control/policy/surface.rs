@@ -59,7 +59,8 @@ pub struct SurfaceGrid {
     pub observed_means: Option<Vec<f64>>,
     /// At most 300 design points, as the value of `across` and the mean.
     pub design: Vec<[f64; 2]>,
-    /// The middle of the design, whose value is kept by whatever no axis shows.
+    /// The middle of the design. Wealth stays there if no axis shows it, and so does the deviation of a record that is
+    /// shifted as a whole.
     pub middle: SurfacePoint,
     /// The policy's own record and initial wealth.
     pub own: SurfacePoint,

@@ -14,8 +14,9 @@ use crate::control::request::rules::{LOG_RETURN, WEALTH};
 use crate::control::request::specification::{InitialLaws, ProblemSpecification, Specification};
 use crate::control::surrogate::stored::StepSurrogates;
 use crate::numerics::law::moments::CentralMoments;
+use crate::numerics::machine::interruption;
 
-/// Numbers of columns and rows. They are odd, so that the middle of the design is among the points.
+/// Numbers of columns and rows.
 const POINTS: [usize; 2] = [21, 31];
 /// With more design points or returns than this a state takes milliseconds, so fewer are shown.
 const MANY: usize = 2000;
@@ -91,7 +92,8 @@ const MEAN: Quantity = Quantity { names: &["mean", "moment_1"], range: (-LOG_RET
 
 /// The features of a design in their own units.
 struct DesignFeatures<'a> {
-    names: &'a [String],
+    /// The names of its features, in the order of the inputs.
+    names: Vec<String>,
     stored: &'a StepSurrogates,
 }
 
@@ -132,10 +134,9 @@ impl DesignFeatures<'_> {
         Some(value.clamp(quantity.range.0, quantity.range.1))
     }
 
-    /// Returns even values of a quantity over the design.
-    fn spread(&self, quantity: &Quantity, count: usize) -> Option<Vec<f64>> {
-        let (low, high) = (self.at(quantity, -WIDE)?, self.at(quantity, WIDE)?);
-        Some((0..count).map(|index| low + (high - low) * index as f64 / (count - 1) as f64).collect())
+    /// Returns the ends of a quantity over the design.
+    fn ends(&self, quantity: &Quantity) -> Option<[f64; 2]> {
+        Some([self.at(quantity, -WIDE)?, self.at(quantity, WIDE)?])
     }
 
     /// Returns a quantity at every design point.
@@ -164,17 +165,19 @@ impl Advisor {
             own,
         };
         let mut states = SurfaceStates { grid, record, to_come: self.problem.dynamics(step).to_come };
-        let solved = &self.policy().steps()[step];
-        if let (Some(stored), Some(policy)) = (solved.solution.surrogates(), &solved.diagnostics.policy) {
-            states.cover(&DesignFeatures { names: &policy.features, stored }, across);
+        if let Some(stored) = self.policy().steps()[step].solution.surrogates() {
+            let names = self.problem.selection.names();
+            let names = stored.scaling.active.iter().map(|&feature| names[feature].clone()).collect();
+            states.cover(&DesignFeatures { names, stored }, across);
         }
         states
     }
 
     /// Returns the allocations of a column of `states`, row by row, and whether each lies in the design. Cost: that of an
-    /// advice by surrogate for each row.
+    /// advice by surrogate for each row, and once for each step the factor that the predicted deviations need.
     pub fn surface_column(&self, states: &SurfaceStates, column: usize) -> Vec<(f64, bool)> {
         let of_row = |&mean: &f64| {
+            interruption::checkpoint();
             let point = states.point(column, mean);
             let law = self.specification().problem.learning.law(&states.record.at(point.mean, point.deviation));
             let state = State { wealth: point.wealth, holding: 0.0, law };
@@ -200,41 +203,40 @@ impl SurfaceStates {
     }
 
     fn cover(&mut self, design: &DesignFeatures<'_>, across: Option<SurfaceAxis>) {
-        let (count, [wealth, deviation]) = (design.stored.count(), AXES.map(Quantity::of));
+        let (own, count) = (self.grid.own, design.stored.count());
+        let middle = |axis, own: f64| design.at(&Quantity::of(axis), 0.0).map_or(own, |value| self.shown(axis, value));
         self.grid.middle = SurfacePoint {
-            wealth: design.at(&wealth, 0.0).map_or(self.grid.own.wealth, |total| self.without_contributions(total)),
-            mean: design.at(&MEAN, 0.0).unwrap_or(self.grid.own.mean),
-            deviation: design.at(&deviation, 0.0).unwrap_or(self.grid.own.deviation),
+            wealth: middle(SurfaceAxis::Wealth, own.wealth),
+            mean: design.at(&MEAN, 0.0).unwrap_or(own.mean),
+            deviation: middle(SurfaceAxis::Deviation, own.deviation),
         };
         let is_axis = |axis: &SurfaceAxis| {
             design.feature(&Quantity::of(*axis)).is_some() && (*axis == SurfaceAxis::Wealth || self.record.is_free())
         };
         self.grid.axes = AXES.into_iter().filter(is_axis).collect();
-        self.grid.across =
-            across.filter(|axis| self.grid.axes.contains(axis)).or_else(|| self.grid.axes.first().copied());
         let [columns, rows] = if count.max(self.record.returns.len()) > MANY { FEWER_POINTS } else { POINTS };
-        self.grid.means = design.spread(&MEAN, rows).unwrap_or_else(|| vec![self.grid.middle.mean]);
-        let observed = |means: &Vec<f64>| means.iter().map(|&mean| self.record.observed(mean)).collect();
+        let means = design.ends(&MEAN).and_then(|ends| even(ends, rows));
+        self.grid.means = means.unwrap_or_else(|| vec![self.grid.middle.mean]);
         let is_observed = self.grid.means.len() > 1 && !self.record.is_free();
+        let observed = |means: &Vec<f64>| means.iter().map(|&mean| self.record.observed(mean)).collect();
         self.grid.observed_means = is_observed.then_some(&self.grid.means).map(observed);
-        let shown = |values: Vec<f64>| -> Vec<f64> {
-            if self.grid.across == Some(SurfaceAxis::Wealth) {
-                values.into_iter().map(|total| self.without_contributions(total)).collect()
-            } else {
-                values
-            }
-        };
-        let columns = self.grid.across.and_then(|axis| design.spread(&Quantity::of(axis), columns));
-        let columns = columns.map_or_else(|| vec![self.grid.middle.deviation], &shown);
-        let points = self.grid.across.map_or_else(Vec::new, |axis| shown(design.points(&Quantity::of(axis))));
+        let across = across.filter(|axis| self.grid.axes.contains(axis)).or_else(|| self.grid.axes.first().copied());
+        let ends = |axis| design.ends(&Quantity::of(axis)).map(|ends| ends.map(|end| self.shown(axis, end)));
+        let values = across.and_then(|axis| even(ends(axis)?, columns));
+        self.grid.across = across.filter(|_| values.is_some());
+        self.grid.columns = values.unwrap_or_else(|| vec![self.grid.middle.deviation]);
+        let points = |axis| design.points(&Quantity::of(axis)).into_iter().map(move |value| (axis, value));
+        let points = self.grid.across.into_iter().flat_map(points).map(|(axis, value)| self.shown(axis, value));
         let stride = count.div_ceil(MOST_DESIGN_POINTS).max(1);
-        self.grid.design = points.into_iter().zip(design.points(&MEAN)).map(<[f64; 2]>::from).step_by(stride).collect();
-        self.grid.columns = columns;
+        self.grid.design = points.zip(design.points(&MEAN)).map(<[f64; 2]>::from).step_by(stride).collect();
     }
 
-    /// Returns the wealth behind total wealth, which includes the present value of the contributions still to come.
-    fn without_contributions(&self, total: f64) -> f64 {
-        (total - self.to_come).max(LEAST_WEALTH * self.grid.own.wealth)
+    /// Returns a value of an axis as it is shown: wealth without the present value of the contributions still to come.
+    fn shown(&self, axis: SurfaceAxis, value: f64) -> f64 {
+        match axis {
+            SurfaceAxis::Wealth => (value - self.to_come).max(LEAST_WEALTH * self.grid.own.wealth),
+            SurfaceAxis::Deviation => value,
+        }
     }
 
     fn point(&self, column: usize, mean: f64) -> SurfacePoint {
@@ -248,9 +250,15 @@ impl SurfaceStates {
 
     /// Returns the surface of these columns, each as from [`Advisor::surface_column`].
     pub fn surface(self, columns: &[Vec<(f64, bool)>], advice: Advice) -> Surface {
-        let (grid, rows) = (self.grid.clone(), 0..self.grid.means.len());
+        let rows = 0..self.grid.means.len();
         let allocations = rows.clone().map(|row| columns.iter().map(|column| column[row].0).collect()).collect();
         let in_design = rows.map(|row| columns.iter().map(|column| column[row].1).collect()).collect();
-        Surface { grid, allocations, in_design, advice }
+        Surface { grid: self.grid, allocations, in_design, advice }
     }
+}
+
+/// Returns even values between two ends; `None` if they are no interval.
+fn even([low, high]: [f64; 2], count: usize) -> Option<Vec<f64>> {
+    let at = |index: usize| low + (high - low) * index as f64 / (count - 1) as f64;
+    (high > low).then(|| (0..count).map(at).collect())
 }

@@ -38,7 +38,7 @@ const ROUND: Duration = Duration::from_secs(60);
 const FIRST_DELAY: Duration = Duration::from_secs(60);
 const LONGEST_DELAY: Duration = Duration::from_hours(24);
 /// Longest time for one step. A step that takes longer is left to a later round, so that it does not delay the tenant's
-/// other sessions. The joint factor of thirty assets over two thousand dates takes some seconds of it.
+/// other sessions.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Sessions read at a time in a round.
 const PAGE: usize = 256;

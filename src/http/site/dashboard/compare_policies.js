@@ -12,8 +12,6 @@ import { surfaceCurve } from "./surface_view.js";
 
 /** Number of points at which the two are evaluated. */
 const ALONG = 61;
-/** Standard errors of the mean, on either side of it, over which the two are shown. */
-const ASIDE = 2.5;
 
 export async function policiesBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
@@ -112,14 +110,14 @@ export function rows(asked) {
 /** Draws what each holds near the start, by the average return of the record. */
 function curves(ids, both, leaving) {
   const holder = h("div", {}, h("p", { class: "note" }, "Reading the two policies\u2026"));
-  const known = both.map(({ specification: { problem } }) => ({ ...moments(problem.history), n: problem.history.length }));
-  const wide = known.map(({ mean, deviation, n }) => [mean - (ASIDE * deviation) / Math.sqrt(n), mean + (ASIDE * deviation) / Math.sqrt(n)]);
-  const [low, high] = [Math.min(...wide.map(([from]) => from)), Math.max(...wide.map(([, to]) => to))];
-  const means = Array.from({ length: ALONG }, (_, k) => low + ((high - low) * k) / (ALONG - 1));
-  Promise.all(ids.map((id, index) => surfaceCurve(id, { step: Math.min(1, both[index].horizon - 1), means }, leaving))).then(
-    (held) => {
-      const series = held.map((values, index) => ({ name: LETTERS[index], kind: "line", bare: true, values }));
-      const start = means.findIndex((mean) => mean >= known[0].mean);
+  const known = both.map(({ specification: { problem } }) => moments(problem.history));
+  Promise.all(ids.map((id, index) => surfaceCurve(id, Math.min(1, both[index].horizon - 1), leaving))).then(
+    (found) => {
+      const ranges = found.map(({ range }, index) => range ?? [known[index].mean - known[index].deviation, known[index].mean + known[index].deviation]);
+      const [low, high] = [Math.min(...ranges.map(([from]) => from)), Math.max(...ranges.map(([, to]) => to))];
+      const means = Array.from({ length: ALONG }, (_, k) => low + ((high - low) * k) / (ALONG - 1));
+      const series = found.map(({ at }, index) => ({ name: LETTERS[index], kind: "line", bare: true, values: means.map(at) }));
+      const start = Math.max(0, means.findIndex((mean) => mean >= known[0].mean));
       const x = { values: means, label: "Average return", format: (value) => percent(value, 2), tick: percentTick };
       holder.replaceChildren(lineChart({ title: "Share in stocks by average return", height: 240, start, x, y: { format: percent, tick: percentTick, also: [0] }, series }));
     },
@@ -127,7 +125,7 @@ function curves(ids, both, leaving) {
   );
   return section(
     "What they hold",
-    h("p", { class: "note" }, "After the first period, by the average log-return of the whole record. Wealth and deviation are in the middle of what the policy was trained for."),
+    h("p", { class: "note" }, "After the first period, by the average log-return of the whole record. Wealth, or the standard deviation, is in the middle of what the policy was trained for."),
     holder,
   );
 }

@@ -11,10 +11,10 @@ const COLOURS = 11;
 /**
  * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x; `solved` has the same shape, and is false for
  * faded cells;
- * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: the position of the record itself, or null. The
+ * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: the position of the record itself. The
  * cell read first is that of the record, or the middle.
  */
-export function heatmap({ title, x, y, field, solved, range, format, dots, own = null, note, name }) {
+export function heatmap({ title, x, y, field, solved, range, format, dots, own, note, name }) {
   const [columns, rows] = [x.values.length, y.values.length];
   const output = h("output", { class: "here", "aria-live": "polite" });
   const legend = h(
@@ -39,7 +39,7 @@ export function heatmap({ title, x, y, field, solved, range, format, dots, own =
   const colour = (value) =>
     `c${Math.round((COLOURS - 1) * Math.max(0, Math.min(1, (value - range[0]) / (range[1] - range[0] || 1))))}`;
   const near = (axis, d, value) => Math.round((value - axis.values[0]) / (2 * d));
-  const first = own && inside(own, x.values, y.values) ? [near(x, dx, own[0]), near(y, dy, own[1])] : [columns >> 1, rows >> 1];
+  const first = inside(own, x.values, y.values) ? [near(x, dx, own[0]), near(y, dy, own[1])] : [columns >> 1, rows >> 1];
   let [column, row] = first,
     place,
     cursor;
@@ -82,7 +82,7 @@ export function heatmap({ title, x, y, field, solved, range, format, dots, own =
       s("text", { class: "axis", x: 0, y: 11 }, y.name),
       ramp(right + 14, range, format),
       cursor,
-      own && inside(own, x.values, y.values) ? cross(across(own[0]), up(own[1])) : null,
+      inside(own, x.values, y.values) ? cross(across(own[0]), up(own[1])) : null,
     ];
   });
   const mark = () => {

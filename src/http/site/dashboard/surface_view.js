@@ -28,7 +28,7 @@ export function surfaceView({ id, problem, leaving, told }) {
   ask({ step: 0 }).then((first) => {
     const { advice } = first;
     told({ band: advice.band, isExact: isSingle(first) || advice.source !== "policy_surrogate" });
-    const { element, show, next } = explorer(problem, isSingle(first) ? Math.min(1, problem.horizon - 1) : 0, ask, fail);
+    const { element, show, next } = explorer(problem, isSingle(first) ? Math.min(1, problem.horizon - 1) : 0, ask, leaving);
     holder.replaceChildren(element);
     if (isSingle(first) && problem.horizon > 1) next();
     else show(first);
@@ -36,22 +36,27 @@ export function surfaceView({ id, problem, leaving, told }) {
   return holder;
 }
 
-/** Resolves to what policy `id` holds after `step` periods at each of `means`, with everything else in the middle of its design; null outside the
- * design. */
-export async function surfaceCurve(id, { step, means }, leaving) {
-  const { columns, means: solved, allocations } = await surface(id, { step }, leaving);
-  const held = allocations.map((row) => row[columns.length >> 1]);
-  if (solved.length === 1) return means.map(() => held[0]);
-  const grain = solved[1] - solved[0];
-  return means.map((mean) => {
-    const place = (mean - solved[0]) / grain;
-    const below = Math.min(Math.max(0, Math.floor(place)), solved.length - 2);
-    return place < 0 || place > solved.length - 1 ? null : held[below] + (place - below) * (held[below + 1] - held[below]);
-  });
+/** Resolves to what policy `id` holds after `step` periods by the mean of the record, with wealth or deviation in the middle of its design: `range`
+ * is that of the design, null if the mean changes nothing; `at(mean)` is null beyond it. */
+export async function surfaceCurve(id, step, leaving) {
+  const { across, columns, means, allocations, middle } = await surface(id, { step }, leaving);
+  const held = allocations.map((row) => between(columns, row, middle[across]));
+  if (means.length === 1) return { range: null, at: () => held[0] };
+  const range = [means[0], means.at(-1)];
+  return { range, at: (mean) => (mean < range[0] || mean > range[1] ? null : between(means, held, mean)) };
+}
+
+/** Returns a function that is known at even `places`, between them. */
+function between(places, values, at) {
+  if (places.length === 1) return values[0];
+  const position = (at - places[0]) / (places[1] - places[0]);
+  const below = Math.min(Math.max(0, Math.floor(position)), places.length - 2);
+  const share = Math.min(Math.max(0, position - below), 1);
+  return values[below] + share * (values[below + 1] - values[below]);
 }
 
 /** Returns the controls and the drawing. One request is pending at a time; the latest one made meanwhile follows it. */
-function explorer({ horizon, periods_per_year }, start, ask, fail) {
+function explorer({ horizon, periods_per_year }, start, ask, leaving) {
   const unit = unitOf(periods_per_year);
   const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: start, step: 1 });
   const across = h("select", { id: "surface-across" });
@@ -70,11 +75,11 @@ function explorer({ horizon, periods_per_year }, start, ask, fail) {
     stale = out;
     if (out) return;
     out = true;
-    ask({ step: Number(step.value), across: across.value }).then((found) => {
+    const fail = (error) => leaving.aborted || drawing.replaceChildren(h("p", { class: "error", role: "alert" }, error.message));
+    ask({ step: Number(step.value), across: across.value }).then(show, fail).then(() => {
       out = false;
-      show(found);
       if (stale) next();
-    }, fail);
+    });
   };
   const show = (found) => {
     say();
