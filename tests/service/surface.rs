@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 /// The two allocations are computed from records that differ by rounding, and smoothed by a Gaussian process.
 const ROUNDING: f64 = 1e-7;
-/// What the bank pays in a period.
+/// Rate of the bank in a period.
 const RATE: f64 = 0.002;
 
 fn numbers(value: &Value) -> Vec<f64> {

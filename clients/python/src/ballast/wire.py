@@ -2138,7 +2138,10 @@ class SurfaceGrid(TypedDict):
     design: list[list[float]]
     """At most 300 design points, as the value of `across` and the mean."""
     middle: SurfacePoint
-    """The middle of the design, whose value is kept by whatever no axis shows."""
+    """
+    The middle of the design. Wealth stays there if no axis shows it, and so does the deviation of a record that is
+    shifted as a whole.
+    """
     own: SurfacePoint
     """The policy's own record and initial wealth."""
 
