@@ -26,7 +26,9 @@ def cells(service: Service) -> list[Any]:
     assert sum(URL in source for source in sources) == 1
     for cell in stored.cells:
         cell.source = cell.source.replace(URL, service.url)
-    NotebookClient(stored, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}).execute()
+    # A cell that hangs is ended. One walk takes minutes beside the other checks, at the lowest priority.
+    client = NotebookClient(stored, timeout=900, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}})
+    client.execute()
     return [cell for cell in stored.cells if cell.cell_type == "code"]
 
 
