@@ -190,6 +190,11 @@ impl ProblemDocument {
         ProblemDocument::new(kind, detail).naming(error.field, value, error.rule)
     }
 
+    /// Creates the problem of a query parameter that breaks a rule.
+    pub fn of_parameter(name: &str, value: &str, rule: impl Into<String>) -> Self {
+        ProblemDocument::of_field(ProblemKind::InvalidQuery, FieldError::new(name, value, rule))
+    }
+
     /// Adds the field, its value and the rule that it must satisfy.
     pub fn naming(self, field: impl Into<String>, value: impl Into<Value>, rule: impl Into<Box<str>>) -> Self {
         let value = match value.into() {

@@ -52,8 +52,7 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
     let mut object = serde_json::Map::new();
     for (name, value) in pairs {
         if object.contains_key(&name) {
-            let error = FieldError::new(name, value, "must be given once");
-            return Err(ProblemDocument::of_field(ProblemKind::InvalidQuery, error));
+            return Err(ProblemDocument::of_parameter(&name, &value, "must be given once"));
         }
         object.insert(name, Value::String(value));
     }

@@ -8,11 +8,10 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::error::FieldError;
 use crate::http::gate::access::{CallerOf, ReadCalls};
 use crate::http::gate::bodies;
 use crate::http::gate::extract::Parameters;
-use crate::http::problem::{ProblemDocument, ProblemKind};
+use crate::http::problem::ProblemDocument;
 use crate::http::routes::page::{self, Page};
 use crate::http::routes::wire::{SessionStatus, session_state};
 use crate::service::Service;
@@ -220,16 +219,12 @@ pub async fn list(
     bodies::written(&service, Large { value, room }).await
 }
 
-fn refused(field: &str, value: &str, rule: impl Into<String>) -> ProblemDocument {
-    ProblemDocument::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
-}
-
 impl SessionListQuery {
     fn read(self) -> Result<SessionQuery, ProblemDocument> {
         let (limit, _) = Page::new(self.limit, None).bounds()?;
         for (field, given, most) in [("search", &self.search, LONGEST_SEARCH), ("tag", &self.tag, LONGEST_TAG)] {
             if let Some(text) = given.as_ref().filter(|text| text.chars().count() > most) {
-                return Err(refused(field, text, format!("must have at most {most} letters")));
+                return Err(ProblemDocument::of_parameter(field, text, format!("must have at most {most} letters")));
             }
         }
         let sort = self.sort.as_deref().unwrap_or("-created");
@@ -241,7 +236,7 @@ impl SessionListQuery {
             "last_report" => SessionOrder::LastReport,
             _ => {
                 let rule = "must be created, name, wealth or last_report, with - in front for descending order";
-                return Err(refused("sort", sort, rule));
+                return Err(ProblemDocument::of_parameter("sort", sort, rule));
             }
         };
         let is = self.state.map(|state| match state {
@@ -263,7 +258,7 @@ impl SessionListQuery {
             SessionQuery { search, tag: self.tag, is, order, descending, limit, counted, ..SessionQuery::default() };
         let after = self.after.map(|text| {
             let rule = "must be the `next` of the previous page, with the same sort";
-            place(&query, &text).ok_or_else(|| refused("after", &text, rule))
+            place(&query, &text).ok_or_else(|| ProblemDocument::of_parameter("after", &text, rule))
         });
         Ok(SessionQuery { after: after.transpose()?, ..query })
     }

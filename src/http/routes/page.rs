@@ -2,8 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::control::error::FieldError;
-use crate::http::problem::{ProblemDocument, ProblemKind};
+use crate::http::problem::ProblemDocument;
 
 const DEFAULT_LIMIT: usize = 50;
 const LARGEST_LIMIT: usize = 1000;
@@ -31,20 +30,17 @@ impl Page {
 
     /// Returns the limit and the cursor.
     pub fn bounds(&self) -> Result<(usize, Option<i64>), ProblemDocument> {
-        let refused = |field, value: &str, rule| {
-            ProblemDocument::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
-        };
         let limit = match &self.limit {
             None => DEFAULT_LIMIT,
             Some(text) => match text.parse() {
                 Ok(limit) if (1..=LARGEST_LIMIT).contains(&limit) => limit,
-                _ => return Err(refused("limit", text, "must be a whole number in [1, 1000]")),
+                _ => return Err(ProblemDocument::of_parameter("limit", text, "must be a whole number in [1, 1000]")),
             },
         };
-        let after = self
-            .after
-            .as_deref()
-            .map(|text| text.parse().map_err(|_| refused("after", text, "must be the `next` of the previous page")));
+        let after = self.after.as_deref().map(|text| {
+            text.parse()
+                .map_err(|_| ProblemDocument::of_parameter("after", text, "must be the `next` of the previous page"))
+        });
         Ok((limit, after.transpose()?))
     }
 }

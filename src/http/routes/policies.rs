@@ -8,13 +8,12 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use crate::control::error::FieldError;
 use crate::control::policy::Policy;
 use crate::control::policy::surface::{Surface, SurfaceAxis};
 use crate::http::gate::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
 use crate::http::gate::extract::{Id, JsonBytes, Parameters};
 use crate::http::gate::{bodies, decode};
-use crate::http::problem::{ProblemDocument, ProblemKind};
+use crate::http::problem::ProblemDocument;
 use crate::http::routes::page::{self, Page};
 use crate::http::routes::wire;
 use crate::service::Service;
@@ -78,10 +77,7 @@ pub struct SurfaceQuery {
 impl SurfaceQuery {
     fn step(&self) -> Result<usize, ProblemDocument> {
         let Some(text) = &self.step else { return Ok(0) };
-        text.parse().map_err(|_| {
-            let error = FieldError::new("step", text, "must be a whole number, 0 or more");
-            ProblemDocument::of_field(ProblemKind::InvalidQuery, error)
-        })
+        text.parse().map_err(|_| ProblemDocument::of_parameter("step", text, "must be a whole number, 0 or more"))
     }
 }
 
