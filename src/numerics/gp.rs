@@ -6,6 +6,7 @@
 //!
 //! Its modules hold kernel, likelihood, fit, linear systems and the selection of points.
 
+mod along;
 pub mod cholesky;
 pub mod farthest;
 pub mod fit;
@@ -109,17 +110,21 @@ impl GpMean {
 
     /// Returns m(query) of every function. Cost O(n (d + functions)).
     pub fn means(&self, query: &[f64]) -> Vec<f64> {
-        let mut squared = vec![0.0; self.input_count()];
-        self.squared_distances(query, 0..self.lengthscales.len(), &mut squared);
-        self.means_from_squared(&mut squared)
+        let mut correlations = vec![0.0; self.input_count()];
+        self.squared_distances(query, 0..self.lengthscales.len(), &mut correlations);
+        matern::matern_from_squared(&mut correlations);
+        self.weighted(&correlations).collect()
+    }
+
+    /// Returns sum_j w_j `factors_j` with the weights of every function. Cost O(n) each.
+    fn weighted(&self, factors: &[f64]) -> impl Iterator<Item = f64> {
+        self.weights.iter().map(move |weights| matern::dot(factors, weights))
     }
 
     /// Overwrites `out[j]` with sum_i ((query_i - x_ji) / l_i)^2 over i in `dimensions`.
     ///
-    /// `query` has all d entries; those outside `dimensions` are not read. `out` has n entries. The sums over disjoint
-    /// ranges add up to the whole, so the part that does not change between queries can be reused.
-    /// Cost O(n |dimensions|).
-    pub fn squared_distances(&self, query: &[f64], dimensions: Range<usize>, out: &mut [f64]) {
+    /// `query` has all d entries; those outside `dimensions` are not read. `out` has n entries. Cost O(n |dimensions|).
+    fn squared_distances(&self, query: &[f64], dimensions: Range<usize>, out: &mut [f64]) {
         assert_eq!(query.len(), self.lengthscales.len(), "one query entry for each column");
         assert_eq!(out.len(), self.input_count(), "one distance for each row");
         let n = out.len();
@@ -131,16 +136,6 @@ impl GpMean {
             &centre,
             out,
         );
-    }
-
-    /// Returns m of every function at a point, given its squared scaled distances to the n inputs, which are
-    /// overwritten. Cost O(n) for each function.
-    pub fn means_from_squared(&self, squared_distances: &mut [f64]) -> Vec<f64> {
-        if let [only] = self.weights.as_slice() {
-            return vec![matern::weighted_sum(squared_distances, only)];
-        }
-        matern::matern_from_squared(squared_distances);
-        self.weights.iter().map(|weights| matern::dot(squared_distances, weights)).collect()
     }
 
     /// Returns the number of inputs, n.

@@ -68,21 +68,11 @@ impl ValueSurrogate {
     }
 
     /// Returns predictions that differ from `features` in the first feature alone, wealth, which must be an input:
-    /// wealth by wealth, holding by holding. Cost O(N) each, because the distance in the law to the design points is
-    /// computed once.
+    /// wealth by wealth, holding by holding. Cost: as [`GpMean::means_along_first`].
     pub fn predictions(&self, features: &Features, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mean = &self.surrogate.mean;
-        let mut input = self.scaling.apply(features);
-        let mut from_law = vec![0.0; mean.input_count()];
-        mean.squared_distances(&input, 1..input.len(), &mut from_law);
-        let mut squared = from_law.clone();
-        let at = |wealth: f64| {
-            input[0] = (wealth - self.scaling.centre[0]) / self.scaling.spread[0];
-            mean.squared_distances(&input, 0..1, &mut squared);
-            squared.iter_mut().zip(&from_law).for_each(|(total, law)| *total += law);
-            self.surrogate.unscaled(mean.means_from_squared(&mut squared))
-        };
-        wealths.flat_map(at).collect()
+        let inputs = wealths.map(|wealth| (wealth - self.scaling.centre[0]) / self.scaling.spread[0]);
+        let inputs: Vec<f64> = inputs.collect();
+        self.surrogate.unscaled(self.surrogate.mean.means_along_first(&self.scaling.apply(features), &inputs))
     }
 
     /// Converts a deviation of the target to one of the floor gain, around `prediction` at total wealth. It is infinite

@@ -103,6 +103,27 @@ pub fn matern_from_squared(squared: &mut [f64]) {
     });
 }
 
+/// Writes the correlation with each input to `values`, and to `derivatives` its derivative with respect to u, the first
+/// entry of the query:
+///
+///   (5/3)(1 + r_j) exp(-r_j) (x_j - u),   r_j^2 = 5 ((x_j - u)^2 + others_j)
+///
+/// `column` holds the first entries x_j of the inputs, `others` the squared distances in all other entries, all in
+/// length scales. Cost O(n), one exponential each.
+pub(super) fn matern_along(column: &[f64], u: f64, others: &[f64], values: &mut [f64], derivatives: &mut [f64]) {
+    let n = column.len();
+    assert!([others.len(), values.len(), derivatives.len()] == [n; 3], "one entry for each input");
+    dispatched!({
+        for (((value, derivative), x), other) in values.iter_mut().zip(derivatives.iter_mut()).zip(column).zip(others) {
+            let difference = x - u;
+            let r = (5.0 * difference.mul_add(difference, *other)).sqrt();
+            let decay = exp(-r);
+            *value = (r * (1.0 / 3.0)).mul_add(r, 1.0 + r) * decay;
+            *derivative = (5.0 / 3.0) * (1.0 + r) * decay * difference;
+        }
+    });
+}
+
 /// Writes sum_i (x_ij - centre_i)^2 to each `out[j]`.
 ///
 /// `columns` holds x column by column, `stride` entries each. `out` belongs to the rows from `first` on. All are
