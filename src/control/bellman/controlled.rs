@@ -7,7 +7,7 @@
 //! every action. The investor's own step (`super::BellmanStep`) knows that wealth is affine in the action, and predicts
 //! at fewer returns.
 
-use super::field::{Field, Payoffs};
+use super::field::{Field, Payoffs, places};
 use super::{BestResponse, best_response};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::dynamics::{Dynamics, Trade};
@@ -131,14 +131,9 @@ impl<P: Controlled> ControlledField<'_, P> {
         let worth = problem.worth(gain, problem.baseline(self.step.step + 1, next));
         problem.utility(worth, self.baseline)
     }
-}
 
-impl<P: Controlled> Field for ControlledField<'_, P> {
-    fn returns(&self) -> &[f64] {
-        &self.returns
-    }
-
-    fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_> {
+    /// Returns the gains of the next state, return by return, action by action; none at the horizon.
+    fn gains(&self, returns: &[f64]) -> Vec<f64> {
         let ControlledStep { problem, laws, selection, step, next } = *self.step;
         let mut gains = Vec::new();
         if let Some(value) = next {
@@ -151,7 +146,17 @@ impl<P: Controlled> Field for ControlledField<'_, P> {
                 }
             }
         }
-        Box::new(ControlledRows { field: self, returns: returns.to_vec(), gains })
+        gains
+    }
+}
+
+impl<P: Controlled> Field for ControlledField<'_, P> {
+    fn returns(&self) -> &[f64] {
+        &self.returns
+    }
+
+    fn at<'f>(&'f self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
+        Box::new(ControlledRows { field: self, returns: returns.to_vec(), gains: self.gains(returns) })
     }
 
     fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
@@ -166,7 +171,23 @@ struct ControlledRows<'f, P: Controlled> {
     gains: Vec<f64>,
 }
 
-impl<P: Controlled> Payoffs for ControlledRows<'_, P> {
+impl<'f, P: Controlled> Payoffs<'f> for ControlledRows<'f, P> {
+    fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
+        let places = places(&self.returns, returns);
+        let new = returns.iter().zip(&places).filter(|(_, place)| place.is_none());
+        let new = self.field.gains(&new.map(|(log_return, _)| *log_return).collect::<Vec<f64>>());
+        let (mut new, actions) = (new.chunks_exact(self.field.actions.len()), self.field.actions.len());
+        let gains = places.iter().flat_map(|place| match place {
+            Some(place) => self.gains.get(place * actions..(place + 1) * actions),
+            None => new.next(),
+        });
+        Box::new(ControlledRows {
+            field: self.field,
+            returns: returns.to_vec(),
+            gains: gains.flatten().copied().collect(),
+        })
+    }
+
     fn payoff(&self, trade: Trade) -> Vec<f64> {
         let (first, weights) = local_cubic(&self.field.actions, trade.action);
         let gain = |index: usize| {

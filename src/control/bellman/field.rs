@@ -8,14 +8,29 @@ pub trait Field {
     fn returns(&self) -> &[f64];
 
     /// Prepares evaluation at fixed returns.
-    fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_>;
+    fn at<'f>(&'f self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f>;
 
     /// Returns a lower bound on the payoff, also outside the returns; it increases with the return.
     fn least_payoff(&self, trade: Trade, log_return: f64) -> f64;
 }
 
 /// A field restricted to fixed returns.
-pub trait Payoffs {
+pub trait Payoffs<'f> {
+    /// Prepares evaluation at other returns. Both are ascending; what is known of a return in both is kept.
+    fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f>;
+
     /// Returns the relative utility of the next state's certainty equivalent, return by return.
     fn payoff(&self, trade: Trade) -> Vec<f64>;
+}
+
+/// Returns the place of each of `returns` among `known`, if it is there; both are ascending.
+pub(super) fn places(known: &[f64], returns: &[f64]) -> Vec<Option<usize>> {
+    let mut next = 0;
+    let place = |log_return: &f64| {
+        while known.get(next).is_some_and(|known| known < log_return) {
+            next += 1;
+        }
+        (known.get(next) == Some(log_return)).then_some(next)
+    };
+    returns.iter().map(place).collect()
 }

@@ -12,7 +12,7 @@
 //! With contributions or withdrawals, everything is relative to total wealth: a trade moves the share of it that is in
 //! hand, and the rest grows as the bank does.
 
-use super::field::{Field, Payoffs};
+use super::field::{Field, Payoffs, places};
 use super::next_value::NextValue;
 use super::problem::Problem;
 use crate::control::problem::dynamics::{Dynamics, Trade};
@@ -115,12 +115,21 @@ impl<'a> GainField<'a> {
         (total - self.after.to_come) / total
     }
 
-    /// Prepares evaluation at fixed returns.
-    fn rows(&self, returns: &[f64]) -> FieldRows<'_> {
+    /// Prepares evaluation at fixed returns, some of which may be among `known`, ascending.
+    fn rows(&self, returns: &[f64], known: Option<&FieldRows<'_>>) -> FieldRows<'_> {
         let (nodes, holdings) = (self.trade_count(), self.holdings.count());
+        let places = known.map_or_else(|| vec![None; returns.len()], |known| places(&known.returns, returns));
         let mut rows = vec![0.0; if self.table.is_empty() { 0 } else { nodes * returns.len() * holdings }];
         if !self.table.is_empty() {
-            for (index, &log_return) in returns.iter().enumerate() {
+            for (index, (&log_return, place)) in returns.iter().zip(&places).enumerate() {
+                if let (Some(known), Some(place)) = (known, place) {
+                    for node in 0..nodes {
+                        let [from, to] = [node * known.returns.len() + place, node * returns.len() + index];
+                        let row = &known.rows[from * holdings..][..holdings];
+                        rows[to * holdings..][..holdings].copy_from_slice(row);
+                    }
+                    continue;
+                }
                 let (first, weights) = local_cubic(&self.returns, log_return);
                 for node in 0..nodes {
                     let start = (node * returns.len() + index) * holdings;
@@ -132,14 +141,18 @@ impl<'a> GainField<'a> {
                 }
             }
         }
-        let growths: Vec<f64> = returns.iter().map(|z| z.exp() / (1.0 + self.dynamics.rate_per_step)).collect();
+        let growth = |(log_return, place): (&f64, &Option<usize>)| match (known, place) {
+            (Some(known), Some(place)) => known.growths[*place],
+            _ => log_return.exp() / (1.0 + self.dynamics.rate_per_step),
+        };
+        let growths: Vec<f64> = returns.iter().zip(&places).map(growth).collect();
         let sold = 1.0 - self.cost_of_selling();
         let excesses = growths.iter().map(|growth| sold * growth - 1.0).collect();
         let largest = match self.next {
             NextValue::Surrogate(_) => self.problem.largest_gains_after(self.step, self.law, returns),
             NextValue::Terminal | NextValue::Constant(..) | NextValue::Exact(..) => vec![f64::INFINITY; returns.len()],
         };
-        FieldRows { field: self, rows, growths, excesses, largest }
+        FieldRows { field: self, returns: returns.to_vec(), rows, growths, excesses, largest }
     }
 
     fn trade_count(&self) -> usize {
@@ -167,8 +180,8 @@ impl Field for GainField<'_> {
         &self.returns
     }
 
-    fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_> {
-        Box::new(self.rows(returns))
+    fn at<'f>(&'f self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
+        Box::new(self.rows(returns, None))
     }
 
     /// Returns the relative utility of selling everything after `log_return`.
@@ -183,6 +196,7 @@ impl Field for GainField<'_> {
 /// A field restricted to fixed returns.
 struct FieldRows<'f> {
     field: &'f GainField<'f>,
+    returns: Vec<f64>,
     /// `rows[(m * returns + k) * holdings + j]`: the prediction at trade m, return k and holding j; empty if the gain
     /// is constant.
     rows: Vec<f64>,
@@ -194,7 +208,11 @@ struct FieldRows<'f> {
     largest: Vec<f64>,
 }
 
-impl Payoffs for FieldRows<'_> {
+impl<'f> Payoffs<'f> for FieldRows<'f> {
+    fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
+        Box::new(self.field.rows(returns, Some(self)))
+    }
+
     /// Returns `u(w(a, z))`. Cost O(returns x nodes).
     fn payoff(&self, trade: Trade) -> Vec<f64> {
         let GainField { next, utility, bank, .. } = self.field;

@@ -20,7 +20,7 @@ const ACTION_TOLERANCE: f64 = 1e-6;
 pub(super) struct NormalPricing<'f> {
     region: ConfidenceRegion,
     field: &'f dyn Field,
-    rows: Box<dyn Payoffs + 'f>,
+    rows: Box<dyn Payoffs<'f> + 'f>,
     quadrature: Quadrature,
 }
 

@@ -113,8 +113,15 @@ impl Problem {
     pub fn largest_gains_after(&self, step: usize, law: &EmpiricalDistribution, returns: &[f64]) -> Vec<f64> {
         let problem = &self.specification.problem;
         let periods = problem.horizon.saturating_sub(step + 1);
-        let largest =
-            |&log_return: &f64| largest_gain(problem, step + 1, self.laws.best_return_with(law, log_return, periods));
+        // Most returns leave the best return as it is.
+        let (mut last, mut gain) = (f64::NAN, f64::NAN);
+        let largest = |&log_return: &f64| {
+            let best = self.laws.best_return_with(law, log_return, periods);
+            if best != last {
+                (last, gain) = (best, largest_gain(problem, step + 1, best));
+            }
+            gain
+        };
         returns.iter().map(largest).collect()
     }
 

@@ -34,7 +34,7 @@ pub(super) struct TransportPricing<'f> {
     radius: f64,
     field: &'f dyn Field,
     grid: Grid,
-    rows: Box<dyn Payoffs + 'f>,
+    rows: Box<dyn Payoffs<'f> + 'f>,
     refined: bool,
     /// The last multiplier found, over its action: those of similar actions hardly differ.
     steepness: Cell<f64>,
@@ -151,7 +151,7 @@ impl Pricing for TransportPricing<'_> {
             let support =
                 subdivided(&self.grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
             self.grid = grid(self.centre, self.radius, support);
-            self.rows = self.field.at(&self.grid.support);
+            self.rows = self.rows.moved_to(&self.grid.support);
         }
         self.refined = true;
         true
