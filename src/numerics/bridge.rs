@@ -22,9 +22,9 @@ pub mod scale_mixture;
 pub mod sized_gaps;
 
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::Arc;
 
-use crate::numerics::bridge::paths::{AbsoluteBridges, PATHS, Share, Times};
+use crate::numerics::bridge::paths::{AbsoluteBridges, PATHS, Share};
 use crate::numerics::bridge::scale_mixture::LastQuantile;
 use crate::numerics::bridge::sized_gaps::{SizedGaps, Statistic};
 use crate::numerics::law::empirical::EmpiricalDistribution;
@@ -66,8 +66,8 @@ impl AbsoluteBridges {
     /// Returns the weight of |B| at each time in the statistic of a law.
     pub(super) fn nodes(&self, law: &EmpiricalDistribution) -> Vec<f64> {
         let mut weights = Weights::new(self);
-        for (pair, shares) in law.atoms().windows(2).zip(self.shares_of(law, Statistic::Current)) {
-            weights.place(&shares, pair[1] - pair[0]);
+        for (pair, shares) in law.atoms().windows(2).zip(&*self.shares_of(law, Statistic::Current)) {
+            weights.place(shares, pair[1] - pair[0]);
         }
         weights.weights.iter().zip(&self.units).map(|(weight, unit)| weight / unit).collect()
     }
@@ -76,15 +76,8 @@ impl AbsoluteBridges {
     /// same times.
     fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<GapWeights> {
         let mut weights = Weights::new(self);
-        let of_these = OnceLock::new();
-        let of_all = match self.times {
-            Times::Sample(_) => &self.shares[which as usize],
-            Times::Graded { .. } => &of_these,
-        };
         let of_law = |law: &&EmpiricalDistribution| {
-            let own = (law.retention() < 1.0).then(|| self.shares_of(law, which));
-            let shares = own.as_ref().unwrap_or_else(|| of_all.get_or_init(|| self.shares_of(law, which)));
-            for (pair, shares) in law.atoms().windows(2).zip(shares) {
+            for (pair, shares) in law.atoms().windows(2).zip(&*self.shares_of(law, which)) {
                 weights.place(shares, pair[1] - pair[0]);
             }
             weights.take()
@@ -93,7 +86,10 @@ impl AbsoluteBridges {
     }
 
     /// Returns the times and weights of each gap of a law.
-    fn shares_of(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<[Share; 4]> {
+    fn shares_of(&self, law: &EmpiricalDistribution, which: Statistic) -> Arc<[[Share; 4]]> {
+        if law.retention() == 1.0 {
+            return self.equal_gaps(law.sample_size(), which);
+        }
         let (mut places, mut below) = (SizedGaps::of_laws_like(self, law, which), 0.0);
         let gap = |weight: &f64| {
             below += weight;
@@ -145,7 +141,11 @@ impl AbsoluteBridges {
         let (atoms, count, retention) = (law.atoms(), law.sample_size(), law.retention());
         let total = law.total_weight() * retention + 1.0;
         let (mut places, mut weights) = (SizedGaps::new(self, count + 1, total, retention, which), Weights::new(self));
-        let mut place = |weights: &mut Weights, below: f64, length: f64| weights.place(&places.of(below), length);
+        let equal = (retention == 1.0).then(|| self.equal_gaps(count + 1, which));
+        let mut place = |weights: &mut Weights, below: f64, length: f64| match &equal {
+            Some(shares) => weights.place(&shares[below as usize - 1], length),
+            None => weights.place(&places.of(below), length),
+        };
         // Gap j is between atoms j - 1 and j. If it is below the new value, the first j atoms lie below it; if it is
         // above, so does the value.
         let gap = |j: usize| atoms[j] - atoms[j - 1];

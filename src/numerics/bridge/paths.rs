@@ -4,12 +4,11 @@
 //! degrees of freedom and independent of the direction. A statistic that scales with the path as |B| does can therefore
 //! be simulated over directions alone, and its length integrated out.
 
-use std::sync::OnceLock;
-
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 use crate::numerics::bridge::scale_mixture::ScaleMixture;
+use crate::numerics::bridge::sized_gaps::EqualGaps;
 use crate::numerics::machine::streams::stream;
 
 /// Simulated `|B(t)|` divided by the length of the path, at ascending times: common random numbers for laws.
@@ -27,9 +26,8 @@ pub struct AbsoluteBridges {
     pub(in crate::numerics) units: Vec<f64>,
     /// The law of the lengths by which the paths are divided.
     pub(in crate::numerics) lengths: ScaleMixture,
-    /// For laws of one size with equal weights: the weight of each gap at the times, for each statistic, computed at
-    /// first use.
-    pub(in crate::numerics) shares: [OnceLock<Vec<[Share; 4]>>; 2],
+    /// The weights of gaps of laws with equal weights.
+    pub(in crate::numerics) equal: EqualGaps,
 }
 
 /// The times at which paths are kept.
@@ -213,8 +211,8 @@ impl AbsoluteBridges {
                 paths[index % PATHS] = (value.abs() / (divisor * unit)).round() as u16;
             }
         }
-        let (lengths, shares) = (ScaleMixture::chi(at.len().max(1)), Default::default());
-        AbsoluteBridges { times, paths, values, units, lengths, shares }
+        let (lengths, equal) = (ScaleMixture::chi(at.len().max(1)), EqualGaps::default());
+        AbsoluteBridges { times, paths, values, units, lengths, equal }
     }
 }
 

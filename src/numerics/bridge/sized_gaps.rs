@@ -1,5 +1,7 @@
 //! The weights of a law's gaps in a statistic over bridges: the times at which they count, and how much.
 
+use std::sync::{Arc, PoisonError, RwLock};
+
 use crate::numerics::bridge::paths::{AbsoluteBridges, Share, Times, deviation};
 use crate::numerics::law::empirical::EmpiricalDistribution;
 
@@ -106,5 +108,41 @@ impl<'a> SizedGaps<'a> {
     fn share(&self, time: usize, part: f64) -> Share {
         let units = &self.bridges.units;
         time.checked_sub(1).and_then(|time| Some((time, part * units.get(time)?))).unwrap_or(NONE)
+    }
+}
+
+/// The weights of all gaps of laws with equal weights, for the sizes and statistics used last. They do not depend on the
+/// values.
+#[derive(Debug, Clone, Default)]
+pub(in crate::numerics) struct EqualGaps(Arc<RwLock<Vec<EqualSize>>>);
+
+#[derive(Debug, Clone)]
+struct EqualSize {
+    size: usize,
+    which: Statistic,
+    /// By gap, from the lowest.
+    shares: Arc<[[Share; 4]]>,
+}
+
+/// Kept sizes and statistics: those of two steps of a training, and of as many others.
+const KEPT: usize = 8;
+
+impl AbsoluteBridges {
+    /// Returns the times and weights of each gap of a law of `size` values with equal weights. Cost O(size) at first.
+    pub(super) fn equal_gaps(&self, size: usize, which: Statistic) -> Arc<[[Share; 4]]> {
+        let EqualGaps(known) = &self.equal;
+        let is_it = |one: &&EqualSize| one.size == size && one.which == which;
+        let found = known.read().unwrap_or_else(PoisonError::into_inner).iter().find(is_it).cloned();
+        if let Some(EqualSize { shares, .. }) = found {
+            return shares;
+        }
+        let mut places = SizedGaps::new(self, size, size as f64, 1.0, which);
+        let shares: Arc<[[Share; 4]]> = (1..size).map(|below| places.of(below as f64)).collect();
+        let mut known = known.write().unwrap_or_else(PoisonError::into_inner);
+        if known.len() == KEPT {
+            known.remove(0);
+        }
+        known.push(EqualSize { size, which, shares: shares.clone() });
+        shares
     }
 }
