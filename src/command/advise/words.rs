@@ -7,7 +7,6 @@ use std::fmt::Write;
 
 use ballast::control::error::FieldError;
 use ballast::control::policy::advice::{Advice, AdviceSource};
-use ballast::control::policy::sensitivity::{NextAdvice, ReturnAndLog, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
 use ballast::numerics::machine::digits;
 use ballast::service::advice::advise::Advised;
@@ -32,7 +31,7 @@ pub fn describe(advised: &Advised, wealth: f64, noun: &str, periods: f64) -> Str
     if let Some(levels) = &advised.levels {
         text += &format!("\n{}", caution::describe(levels, periods));
     }
-    for sentence in near(advised, noun) {
+    for sentence in near(advised) {
         text += &format!("\n{sentence}");
     }
     text.trim_end().to_owned()
@@ -55,41 +54,10 @@ pub fn append_coarser(text: String, coarser: &[(&str, Result<f64, FieldError>)])
 }
 
 /// Lists the warnings and, if requested, how close the advice is to changing.
-fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: &str) -> Vec<String> {
-    let mut sentences: Vec<String> = warnings.iter().map(|warning| warning.message.clone()).collect();
-    sentences.extend(caution.iter().map(|caution| caution.sentence.clone()));
-    let Some(Sensitivity { without_one, next_return, premium, .. }) = sensitivity else { return sentences };
-    if let Some(range) = without_one {
-        let ends = [range.lowest, range.highest].map(|end| end.allocation);
-        let [low, high] = apart(ends, 1);
-        let tried =
-            if range.tried < advice.sample_size { format!(" ({} were tried)", range.tried) } else { String::new() };
-        sentences.push(format!("With any one return left out{tried} the advice would lie between {low} and {high}."));
-    }
-    let [low, high] = [next_return.low, next_return.high].map(|next: NextAdvice| percent(next.simple_return, 1));
-    let [then_low, then_high] = apart([next_return.low, next_return.high].map(|next| next.allocation), 1);
-    sentences.push(format!("After a next return of {low} it would be {then_low}, after one of {high} {then_high}."));
-    let crossing = |to: Option<ReturnAndLog>, what: &str| {
-        to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
-    };
-    let leaves = |to: ReturnAndLog| {
-        format!(
-            "The next {noun} must return more than {} before the advice leaves the bank.",
-            percent(to.simple_return, 1)
-        )
-    };
-    sentences.extend(match advice.allocation {
-        0.0 => next_return.to_bank.map(leaves),
-        _ => crossing(next_return.to_bank, "the bank"),
-    });
-    sentences.extend(crossing(next_return.to_highest, "the most that may be held"));
-    if let Some(needed) = premium.needed {
-        let [present, needed] = apart([premium.present, needed], 2);
-        sentences.push(format!(
-            "The record paid {present} a period beyond what the bank pays now; at {needed} the advice leaves the bank."
-        ));
-    }
-    sentences
+fn near(Advised { caution, sensitivity, warnings, .. }: &Advised) -> impl Iterator<Item = &String> {
+    let warnings = warnings.iter().map(|warning| &warning.message);
+    let cautions = caution.iter().map(|caution| &caution.sentence);
+    warnings.chain(cautions).chain(sensitivity.iter().flat_map(|sensitivity| &sensitivity.sentences))
 }
 
 fn hold(advice: &Advice, noun: &str) -> String {
@@ -185,12 +153,6 @@ fn money(amount: f64) -> String {
 
 fn percent(share: f64, decimals: usize) -> String {
     format!("{} %", digits::fixed(100.0 * share, decimals))
-}
-
-/// Formats two shares with enough decimals to tell them apart, at least `least`.
-fn apart(shares: [f64; 2], least: usize) -> [String; 2] {
-    let decimals = digits::deciding(100.0 * shares[0], 100.0 * shares[1], least);
-    shares.map(|share| percent(share, decimals))
 }
 
 fn signed(share: f64) -> String {

@@ -13,6 +13,9 @@ const WEEK: RangeInclusive<i32> = 4..=10;
 /// Smallest number of days from a month's date to the next one's, if both move to trading days; less is no month.
 const SHORTEST_MONTH: i32 = 20;
 
+/// Periods of which there are as many in a year are days.
+const LEAST_DAYS: f64 = 200.0;
+
 /// The frequency of periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frequency {
@@ -146,6 +149,18 @@ impl Frequency {
             Monthly => apart == 1 && days >= SHORTEST_MONTH,
             Quarterly => apart == 3 && days >= 3 * SHORTEST_MONTH,
             Yearly => apart == 12 && days >= 12 * SHORTEST_MONTH,
+        }
+    }
+
+    /// Returns the noun for a period of which there are so many in a year; `period` if that is unknown or unusual.
+    pub fn noun_for(periods_per_year: Option<f64>) -> &'static str {
+        match periods_per_year.map_or(0.0, f64::round) {
+            1.0 => Yearly.noun(),
+            4.0 => Quarterly.noun(),
+            12.0 => Monthly.noun(),
+            52.0 => Weekly.noun(),
+            days if days >= LEAST_DAYS => Daily.noun(),
+            _ => "period",
         }
     }
 

@@ -2019,6 +2019,8 @@ class Sensitivity(TypedDict):
     """Effect of one more return."""
     premium: Premium
     """Effect of another mean, and of more returns like those in the record."""
+    sentences: list[str]
+    """These figures in sentences, of which the first sums up the others."""
 
 
 class Series(TypedDict):

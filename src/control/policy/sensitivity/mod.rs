@@ -5,6 +5,7 @@
 //! were the record. So a next return is tried in the last period also.
 
 mod search;
+mod sentences;
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -22,6 +23,8 @@ pub struct Sensitivity {
     pub next_return: NextReturn,
     /// Effect of another mean, and of more returns like those in the record.
     pub premium: Premium,
+    /// These figures in sentences, of which the first sums up the others.
+    pub sentences: Vec<String>,
     /// Warning against following the advice, if there is one.
     #[serde(skip)]
     pub caution: Option<Caution>,

@@ -1,5 +1,6 @@
 //! Computes the advice for other records, and finds the changes of advice between them.
 
+use super::sentences::Described;
 use super::{LeftOut, NextAdvice, NextReturn, Premium, ReturnAndLog, Sensitivity, WithoutOne};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
@@ -7,6 +8,7 @@ use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::caution::Caution;
 use crate::control::pool;
 use crate::control::problem::state::State;
+use crate::control::request::frequency::Frequency;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules;
 use crate::control::request::specification::{ProblemSpecification, Specification};
@@ -137,7 +139,13 @@ impl AdviceVariants<'_> {
         let (needed, periods_more) = pool::join(|| self.needed(), || self.periods_more());
         let premium = Premium { present: self.present(), needed, periods_more };
         let caution = without_one.and_then(|range| self.hangs_on_one(range));
-        Sensitivity { without_one, next_return, premium, caution }
+        let described = Described {
+            allocation: self.advice.allocation,
+            returns: self.record.len(),
+            noun: Frequency::noun_for(self.problem.periods_per_year),
+        };
+        let sentences = described.sentences(without_one.as_ref(), &next_return, &premium);
+        Sensitivity { without_one, next_return, premium, sentences, caution }
     }
 
     /// Leaves out each return in turn. With equal weights, equal returns leave equal records and are left out once.

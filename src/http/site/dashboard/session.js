@@ -96,7 +96,7 @@ async function fill(holder, told) {
 function ofOne(shown, action, rest) {
   const { id, session, policy, leaving, calendar } = shown;
   const advice = adviceView(action, place(shown, action), rest);
-  const near = nearness({ id, session, policy, leaving, unit: calendar.unit });
+  const near = nearness({ id, policy, leaving });
   const cautious = isCautious(policy.specification.problem);
   const caution = shown.canAsk && cautious ? conservatism(shown, action) : null;
   const worst = worstMarket({ ...shown, cautious }, advice, () => near.ask().then(() => caution?.ask()));
