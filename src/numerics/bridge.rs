@@ -140,8 +140,10 @@ impl AbsoluteBridges {
     ) -> Vec<f64> {
         let (atoms, count, retention) = (law.atoms(), law.sample_size(), law.retention());
         let total = law.total_weight() * retention + 1.0;
-        let (mut places, mut weights) = (SizedGaps::new(self, count + 1, total, retention, which), Weights::new(self));
+        let mut weights = Weights::new(self);
+        // Known if all weights are equal; the others are computed gap by gap.
         let equal = (retention == 1.0).then(|| self.equal_gaps(count + 1, which));
+        let mut places = SizedGaps::new(self, count + 1, total, retention, which);
         let mut place = |weights: &mut Weights, below: f64, length: f64| match &equal {
             Some(shares) => weights.place(&shares[below as usize - 1], length),
             None => weights.place(&places.of(below), length),

@@ -4,11 +4,12 @@
 //! degrees of freedom and independent of the direction. A statistic that scales with the path as |B| does can therefore
 //! be simulated over directions alone, and its length integrated out.
 
+use std::sync::{Arc, PoisonError, RwLock};
+
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 use crate::numerics::bridge::scale_mixture::ScaleMixture;
-use crate::numerics::bridge::sized_gaps::EqualGaps;
 use crate::numerics::machine::streams::stream;
 
 /// Simulated `|B(t)|` divided by the length of the path, at ascending times: common random numbers for laws.
@@ -46,6 +47,38 @@ pub(in crate::numerics) enum Times {
 
 /// A time of the bridges, and the weight of a gap's length there, in the unit of the values at that time.
 pub(in crate::numerics) type Share = (usize, f64);
+
+/// Largest number of gaps of all kept sizes and statistics together, unless one alone has more: a step of a training
+/// needs two sizes and both statistics. They take two megabytes.
+pub(super) const MOST_GAPS: usize = 1 << 15;
+
+/// The weights of all gaps of laws with equal weights, which do not depend on the values: those computed last, by size
+/// and number of the statistic.
+#[derive(Debug, Clone, Default)]
+pub(in crate::numerics) struct EqualGaps(Arc<RwLock<Vec<EqualSize>>>);
+
+type EqualSize = ((usize, usize), Arc<[[Share; 4]]>);
+
+impl EqualGaps {
+    /// Returns the weights of a size and a statistic, from the lowest gap; they are computed if they are not kept.
+    pub(super) fn of(&self, key: (usize, usize), compute: impl FnOnce() -> Arc<[[Share; 4]]>) -> Arc<[[Share; 4]]> {
+        let found = |known: &[EqualSize]| known.iter().find(|one| one.0 == key).map(|one| one.1.clone());
+        if let Some(shares) = found(&self.0.read().unwrap_or_else(PoisonError::into_inner)) {
+            return shares;
+        }
+        let shares = compute();
+        let mut known = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        // Another thread may have been faster.
+        if let Some(shares) = found(&known) {
+            return shares;
+        }
+        known.push((key, shares.clone()));
+        while known.len() > 1 && known.iter().map(|((size, _), _)| size).sum::<usize>() > MOST_GAPS {
+            known.remove(0);
+        }
+        shares
+    }
+}
 
 /// Returns the standard deviation of a bridge at a time.
 pub(in crate::numerics) fn deviation(time: f64) -> f64 {
@@ -173,9 +206,12 @@ impl AbsoluteBridges {
 
     /// Returns the bytes of the bridges for laws of `sample_size` values.
     pub fn bytes_of(sample_size: usize, paths: usize) -> usize {
-        let times = if sample_size < GRADED_FROM { sample_size } else { GRADED_CELLS + 2 * HALVINGS as usize };
+        let (times, gaps) = match sample_size {
+            ..GRADED_FROM => (sample_size, 2 * sample_size),
+            _ => (GRADED_CELLS + 2 * HALVINGS as usize, MOST_GAPS),
+        };
         let of_a_time = size_of::<u16>().saturating_mul(paths.saturating_add(PATHS - 1) / PATHS * PATHS);
-        of_a_time.saturating_add(2 * size_of::<[Share; 4]>()).saturating_mul(times)
+        of_a_time.saturating_mul(times).saturating_add(gaps * size_of::<[Share; 4]>())
     }
 
     /// Returns the values of each block of paths, time by time.
@@ -256,6 +292,19 @@ impl AbsoluteBridges {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn kept_weights_of_gaps_are_bounded_and_computed_once() {
+        let known = EqualGaps::default();
+        let of = |size: usize, part: f64| known.of((size, 0), || vec![[(1, part); 4]; size - 1].into())[0][0].1;
+        assert_eq!([of(2000, 1.0), of(2000, 2.0)], [1.0, 1.0]);
+        for size in [5000, 6000, 7000, 8000, 9000, MOST_GAPS + 1, 3] {
+            assert_eq!([of(size, 3.0), of(size, 4.0)], [3.0, 3.0]);
+            let kept: Vec<usize> = known.0.read().unwrap().iter().map(|((size, _), _)| *size).collect();
+            assert!(kept.len() == 1 || kept.iter().sum::<usize>() <= MOST_GAPS, "{kept:?}");
+        }
+        assert_eq!(of(2000, 5.0), 5.0);
+    }
 
     #[test]
     fn bridges_have_their_covariance_at_every_sample_size() {

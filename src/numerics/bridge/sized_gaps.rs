@@ -1,6 +1,6 @@
 //! The weights of a law's gaps in a statistic over bridges: the times at which they count, and how much.
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::Arc;
 
 use crate::numerics::bridge::paths::{AbsoluteBridges, Share, Times, deviation};
 use crate::numerics::law::empirical::EmpiricalDistribution;
@@ -111,38 +111,29 @@ impl<'a> SizedGaps<'a> {
     }
 }
 
-/// The weights of all gaps of laws with equal weights, for the sizes and statistics used last. They do not depend on the
-/// values.
-#[derive(Debug, Clone, Default)]
-pub(in crate::numerics) struct EqualGaps(Arc<RwLock<Vec<EqualSize>>>);
-
-#[derive(Debug, Clone)]
-struct EqualSize {
-    size: usize,
-    which: Statistic,
-    /// By gap, from the lowest.
-    shares: Arc<[[Share; 4]]>,
-}
-
-/// Kept sizes and statistics: those of two steps of a training, and of as many others.
-const KEPT: usize = 8;
-
 impl AbsoluteBridges {
     /// Returns the times and weights of each gap of a law of `size` values with equal weights. Cost O(size) at first.
     pub(super) fn equal_gaps(&self, size: usize, which: Statistic) -> Arc<[[Share; 4]]> {
-        let EqualGaps(known) = &self.equal;
-        let is_it = |one: &&EqualSize| one.size == size && one.which == which;
-        let found = known.read().unwrap_or_else(PoisonError::into_inner).iter().find(is_it).cloned();
-        if let Some(EqualSize { shares, .. }) = found {
-            return shares;
+        self.equal.of((size, which as usize), || {
+            let mut places = SizedGaps::new(self, size, size as f64, 1.0, which);
+            (1..size).map(|below| places.of(below as f64)).collect()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kept_weights_are_those_computed_anew() {
+        let bridges = AbsoluteBridges::graded(10, 3);
+        for size in [2000, 3, 2000, 5000, 9000, 2000] {
+            for which in [Statistic::Current, Statistic::AfterOneMore] {
+                let mut places = SizedGaps::new(&bridges, size, size as f64, 1.0, which);
+                let anew: Vec<[Share; 4]> = (1..size).map(|below| places.of(below as f64)).collect();
+                assert_eq!(*bridges.equal_gaps(size, which), *anew, "{size}");
+            }
         }
-        let mut places = SizedGaps::new(self, size, size as f64, 1.0, which);
-        let shares: Arc<[[Share; 4]]> = (1..size).map(|below| places.of(below as f64)).collect();
-        let mut known = known.write().unwrap_or_else(PoisonError::into_inner);
-        if known.len() == KEPT {
-            known.remove(0);
-        }
-        known.push(EqualSize { size, which, shares: shares.clone() });
-        shares
     }
 }
