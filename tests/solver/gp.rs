@@ -117,12 +117,18 @@ fn gradients_equal_finite_differences_when_the_factorisation_is_blocked() {
 }
 
 #[test]
-fn the_mean_alone_equals_the_process() {
-    let case = cases().pop().unwrap();
-    let process = GaussianProcess::condition(&matrix(&case.inputs), &case.targets, &case.hyper).unwrap();
-    let mean = GpMean::new(&matrix(&case.inputs), &[process.weights().to_vec()], &case.hyper);
-    for query in &case.test_inputs {
-        assert_eq!(mean.mean_with(query, &mut Vec::new()), process.mean(query));
+fn means_of_several_functions_are_those_of_scikit_learn_and_of_their_sum() {
+    for case in cases() {
+        let (inputs, count) = (matrix(&case.inputs), case.targets.len());
+        let process = GaussianProcess::condition(&inputs, &case.targets, &case.hyper).unwrap();
+        let (own, ones) = (process.weights().to_vec(), process.weights_of(&vec![1.0; count]));
+        let sum: Vec<f64> = own.iter().zip(&ones).map(|(one, other)| one + other).collect();
+        let mean = GpMean::new(&inputs, &[own, ones, sum], &case.hyper);
+        for (query, expected) in case.test_inputs.iter().zip(&case.mean) {
+            let means = mean.means(query);
+            assert_close(means[0], *expected);
+            assert!((means[2] - means[0] - means[1]).abs() < 1e-9 * (means[0].abs() + means[1].abs()), "{means:?}");
+        }
     }
 }
 

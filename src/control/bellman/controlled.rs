@@ -173,19 +173,17 @@ struct ControlledRows<'f, P: Controlled> {
 
 impl<'f, P: Controlled> Payoffs<'f> for ControlledRows<'f, P> {
     fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
-        let places = places(&self.returns, returns);
-        let new = returns.iter().zip(&places).filter(|(_, place)| place.is_none());
-        let new = self.field.gains(&new.map(|(log_return, _)| *log_return).collect::<Vec<f64>>());
-        let (mut new, actions) = (new.chunks_exact(self.field.actions.len()), self.field.actions.len());
+        let (places, actions) = (places(&self.returns, returns), self.field.actions.len());
+        let unknown = returns.iter().zip(&places).filter(|(_, place)| place.is_none());
+        let unknown: Vec<f64> = unknown.map(|(log_return, _)| *log_return).collect();
+        let computed = self.field.gains(&unknown);
+        let mut computed = computed.chunks_exact(actions);
         let gains = places.iter().flat_map(|place| match place {
             Some(place) => self.gains.get(place * actions..(place + 1) * actions),
-            None => new.next(),
+            None => computed.next(),
         });
-        Box::new(ControlledRows {
-            field: self.field,
-            returns: returns.to_vec(),
-            gains: gains.flatten().copied().collect(),
-        })
+        let gains = gains.flatten().copied().collect();
+        Box::new(ControlledRows { field: self.field, returns: returns.to_vec(), gains })
     }
 
     fn payoff(&self, trade: Trade) -> Vec<f64> {

@@ -16,7 +16,8 @@ pub trait Field {
 
 /// A field restricted to fixed returns.
 pub trait Payoffs<'f> {
-    /// Prepares evaluation at other returns. Both are ascending; what is known of a return in both is kept.
+    /// Prepares evaluation at other returns, which are ascending, as those prepared now must be. What was computed for a
+    /// return in both lists is used again.
     fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f>;
 
     /// Returns the relative utility of the next state's certainty equivalent, return by return.
@@ -33,4 +34,18 @@ pub(super) fn places(known: &[f64], returns: &[f64]) -> Vec<Option<usize>> {
         (known.get(next) == Some(log_return)).then_some(next)
     };
     returns.iter().map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::places;
+
+    #[test]
+    fn places_are_found_wherever_lists_overlap() {
+        let known = [-0.3, -0.1, 0.0, 0.2];
+        assert_eq!(places(&known, &[-0.4, -0.3, -0.2, 0.0, 0.2, 0.5]), [None, Some(0), None, Some(2), Some(3), None]);
+        assert_eq!(places(&known, &known), [Some(0), Some(1), Some(2), Some(3)]);
+        assert_eq!(places(&[], &[0.1]), [None]);
+        assert!(places(&known, &[]).is_empty());
+    }
 }

@@ -3,8 +3,9 @@
 //! From one state, the next state depends on the action and the adversary's return z only. The law's features depend on
 //! z alone. Wealth and the holding depend on both, wealth linearly in the action. The prediction is a smooth function
 //! of z and wealth, so it is tabulated once. The table is exact at a few returns (local cubics between them), at a few
-//! Chebyshev nodes in the action if wealth matters, and at the holdings at which the value is known. Every action is
-//! then priced without evaluating the surrogate again: one product for each node and return.
+//! Chebyshev nodes in the action if wealth matters, and at the holdings at which the value is known. Where the nodes lie
+//! within half a length scale in wealth, it is itself interpolated (`numerics/gp/along.rs`). Every action is then priced
+//! without evaluating the surrogate again: one product for each node and return.
 //!
 //! If trading costs, wealth also depends on the share that the trade keeps, by a few percent at most. This dependence
 //! is nearly linear, except when withdrawals leave little wealth.
@@ -55,7 +56,7 @@ pub struct GainField<'a> {
 
 impl<'a> GainField<'a> {
     /// Tabulates the field. `returns` are ascending and distinct, `utility` is relative to the floor of `state`. Cost
-    /// O(returns x nodes x design count).
+    /// O(returns x nodes x design count) at most.
     pub fn tabulate(
         problem: &'a Problem,
         step: usize,

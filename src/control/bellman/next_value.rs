@@ -60,7 +60,7 @@ impl NextValue {
     /// Returns predictions at every state that follows from `state` at `step` through one of `returns` (ascending)
     /// after one of `trades`. Their order is return by return, trade by trade, holding by holding; the table is empty
     /// if the value is constant. If the value does not depend on wealth, one trade is enough. Cost O(returns x trades x
-    /// design points x holdings).
+    /// design points x holdings) at most: of trades that lead to a similar wealth two are enough.
     pub fn tabulate(
         &self,
         problem: &Problem,
