@@ -162,7 +162,7 @@ impl Returns {
 
     /// Returns the noun for one period.
     pub fn noun(&self) -> &'static str {
-        self.frequency.map_or("period", Frequency::noun)
+        self.frequency.map_or_else(|| Frequency::noun_for(Some(self.periods_per_year as f64)), Frequency::noun)
     }
 
     /// Keeps the last `count` periods.

@@ -13,7 +13,7 @@ const WEEK: RangeInclusive<i32> = 4..=10;
 /// Smallest number of days from a month's date to the next one's, if both move to trading days; less is no month.
 const SHORTEST_MONTH: i32 = 20;
 
-/// Periods of which there are as many in a year are days.
+/// With at least this many periods in a year, a period is a day.
 const LEAST_DAYS: f64 = 200.0;
 
 /// The frequency of periods.

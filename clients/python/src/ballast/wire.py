@@ -2020,7 +2020,7 @@ class Sensitivity(TypedDict):
     premium: Premium
     """Effect of another mean, and of more returns like those in the record."""
     sentences: list[str]
-    """These figures in sentences, of which the first sums up the others."""
+    """These figures in sentences. The first says how far an unusual next return would move the advice."""
 
 
 class Series(TypedDict):

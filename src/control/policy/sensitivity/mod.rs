@@ -14,6 +14,12 @@ pub(super) use self::search::check_learning;
 use super::advice::Advice;
 use super::caution::Caution;
 
+/// Distance within which an allocation counts as at an end of the action interval: ten times the tolerance of the
+/// search.
+const AT_AN_END: f64 = 1e-6;
+/// Most periods considered: eight centuries of months.
+const MOST_PERIODS: usize = 10_000;
+
 /// How close an advice is to changing.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Sensitivity {
@@ -23,7 +29,7 @@ pub struct Sensitivity {
     pub next_return: NextReturn,
     /// Effect of another mean, and of more returns like those in the record.
     pub premium: Premium,
-    /// These figures in sentences, of which the first sums up the others.
+    /// These figures in sentences. The first says how far an unusual next return would move the advice.
     pub sentences: Vec<String>,
     /// Warning against following the advice, if there is one.
     #[serde(skip)]
@@ -126,4 +132,9 @@ pub struct Premium {
 pub fn cautions(advice: &Advice, sensitivity: Option<&Sensitivity>) -> Vec<Caution> {
     let short = Caution::short_record(advice.sample_size, advice.effective_size);
     short.into_iter().chain(sensitivity.and_then(|found| found.caution.clone())).collect()
+}
+
+/// Returns true if an allocation is more than the bank alone.
+fn is_invested(allocation: f64) -> bool {
+    allocation > AT_AN_END
 }

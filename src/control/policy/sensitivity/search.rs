@@ -1,7 +1,10 @@
 //! Computes the advice for other records, and finds the changes of advice between them.
 
-use super::sentences::Described;
-use super::{LeftOut, NextAdvice, NextReturn, Premium, ReturnAndLog, Sensitivity, WithoutOne};
+use super::sentences::SensitivityText;
+use super::{
+    AT_AN_END, LeftOut, MOST_PERIODS, NextAdvice, NextReturn, Premium, ReturnAndLog, Sensitivity, WithoutOne,
+    is_invested,
+};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
@@ -35,13 +38,8 @@ const WIDENED: f64 = 0.5;
 const PARTS: usize = 48;
 /// Resolution of reported returns and shifts, in log-return.
 const RESOLUTION: f64 = 1e-6;
-/// Distance within which an allocation counts as at an end of the action interval: ten times the tolerance of the
-/// search.
-const AT_AN_END: f64 = 1e-6;
 /// Share of the action interval beyond which a change of the advice counts as large.
 const FAR: f64 = 0.5;
-/// Most periods considered: eight centuries of months.
-const MOST_PERIODS: usize = 10_000;
 
 /// An advice, and functions that compute the advice in other cases.
 struct AdviceVariants<'a> {
@@ -139,12 +137,14 @@ impl AdviceVariants<'_> {
         let (needed, periods_more) = pool::join(|| self.needed(), || self.periods_more());
         let premium = Premium { present: self.present(), needed, periods_more };
         let caution = without_one.and_then(|range| self.hangs_on_one(range));
-        let described = Described {
+        let text = SensitivityText {
             allocation: self.advice.allocation,
+            highest: self.highest,
             returns: self.record.len(),
+            selected: without_one.is_some_and(|range| range.tried == self.most_left_out()),
             noun: Frequency::noun_for(self.problem.periods_per_year),
         };
-        let sentences = described.sentences(without_one.as_ref(), &next_return, &premium);
+        let sentences = text.sentences(without_one.as_ref(), &next_return, &premium);
         Sensitivity { without_one, next_return, premium, sentences, caution }
     }
 
@@ -312,11 +312,6 @@ impl AdviceVariants<'_> {
             self.problem.support_rule().given().unwrap_or(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
         [min.max(-rules::LOG_RETURN), max.min(rules::LOG_RETURN)]
     }
-}
-
-/// Returns true if an allocation is more than the bank alone.
-fn is_invested(allocation: f64) -> bool {
-    allocation > AT_AN_END
 }
 
 /// Bisects an interval, of which only the upper end is above, down to the resolution; the result has the same property.
