@@ -75,7 +75,7 @@ fn a_frequency_that_the_dates_do_not_say_is_an_option() {
         "{error}"
     );
     let read = parse(plain, &Choices::default(), Some(4)).unwrap();
-    let sentence = "2 returns, row 1 to row 2, as in column return.\nA year of 4 periods has a mean of -2.0 % and";
+    let sentence = "2 returns, row 1 to row 2, as in column return.\nA year of 4 quarters has a mean of -2.0 % and";
     assert!(read.sentence().starts_with(sentence), "{}", read.sentence());
     let halves = "date,ret\n2000-06-30,0.04\n2000-12-31,-0.02\n2001-06-30,0.05\n2001-12-31,0.03\n";
     let questions = parse(halves, &Choices::default(), None).unwrap_err().to_string();
