@@ -8,7 +8,7 @@ use std::fmt::Write;
 use ballast::control::error::FieldError;
 use ballast::control::policy::advice::{Advice, AdviceSource};
 use ballast::control::policy::worst_case::WorstCase;
-use ballast::numerics::machine::digits;
+use ballast::numerics::machine::digits::percent;
 use ballast::service::advice::advise::Advised;
 
 pub use several::describe_several;
@@ -149,10 +149,6 @@ fn figures(Advised { advice, levels, .. }: &Advised, wealth: f64, noun: &str) ->
 fn money(amount: f64) -> String {
     let decimals = if amount.abs() < 1000.0 { 4 } else { 2 };
     format!("{amount:.decimals$}")
-}
-
-fn percent(share: f64, decimals: usize) -> String {
-    format!("{} %", digits::fixed(100.0 * share, decimals))
 }
 
 fn signed(share: f64) -> String {

@@ -119,22 +119,20 @@ impl<'a> GainField<'a> {
     /// Prepares evaluation at fixed returns, some of which may be among `known`, ascending.
     fn rows(&self, returns: &[f64], known: Option<&FieldRows<'_>>) -> FieldRows<'_> {
         let (nodes, holdings) = (self.trade_count(), self.holdings.count());
-        let places = known.map_or_else(|| vec![None; returns.len()], |known| places(&known.returns, returns));
+        let places = known.map(|known| places(&known.returns, returns));
+        let kept = |index: usize| Some((known?, places.as_ref()?[index]?));
         let mut rows = vec![0.0; if self.table.is_empty() { 0 } else { nodes * returns.len() * holdings }];
         if !self.table.is_empty() {
-            for (index, (&log_return, place)) in returns.iter().zip(&places).enumerate() {
-                if let (Some(known), Some(place)) = (known, place) {
-                    for node in 0..nodes {
-                        let [from, to] = [node * known.returns.len() + place, node * returns.len() + index];
-                        let row = &known.rows[from * holdings..][..holdings];
-                        rows[to * holdings..][..holdings].copy_from_slice(row);
-                    }
-                    continue;
-                }
-                let (first, weights) = local_cubic(&self.returns, log_return);
+            for (index, &log_return) in returns.iter().enumerate() {
+                let kept = kept(index);
+                let cubic = kept.is_none().then(|| local_cubic(&self.returns, log_return));
                 for node in 0..nodes {
                     let start = (node * returns.len() + index) * holdings;
                     let row = &mut rows[start..start + holdings];
+                    if let Some((known, place)) = kept {
+                        row.copy_from_slice(&known.rows[(node * known.returns.len() + place) * holdings..][..holdings]);
+                    }
+                    let Some((first, weights)) = cubic else { continue };
                     for i in (0..weights.len()).filter(|i| weights[*i] != 0.0) {
                         let values = &self.table[((first + i) * nodes + node) * holdings..][..holdings];
                         row.iter_mut().zip(values).for_each(|(sum, value)| *sum += weights[i] * value);
@@ -142,11 +140,11 @@ impl<'a> GainField<'a> {
                 }
             }
         }
-        let growth = |(log_return, place): (&f64, &Option<usize>)| match (known, place) {
-            (Some(known), Some(place)) => known.growths[*place],
-            _ => log_return.exp() / (1.0 + self.dynamics.rate_per_step),
+        let growth = |(index, log_return): (usize, &f64)| match kept(index) {
+            Some((known, place)) => known.growths[place],
+            None => log_return.exp() / (1.0 + self.dynamics.rate_per_step),
         };
-        let growths: Vec<f64> = returns.iter().zip(&places).map(growth).collect();
+        let growths: Vec<f64> = returns.iter().enumerate().map(growth).collect();
         let sold = 1.0 - self.cost_of_selling();
         let excesses = growths.iter().map(|growth| sold * growth - 1.0).collect();
         let largest = match self.next {

@@ -50,7 +50,7 @@ pub(in crate::numerics) type Share = (usize, f64);
 
 /// Largest number of gaps of all kept sizes and statistics together, unless one alone has more: a step of a training
 /// needs two sizes and both statistics. They take two megabytes.
-pub(super) const MOST_GAPS: usize = 1 << 15;
+const MOST_GAPS: usize = 1 << 15;
 
 /// The weights of all gaps of laws with equal weights, which do not depend on the values: those computed last, by size
 /// and number of the statistic.

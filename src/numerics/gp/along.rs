@@ -16,7 +16,8 @@ impl GpMean {
     ///
     /// Three and more points within half a length scale are interpolated by the cubic with the mean's values and
     /// derivatives at two places. Over a distance of h length scales it errs by at most h^4 / 1536 times the largest
-    /// fourth derivative per length scale. Cost O(n (d + 4 functions)), and O(n (d + points functions)) over longer distances.
+    /// fourth derivative per length scale. Cost O(n (d + 4 functions)), and O(n (d + points functions)) over longer
+    /// distances.
     /// Checked by: tests/solver/gp.rs, means_along_an_input_are_those_at_its_points.
     pub fn means_along_first(&self, query: &[f64], firsts: &[f64]) -> Vec<f64> {
         let n = self.input_count();

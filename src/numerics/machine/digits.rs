@@ -6,6 +6,11 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if is_zero(&text) { text.trim_start_matches('-').to_owned() } else { text }
 }
 
+/// Writes a fraction as a percentage to `decimals` decimals; a zero has no sign.
+pub fn percent(fraction: f64, decimals: usize) -> String {
+    format!("{} %", fixed(100.0 * fraction, decimals))
+}
+
 /// Writes a number to `decimals` decimals with its sign; a zero has no sign.
 pub fn signed(value: f64, decimals: usize) -> String {
     let text = format!("{value:+.decimals$}");

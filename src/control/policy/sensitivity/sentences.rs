@@ -1,7 +1,7 @@
 //! How close an advice is to changing, in sentences.
 
 use super::{AT_AN_END, LeftOut, MOST_PERIODS, NextReturn, Premium, WithoutOne, is_invested};
-use crate::numerics::machine::digits;
+use crate::numerics::machine::digits::{self, percent};
 
 /// An advice that an unusual return moves by less than this is steady.
 const STEADY: f64 = 0.02;
@@ -126,16 +126,10 @@ impl SensitivityText {
     }
 }
 
-/// Formats a share of wealth; nothing and everything have no decimals.
+/// Formats a share of wealth; nothing and everything, after rounding, have no decimals.
 fn allocation(share: f64) -> String {
-    let text = percent(share, 1);
-    text.strip_suffix(".0 %")
-        .filter(|whole| ["0", "100"].contains(whole))
-        .map_or(text.clone(), |whole| format!("{whole} %"))
-}
-
-fn percent(share: f64, decimals: usize) -> String {
-    format!("{} %", digits::fixed(100.0 * share, decimals))
+    let is_end = ["0.0", "100.0"].contains(&digits::fixed(100.0 * share, 1).as_str());
+    percent(share, usize::from(!is_end))
 }
 
 #[cfg(test)]
