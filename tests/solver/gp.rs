@@ -287,6 +287,31 @@ fn ends_as_high(rows: usize, lost: f64) {
     assert_eq!(found, fit(&inputs, &targets, &bounds, None).unwrap());
 }
 
+/// The length scales of nearly linear functions are far beyond those at which searches start. The search on 400 of the rows
+/// must not lose what that on 200 found.
+#[test]
+fn nearly_linear_functions_of_many_rows_get_long_scales() {
+    let bounds = Bounds { lengthscale: [0.05, 1e3], signal_variance: [1e-3, 1e5], noise_variance: [1e-10, 1.0] };
+    for seed in 1..=3 {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        let slopes: Vec<f64> = (0..8).map(|_| generator.random_range(-1.0..1.0)).collect();
+        let inputs = DMatrix::from_fn(900, 8, |_, _| generator.random_range(-2.0..2.0));
+        let function = |row: usize| {
+            let linear: f64 = slopes.iter().zip(inputs.row(row).iter()).map(|(slope, x)| slope * x).sum();
+            linear + 0.01 * linear * linear
+        };
+        let targets: Vec<f64> = (0..inputs.nrows()).map(function).collect();
+        let found = fit(&inputs, &targets, &bounds, None).unwrap();
+        let some = fit::evenly_spaced(200, inputs.nrows());
+        let of_some: Vec<f64> = some.iter().map(|&row| targets[row]).collect();
+        let before = fit(&inputs.select_rows(&some), &of_some, &bounds, None).unwrap();
+        let (before, _) = one_likelihood(&inputs, &targets, before.process.hyperparameters()).unwrap();
+        // Found on 400 of 900 rows: by the normal law of estimates ln p of all is below the highest by (900 / 400 - 1) / 2
+        // times a chi-squared variable with 10 degrees of freedom, which exceeds 29.6 once in a thousand.
+        assert!(found.log_likelihood > before - 18.5, "{} after {before}", found.log_likelihood);
+    }
+}
+
 #[test]
 fn repeated_inputs_without_noise_need_jitter_and_say_so() {
     let inputs = DMatrix::from_element(10, 1, 0.5);
