@@ -148,6 +148,12 @@ def kernel(hyper, left, right):
     return hyper["signal_variance"] * (1 + r + r * r / 3) * math.exp(-r)
 
 
+def nearest(coordinate, column):
+    """Half of the range of the design beyond its ends, a value is as at these ends."""
+    beyond = 0.5 * (max(column) - min(column))
+    return min(max(coordinate, min(column) - beyond), max(column) + beyond)
+
+
 def predictions(process, points, x):
     covariances = [kernel(process["hyperparameters"], point, x) for point in points]
     totals = [sum(w * k for w, k in zip(weights, covariances)) for weights in process["weights"]]
@@ -233,7 +239,8 @@ def evaluate(policy, question):
     scales = zip(scaling["active"], scaling["centre"], scaling["spread"])
     x = [(found[feature] - centre) / spread for feature, centre, spread in scales]
     points = list(zip(*solution["inputs"]))
-    value = at_holding(predictions(solution["value"], points, x), known / highest)
+    near = [nearest(coordinate, column) for coordinate, column in zip(x, solution["inputs"])]
+    value = at_holding(predictions(solution["value"], points, near), known / highest)
     if specification["surrogate"]["target"] == "value":
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
         unit = 1.0 if sees_wealth(problem) else wealth

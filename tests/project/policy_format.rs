@@ -107,17 +107,21 @@ fn policies() -> Vec<Value> {
 /// Seen in the two periods after the history.
 const SEEN: [f64; 2] = [0.03, -0.02];
 
-/// States of every step: along a path, and one of another wealth.
-fn states(solved: &Advisor) -> Vec<(usize, State)> {
+/// A return five times the best, beyond what designs know.
+const LEAP: [f64; 1] = [0.28];
+
+/// States of every step, with the returns seen: along a path, one of another wealth, and one after a leap.
+fn states(solved: &Advisor) -> Vec<(usize, State, &'static [f64])> {
     let start = solved.initial_state(None, None).unwrap();
     let first = solved.advance(0, &start, &PeriodOutcome::of(0.6, SEEN[0]));
     let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
     let second = solved.advance(1, &first, &PeriodOutcome::of(0.3, SEEN[1]));
-    vec![(0, start), (1, first), (1, other), (2, second)]
+    let leaping = solved.advance(0, &start, &PeriodOutcome::of(0.6, LEAP[0]));
+    vec![(0, start, &[]), (1, first, &SEEN[..1]), (1, other, &SEEN[..1]), (2, second, &SEEN), (1, leaping, &LEAP)]
 }
 
-fn question(solved: &Advisor, step: usize, state: &State) -> Value {
-    let returns = [&HISTORY, &SEEN[..step]].concat();
+fn question(solved: &Advisor, step: usize, state: &State, seen: &[f64]) -> Value {
+    let returns = [&HISTORY, seen].concat();
     let mut question = json!({ "step": step, "wealth": state.wealth, "holding": state.holding, "returns": returns });
     let problem = solved.policy().problem(Default::default());
     if problem.specification.problem.radius.as_ref().is_some_and(|rule| json!(rule)["rule"] == "bridge") {
@@ -142,10 +146,11 @@ fn another_program_that_follows_the_page_answers_what_the_service_answers() {
         let document: Value = serde_json::from_slice(&solved.policy().to_json().unwrap()).unwrap();
         seen.extend(features(&document));
         let states = states(&solved);
-        let questions: Vec<Value> = states.iter().map(|(step, state)| question(&solved, *step, state)).collect();
+        let questions: Vec<Value> =
+            states.iter().map(|(step, state, seen)| question(&solved, *step, state, seen)).collect();
         let answers = python(&[], &json!({ "policy": document, "questions": questions }));
         assert_eq!(answers.as_array().unwrap().len(), states.len());
-        for ((step, state), answer) in states.iter().zip(answers.as_array().unwrap()) {
+        for ((step, state, _), answer) in states.iter().zip(answers.as_array().unwrap()) {
             let what = format!("{request} step {step} wealth {}", state.wealth);
             let number = |field: &str| answer[field].as_f64().unwrap_or_else(|| panic!("{what}: {answer}"));
             // A sum of 25 weights that cancel: up to 1e6 times the rounding of the result.

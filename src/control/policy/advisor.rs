@@ -291,11 +291,12 @@ impl Advisor {
             }
             Solution::Surrogates(stored) => {
                 let PreparedStep { value, policy, factor } = self.prepared_from(step, stored);
-                let input = value.scaling.apply(&self.problem.features_within(step, state, radius));
+                let features = self.problem.features_within(step, state, radius);
+                let input = value.scaling.apply(&features);
                 let process = factor.process(&self.kept, stored);
                 let deviation =
                     process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
-                let (ends, predictions, holdings) = (policy.at(&input), value.surrogate.at(&input), value.holdings());
+                let (ends, predictions, holdings) = (policy.at(&input), value.prediction(&features), value.holdings());
                 let is_finite = ends.iter().all(|end| end.is_finite());
                 let unit = self.problem.unit_of_action(step, state);
                 let ends: Vec<f64> = ends.into_iter().map(|end| (end / unit).clamp(0.0, highest)).collect();
