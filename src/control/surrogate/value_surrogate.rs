@@ -78,15 +78,20 @@ impl ValueSurrogate {
 
     /// Returns the nearest input to `features` from which the process predicts.
     fn within_reach(&self, features: &Features) -> Vec<f64> {
-        let inputs = self.scaling.apply(features).into_iter().zip(&self.reach);
-        inputs.map(|(input, [low, high])| input.max(*low).min(*high)).collect()
+        let inputs = self.scaling.apply(features).into_iter().enumerate();
+        inputs.map(|(place, input)| self.nearest(place, input)).collect()
+    }
+
+    /// Returns the nearest value of the input at a place.
+    fn nearest(&self, place: usize, input: f64) -> f64 {
+        let [low, high] = self.reach[place];
+        input.max(low).min(high)
     }
 
     /// Returns predictions that differ from `features` in the first feature alone, wealth, which must be an input:
     /// wealth by wealth, holding by holding. Cost: as [`GpMean::means_along_first`].
     pub fn predictions(&self, features: &Features, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
-        let [low, high] = self.reach[0];
-        let input = |wealth: f64| ((wealth - self.scaling.centre[0]) / self.scaling.spread[0]).max(low).min(high);
+        let input = |wealth: f64| self.nearest(0, (wealth - self.scaling.centre[0]) / self.scaling.spread[0]);
         let inputs: Vec<f64> = wealths.map(input).collect();
         self.surrogate.unscaled(self.surrogate.mean.means_along_first(&self.within_reach(features), &inputs))
     }

@@ -114,7 +114,7 @@ pub fn fit(
     let search = LikelihoodSearch { inputs: &some_inputs, targets: &some_targets, bounds, stop };
     let run = |start: &[f64], steps: usize| search.run(start, curvature_of_a_row.as_ref().map(|known| (known, steps)));
     let mut minimum = run(&start, STEP_LIMIT + to_come_back)?;
-    if to_come_back > 0 {
+    if to_come_back > 0 && curvature_of_a_row.is_some() {
         // Steps may not have sufficed.
         let known = run(&point, 0)?;
         evaluations += known.evaluations;
