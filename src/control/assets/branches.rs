@@ -12,10 +12,10 @@ use super::centred::CentredUtility;
 use crate::numerics::machine::interruption;
 use crate::numerics::transport::water_filling::{FillingPhase, Levelling};
 
-/// Largest number of Newton steps for a local minimum; they approach it from one side, and double the digits from about
-/// the third on.
+/// Largest number of Newton steps for a local minimum, and the last step as a share of it: they approach it from one
+/// side, and double the digits from about the third on.
 const NEWTON_STEPS: usize = 40;
-const NEWTON_TOLERANCE: f64 = 1e-13;
+const NEWTON_TOLERANCE: f64 = 1e-9;
 /// At 1 a local minimum and a maximum meet.
 const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
@@ -207,13 +207,13 @@ fn local_minima(
                 let at_peak = if peak < f64::INFINITY { utility.at(fixed + peak).1 * peak / rate } else { 0.0 };
                 *last = Inside { fixed, rate, at_peak, moving: f64::NAN, utility: (0.0, 0.0) };
             }
-            if start > price || (peak < speed * high && last.at_peak > price) {
+            let crosses = speed * low < peak && peak < speed * high && last.at_peak > price;
+            if start > price || crosses {
                 if last.moving.is_nan() {
                     last.moving = inside(phase, utility, price, peak.min(speed * high));
                     last.utility = utility.at(fixed + last.moving);
                 }
-                // Below the end of its phase the level is still that of a move, but with another utility.
-                found(last.moving / speed, true, (last.moving >= speed * low).then_some(last.utility));
+                found(last.moving / speed, true, Some(last.utility));
             }
         }
     }
@@ -225,8 +225,8 @@ fn local_minima(
     true
 }
 
-/// Returns the y below `peak` at which `U'(b + y) y / rate` is the price. Newton's method in ln y runs from the left on
-/// the logarithms, whose difference is concave there.
+/// Returns the y below `peak` at which `U'(b + y) y / rate` is the price. Newton's method runs from the left: up to its
+/// peak `U'(b + y) y` is concave for every utility.
 fn inside(phase: &FillingPhase, utility: CentredUtility, price: f64, peak: f64) -> f64 {
     let &FillingPhase { fixed, speed, rate, low, .. } = phase;
     let target = price * rate;
@@ -238,10 +238,12 @@ fn inside(phase: &FillingPhase, utility: CentredUtility, price: f64, peak: f64) 
     };
     for _ in 0..NEWTON_STEPS {
         let wealth = fixed + moving;
-        let short = (target / (utility.at(wealth).1 * moving)).ln();
-        let step = short / (1.0 - utility.relative_aversion(wealth) * moving / wealth);
-        moving = (moving * step.exp()).min(peak);
-        if step.abs() < NEWTON_TOLERANCE {
+        let slope = utility.at(wealth).1;
+        let rise = slope * (1.0 - utility.relative_aversion(wealth) * moving / wealth);
+        let next = (moving + (target - slope * moving) / rise).min(peak);
+        let step = (next - moving).abs();
+        moving = next;
+        if step < NEWTON_TOLERANCE * moving {
             break;
         }
     }

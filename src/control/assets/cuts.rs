@@ -99,9 +99,9 @@ impl Cuts {
         self.all[self.of(atom)].iter().map(|cut| cut.payoff).fold(f64::INFINITY, f64::min)
     }
 
-    /// Takes over the branches found at a point, and those earlier moves that still carry mass and differ from all of
-    /// the new ones.
-    pub fn renew(&mut self, step: &PortfolioStep, branches: &Branches, point: &[f64], before: &Cuts) {
+    /// Takes over the branches found at a point that pay within `reach` of the least, and those earlier moves that still
+    /// carry mass and differ from all of the new ones.
+    pub fn renew(&mut self, step: &PortfolioStep, branches: &Branches, reach: f64, point: &[f64], before: &Cuts) {
         self.assets = step.assets();
         self.origin.clear();
         self.origin.extend_from_slice(point);
@@ -111,7 +111,10 @@ impl Cuts {
         self.excesses.clear();
         self.stills.clear();
         for (atom, mass) in step.masses.iter().enumerate() {
-            for branch in branches.of(atom) {
+            let least = branches.all[branches.worst(atom)].payoff;
+            let is_near = |branch: &usize| branches.all[*branch].payoff <= least + reach;
+            let stays = branches.of(atom).start;
+            for branch in branches.of(atom).filter(|branch| *branch == stays || is_near(branch)) {
                 let (found, excess) = (&branches.all[branch], branches.excess(branch));
                 let at_bank = found.payoff - point[self.assets] * found.cost - found.slope * dot(excess, point);
                 let follows = found.follows.then_some(Following { at_bank, slope: found.slope });
@@ -293,7 +296,7 @@ mod tests {
             let found_at = |length: f64| {
                 let (mut branches, mut cuts, at) = (Branches::default(), Cuts::default(), at(length));
                 branches.find(&step, &at[..ASSETS], at[ASSETS]);
-                cuts.renew(&step, &branches, &at, &Cuts::default());
+                cuts.renew(&step, &branches, f64::INFINITY, &at, &Cuts::default());
                 cuts
             };
             let here = found_at(0.0);

@@ -46,6 +46,8 @@ const ROUNDING: f64 = 1e-15;
 /// Largest number of Newton steps for t_j, and their tolerance as a share of the barrier.
 const TOP_STEPS: usize = 30;
 const TOP_TOLERANCE: f64 = 1e-10;
+/// A product of slacks, in barriers, up to this and down to its inverse may have another factor.
+const MOST_PRODUCT: f64 = 1e100;
 /// Smallest radius used in the search.
 const LEAST_RADIUS: f64 = 1e-9;
 /// Weight of the default start in a warm start, which keeps it inside the bounds.
@@ -83,6 +85,8 @@ pub(super) struct Interior<'a> {
     /// Barrier of a bound, over that of all atoms.
     pub bound_weight: f64,
     pub barrier: f64,
+    /// How far above the least of its atom a move may pay to be learned, in barriers.
+    reach: f64,
     /// The adversary's answer at the point.
     branches: Branches,
     /// The known moves of the adversary.
@@ -129,6 +133,7 @@ impl<'a> Interior<'a> {
         held: &'a [usize],
         near: Option<(Vec<f64>, f64)>,
         barrier: f64,
+        reach: f64,
     ) -> Self {
         let assets = step.assets();
         let highest = step.total.highest;
@@ -160,10 +165,7 @@ impl<'a> Interior<'a> {
                 lines.push((line, -sign * held));
             }
         }
-        let bounds = lines
-            .into_iter()
-            .map(|(direction, offset)| BarrierConstraint { direction, offset, multiplier: 0.0 })
-            .collect();
+        let bound = |(direction, offset)| BarrierConstraint { direction, offset, multiplier: 0.0 };
         let mut interior = Interior {
             step,
             whole,
@@ -172,9 +174,10 @@ impl<'a> Interior<'a> {
             best: point[..assets].to_vec(),
             best_price: point[assets],
             point,
-            bounds,
+            bounds: lines.into_iter().map(bound).collect(),
             bound_weight: 1.0 / assets as f64,
             barrier,
+            reach,
             branches: Branches::default(),
             cuts: Cuts::default(),
             known_before: Cuts::default(),
@@ -203,7 +206,7 @@ impl<'a> Interior<'a> {
     /// Adds the adversary's answer to the known moves.
     fn learn(&mut self) {
         std::mem::swap(&mut self.cuts, &mut self.known_before);
-        self.cuts.renew(self.step, &self.branches, &self.point, &self.known_before);
+        self.cuts.renew(self.step, &self.branches, self.reach * self.barrier, &self.point, &self.known_before);
         self.merit();
         for (atom, mass) in self.step.masses.iter().enumerate() {
             let of = self.cuts.of(atom);
@@ -330,12 +333,16 @@ impl<'a> Interior<'a> {
             let of = self.cuts.of(atom);
             let cuts = &mut self.cuts.all[of];
             let top = top(cuts, barrier);
-            let mut logarithms = 0.0;
+            let (mut product, mut logarithms) = (1.0_f64, 0.0);
             for cut in cuts {
                 cut.slack = cut.payoff - top;
-                logarithms += (cut.slack / barrier).ln();
+                product *= cut.slack / barrier;
+                if !(MOST_PRODUCT.recip()..MOST_PRODUCT).contains(&product) {
+                    logarithms += product.ln();
+                    product = 1.0;
+                }
             }
-            merit += mass * (top + barrier * logarithms);
+            merit += mass * (top + barrier * (logarithms + product.ln()));
         }
         merit
     }

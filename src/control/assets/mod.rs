@@ -54,6 +54,10 @@ const ROUNDING: f64 = 1e-14;
 const BARRIERS: [f64; 4] = [1e-3, 1e-4, 1e-2, 1e-1];
 const BARRIER_NEAR: f64 = 1e-6;
 const BARRIER_CONTINUED: f64 = 1e-2;
+/// How far above the least of its atom a move of the adversary may pay to be learned by a first search, in barriers.
+/// Further up it would get a thousandth of the mass at most. If it is missed as the search goes on, it is found again,
+/// and searches after a failed one learn all moves.
+const REACH: f64 = 1000.0;
 /// Smaller shares are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 
@@ -147,18 +151,18 @@ impl PortfolioStep {
 
     /// Solves for the best allocation. `near` is a warm start: the solution of a similar step.
     ///
-    /// If a search leaves its bounds apart, others follow from starts further inside or out, and then from the
-    /// solutions at lower risk aversions; bounds of all of them hold. Cost: 1 search, and up to 12 if they fail, each
-    /// with some 10 to 40 evaluations of O(n d ln d), and 30 to 120 steps of O(n d^2), d the number of assets in the
-    /// search.
+    /// If a search leaves its bounds apart, others follow with all moves of the adversary from starts further inside or
+    /// out, and then from the solutions at lower risk aversions; bounds of all of them hold. Cost: 1 search, and up to 13
+    /// if they fail, each with some 10 to 40 evaluations of O(n d ln d), and 30 to 200 steps of O(n d^2), d the number
+    /// of assets in the search.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
         let barrier = if near.is_some() { BARRIER_NEAR } else { BARRIERS[0] };
-        let (mut best, _) = self.search(self.first_held(near), near, barrier);
-        for barrier in BARRIERS.into_iter().skip(usize::from(near.is_none())) {
+        let (mut best, _) = self.search(self.first_held(near), near, barrier, REACH);
+        for barrier in BARRIERS {
             if best.is_certified() {
                 break;
             }
-            best = best.or(self.search((0..self.assets).collect(), None, barrier).0);
+            best = best.or(self.search((0..self.assets).collect(), None, barrier, f64::INFINITY).0);
         }
         if !best.is_certified() {
             best = self.continue_from_milder(best);
@@ -173,13 +177,14 @@ impl PortfolioStep {
             std::iter::successors(Some(self.utility), |utility| utility.milder()).skip(1).collect();
         let Some(mildest) = utilities.pop() else { return failed };
         let with = |utility: CentredUtility| PortfolioStep { utility, ..self.clone() };
-        let (mut near, _) = with(mildest).search(self.first_held(None), None, BARRIERS[0]);
+        let (mut near, _) = with(mildest).search(self.first_held(None), None, BARRIERS[0], f64::INFINITY);
         for utility in utilities.into_iter().rev().chain([self.utility]) {
             let log_wealth = with(utility.around(near.value)).worth(&near.allocation).value;
             let step = with(utility.around(log_wealth));
             let RobustValue { value, multiplier, .. } = step.worth(&near.allocation);
             let start = AssetsSolution { value, bound: f64::INFINITY, multiplier, ..near };
-            let (found, _) = step.search(step.first_held(Some(&start)), Some(&start), BARRIER_CONTINUED);
+            let held = step.first_held(Some(&start));
+            let (found, _) = step.search(held, Some(&start), BARRIER_CONTINUED, f64::INFINITY);
             near = start.or(found);
         }
         failed.or(near)
@@ -216,19 +221,21 @@ impl PortfolioStep {
         AssetsSolution { allocation: nothing.clone(), value: 0.0, bound: bound.max(0.0), mean_moves: nothing, ..found }
     }
 
-    /// Searches among the assets `held`, and adds others once they would raise the value. The bound is that of all
-    /// assets, and so is the tangent returned with it.
+    /// Searches among the assets `held`, and adds others once they would raise the value. Moves of the adversary within
+    /// `reach` barriers of the least of their atom are learned. The bound is that of all assets, and so is the tangent
+    /// returned with it.
     fn search(
         &self,
         mut held: Vec<usize>,
         near: Option<&AssetsSolution>,
         mut barrier: f64,
+        reach: f64,
     ) -> (AssetsSolution, Option<Tangent>) {
         let mut start = near.map(|near| (held.iter().map(|&asset| near.allocation[asset]).collect(), near.multiplier));
         let (mut upper, mut evaluations) = (f64::INFINITY, 0);
         loop {
             let among = self.among(&held);
-            let mut interior = Interior::start(&among, self, &held, start, barrier);
+            let mut interior = Interior::start(&among, self, &held, start, barrier, reach);
             interior.run(TOLERANCE);
             upper = interior.upper.min(upper);
             evaluations += interior.evaluations;

@@ -10,11 +10,13 @@
 //!
 //!   the whole  <=  V_F(a) + ln(1 - c T(a)) + max_b [ grad V_F(a) . (b - a) - c / (1 - c T(a)) (T(b) - T(a)) ].
 
-use super::{AssetsSolution, BARRIER_NEAR, BARRIERS, CONTENT, LEAST_SHARE, PortfolioStep};
+use super::{AssetsSolution, BARRIER_NEAR, BARRIERS, CONTENT, PortfolioStep, REACH};
 use crate::control::problem::actions::ActionInterval;
 
 /// Largest number of searches.
 const SEARCHES: usize = 12;
+/// A holding that changes by less is kept if that costs no more than the bounds may lie apart.
+const LEAST_TRADE: f64 = 1e-4;
 /// Relative change of the price of trading above which the search runs again.
 const PRICE_STANDS: f64 = 1e-7;
 
@@ -89,14 +91,14 @@ impl PortfolioStep {
         let mut step = self.clone();
         step.trading = Trading { holdings: holdings.to_vec(), price: cost };
         let mut best = step.without_assets(cost);
-        let (mut barriers, mut near) = (BARRIERS.into_iter(), near.cloned());
+        let (mut barriers, mut near, mut reach) = (BARRIERS.into_iter(), near.cloned(), REACH);
         for _ in 0..SEARCHES {
             let barrier = match &near {
                 Some(_) => Some(BARRIER_NEAR),
                 None => barriers.next(),
             };
             let Some(barrier) = barrier else { break };
-            let (found, tangent) = step.search(step.first_held(near.as_ref()), near.as_ref(), barrier);
+            let (found, tangent) = step.search(step.first_held(near.as_ref()), near.as_ref(), barrier, reach);
             let found = step.less_cost(found, tangent, cost);
             let price = step.price_of_trading(&found, cost);
             let stands = (price - step.trading.price).abs() < PRICE_STANDS * price;
@@ -104,6 +106,9 @@ impl PortfolioStep {
             best = best.or(found);
             if best.is_certified() {
                 break;
+            }
+            if stands {
+                reach = f64::INFINITY;
             }
             step.trading.price = price;
         }
@@ -128,7 +133,7 @@ impl PortfolioStep {
     /// kept. Without a tangent the bound is infinite.
     fn less_cost(&self, found: AssetsSolution, tangent: Option<Tangent>, cost: f64) -> AssetsSolution {
         let trading = &self.trading;
-        let kept = |(held, share): (&f64, &f64)| if (share - held).abs() < LEAST_SHARE { *held } else { *share };
+        let kept = |(held, share): (&f64, &f64)| if (share - held).abs() < LEAST_TRADE { *held } else { *share };
         let kept: Vec<f64> = trading.holdings.iter().zip(&found.allocation).map(kept).collect();
         let whole: f64 = kept.iter().sum();
         let fits = (self.total.lowest..=self.total.highest).contains(&whole);

@@ -2,8 +2,9 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{MatMut, MatRef, Par};
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
 use crate::numerics::gp::matern::dot_inline;
@@ -33,6 +34,15 @@ pub struct Singular {
 pub struct Cholesky {
     /// The factor; entries above the diagonal are those of the matrix factored.
     lower: DMatrix<f64>,
+}
+
+/// Adds `sum v v'` over the vectors v, one after the other in `vectors`, to the lower triangle of a matrix of `size`
+/// rows, column by column. Cost `size` / 2 for each entry of the vectors.
+pub fn add_squares(matrix: &mut [f64], size: usize, vectors: &[f64]) {
+    let vectors = MatRef::from_column_major_slice(vectors, size, vectors.len() / size);
+    let matrix = MatMut::from_column_major_slice_mut(matrix, size, size);
+    let (lower, all) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    matmul(matrix, lower, Accum::Add, vectors, all, vectors.transpose(), all, 1.0, Par::Seq);
 }
 
 impl Cholesky {

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::Interior;
 use crate::control::assets::cuts::dot;
 use crate::control::request::assets::MOST_ASSETS;
-use crate::numerics::gp::cholesky::Cholesky;
+use crate::numerics::gp::cholesky::{Cholesky, add_squares};
 use crate::numerics::machine::dispatch::dispatched;
 
 /// Steps keep this share of the distance to a bound.
@@ -14,8 +14,8 @@ const TO_BOUND: f64 = 0.95;
 const NO_MASS: f64 = 1e-13;
 /// Multipliers are kept within this factor of the central path.
 const OFF_CENTRE: f64 = 100.0;
-/// Rows of the matrix start at multiples of this.
-const ROW_START: usize = 4;
+/// Squares that are added to the matrix together.
+const TOGETHER: usize = 128;
 /// Shares of the diagonal that are added to it until all pivots are above rounding. A damped step is still uphill.
 const DAMPINGS: [f64; 4] = [1e-11, 1e-8, 1e-5, 1e-2];
 
@@ -31,23 +31,34 @@ pub(super) struct Direction {
     pub gain: f64,
 }
 
-/// A symmetric matrix that is a sum of squares, with a right-hand side. Each row is kept from near the diagonal on.
+/// A symmetric matrix that is a sum of squares, with a right-hand side. Each row is kept from the diagonal on.
 struct System {
     size: usize,
     matrix: Vec<f64>,
     right: Vec<f64>,
+    /// Vectors whose squares are yet to be added, one after the other.
+    waiting: Vec<f64>,
 }
 
 impl System {
-    /// Adds `weight v v'`, from the diagonal on, or a little before it to fill whole registers.
+    fn of(size: usize) -> Self {
+        let waiting = Vec::with_capacity(TOGETHER * size);
+        System { size, matrix: vec![0.0; size * size], right: vec![0.0; size], waiting }
+    }
+
+    /// Adds `weight v v'`. Squares wait until there are enough for a product of matrices.
     #[inline(always)]
     fn add(&mut self, weight: f64, vector: &[f64]) {
-        let size = vector.len();
-        for (index, (row, entry)) in self.matrix.chunks_exact_mut(size).zip(vector).enumerate() {
-            let from = index - index % ROW_START;
-            let scaled = weight * entry;
-            row[from..].iter_mut().zip(&vector[from..]).for_each(|(sum, value)| *sum += scaled * value);
+        let root = weight.sqrt();
+        self.waiting.extend(vector.iter().map(|entry| root * entry));
+        if self.waiting.len() >= TOGETHER * self.size {
+            self.add_waiting();
         }
+    }
+
+    fn add_waiting(&mut self) {
+        add_squares(&mut self.matrix, self.size, &self.waiting);
+        self.waiting.clear();
     }
 
     /// Returns the solution with its diagonal raised by a share; `None` if it is not positive definite even then.
@@ -75,7 +86,7 @@ impl Interior<'_> {
     /// `None` if the matrix is not positive definite even if damped. Cost O(n d^2) for n moves.
     pub(super) fn direction(&self) -> Option<Direction> {
         let size = self.step.assets() + 1;
-        let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
+        let mut system = System::of(size);
         let mut stiffnesses = vec![0.0; self.step.atoms()];
         // Sums of `multiplier / slack` times gradients, atom by atom.
         let mut gradients = vec![0.0; self.step.atoms() * size];
@@ -86,6 +97,7 @@ impl Interior<'_> {
                 *stiffness = self.add_atom(atom, gradient, &mut system);
             }
         });
+        system.add_waiting();
         system.right[size - 1] -= self.radius();
         let mut system = self.with_trades(system);
         for bound in &self.bounds {
@@ -94,6 +106,7 @@ impl Interior<'_> {
             system.right.iter_mut().zip(&bound.direction).for_each(|(sum, part)| *sum += target * part);
             system.add(bound.multiplier / slack, &bound.direction);
         }
+        system.add_waiting();
         let point = DAMPINGS.iter().find_map(|damping| system.solve(*damping))?;
         let gain = dot(&system.right, &point);
         let atoms = stiffnesses.iter().zip(gradients.chunks_exact(size));
@@ -114,7 +127,7 @@ impl Interior<'_> {
         }
         let mut right = system.right;
         right.resize(whole, -self.step.trading.price);
-        System { size: whole, matrix, right }
+        System { size: whole, matrix, right, waiting: system.waiting }
     }
 
     /// Adds the contribution of the moves of an atom, with its t eliminated. Returns the sum of theta, and puts that of
