@@ -7,7 +7,9 @@
 //!
 //! One state in eight leaps beyond the record: one return on the way to it is spread evenly over the support, or over
 //! twice the worst and the best of the record. The adversary moves returns that far, and a session may report them, so
-//! the value there must be learned and not extrapolated.
+//! the value there must be learned and not extrapolated. In each period the adversary moves a few percent of the mass,
+//! less as the record grows. Over several periods it leads to states after two and three leaps, and so some later
+//! returns leap too.
 
 use rand::RngExt;
 
@@ -31,6 +33,9 @@ use crate::numerics::machine::streams::stream;
 pub const GUARDS: usize = 1000;
 /// Share of leaps beyond each end of the range, which are moved to the end: the adversary goes there.
 const AT_THE_ENDS: f64 = 0.05;
+/// Chance of another leap in each later period, times the root of the returns: somewhat more than the mass that the
+/// adversary moves under the usual radii.
+const AGAIN: f64 = 0.3;
 /// How far below the worst return the adversary may go in one period if every return is allowed, in log-return.
 const FREE_FALL: f64 = 1.2;
 /// Largest number of guards for each design point: in a small design more features would cost more than solving it.
@@ -106,8 +111,8 @@ impl Design {
     }
 
     /// Returns state `index` of `step`; those beyond the candidates are independent draws of the same law. Those from
-    /// [`LEAPING`] leap beyond the record in one of the periods. Streams: ("initial", 0, index) for the start,
-    /// ("design", t, index) for each step, ("leap", step, index) for the period of the leap. Cost O(history) a step.
+    /// [`LEAPING`] leap beyond the record in one of the periods or more. Streams: ("initial", 0, index) for the start,
+    /// ("design", t, index) for each step, ("leap", step, index) for the leaps. Cost O(history) a step.
     pub fn state(&self, step: usize, index: usize) -> State {
         let problem = &self.problem;
         if let Some(wealths) = self.ladder.get(index) {
@@ -122,16 +127,16 @@ impl Design {
         } else {
             self.history.clone()
         };
-        let leap = self.leap_to(step, index);
+        let mut leaps = self.leaps_to(step, index).into_iter().peekable();
         let mut seen = Vec::with_capacity(step);
         for (earlier, dynamics) in self.periods[..step].iter().enumerate() {
             let mut generator = stream(self.seed, "design", earlier, index);
             let action = dynamics.highest_action(wealth, problem.action_interval[1]) * generator.random::<f64>();
             let mut log_return = admissible(self.law.draw(&mut generator), problem);
-            if let Some(leap) = leap.as_ref().filter(|leap| leap.period == earlier) {
+            if let Some(leap) = leaps.next_if(|leap| leap.period == earlier) {
                 let mut known = law.clone();
                 known.extend(&seen);
-                log_return = admissible(self.leap(&known, leap), problem);
+                log_return = admissible(self.leap(&known, &leap), problem);
             }
             (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
             seen.push(log_return);
@@ -140,12 +145,19 @@ impl Design {
         self.holding_half(wealth.max(self.periods[step].least_wealth()), law)
     }
 
-    /// Returns the leap of a state that leaps.
-    fn leap_to(&self, step: usize, index: usize) -> Option<Leap> {
-        let number = index.checked_sub(LEAPING).filter(|_| step > 0)?;
-        let period = stream(self.seed, "leap", step, number).random_range(0..step);
+    /// Returns the leaps of a state that leaps, in order: one in any period, and some in the periods after it.
+    fn leaps_to(&self, step: usize, index: usize) -> Vec<Leap> {
+        let Some(number) = index.checked_sub(LEAPING).filter(|_| step > 0) else { return Vec::new() };
+        let mut generator = stream(self.seed, "leap", step, number);
+        let period = generator.random_range(0..step);
         // Multiples of the golden ratio are even in every range of numbers.
-        Some(Leap { period, place: (number as f64 * GOLDEN).fract(), far: !number.is_multiple_of(2) })
+        let first = Leap { period, place: (number as f64 * GOLDEN).fract(), far: !number.is_multiple_of(2) };
+        let again_chance = AGAIN / self.problem.learning.effective_size(self.problem.history.len()).sqrt();
+        let again = |period: usize| {
+            let leaps = generator.random::<f64>() < again_chance;
+            leaps.then(|| Leap { period, place: generator.random(), far: generator.random() })
+        };
+        std::iter::once(first).chain((period + 1..step).filter_map(again)).collect()
     }
 
     /// Returns the return of a leap after `law`. Leaps are spread evenly over the support, or over the support that a
