@@ -27,6 +27,8 @@ const MARGIN: f64 = 1.15;
 const GROWTH: [f64; 2] = [1.25, 2.0];
 /// The least aim of a step if others erred by more, as a share of an even split.
 const LEAST_SHARE: f64 = 0.5;
+/// Halvings of an interval, for a share to 12 digits.
+const HALVINGS: usize = 40;
 const BASIS_POINTS: f64 = 1e4;
 
 /// The largest error allowed at one step, and the number of design points to begin with.
@@ -34,8 +36,8 @@ const BASIS_POINTS: f64 = 1e4;
 pub struct Aim {
     /// The error of its surrogate alone, in basis points.
     pub own: f64,
-    /// The error of the step after, in basis points.
-    pub later: f64,
+    /// The errors of the step after.
+    pub after: ExpectedError,
     /// Design points to begin with.
     pub first: usize,
 }
@@ -52,12 +54,12 @@ impl Aim {
     ) -> Option<Self> {
         let accuracy = design.accuracy?;
         let next = after.and_then(|after| after.expected_error).unwrap_or_default();
-        let steps = (erring + after.map_or(0, |_| 1)).max(step + 1) as f64;
-        let left = (accuracy * accuracy - next.total * next.total).max(0.0) / erring.max(1) as f64;
-        let own = left.sqrt().max(LEAST_SHARE * accuracy / steps.sqrt());
+        let steps = (erring + after.map_or(0, |_| 1)).max(step + 1);
+        let even = even_share(accuracy, ExpectedError::default(), steps);
+        let own = even_share(accuracy, next, erring.max(1)).max(LEAST_SHARE * even);
         let points = after.filter(|after| after.expected_error.is_some()).map_or(0, |after| after.design_count);
         let first = (points as f64 * (MARGIN * next.own / own).min(1.0)).ceil() as usize;
-        Some(Aim { own, later: next.total, first: first.max(LEAST) })
+        Some(Aim { own, after: next, first: first.max(LEAST) })
     }
 
     /// Returns true if an error is no more than the aim.
@@ -73,8 +75,20 @@ impl Aim {
 
     /// Returns the error with those of the steps after.
     pub fn expected_error(&self, own: f64) -> ExpectedError {
-        ExpectedError { own, total: own.hypot(self.later) }
+        self.after.before(own)
     }
+}
+
+/// Returns the error of each of `steps` surrogates, all alike, for which they err by `accuracy` with those after them.
+/// Found by bisection; 0 if those after them err by more already.
+fn even_share(accuracy: f64, after: ExpectedError, steps: usize) -> f64 {
+    let total = |own: f64| (0..steps).fold(after, |after, _| after.before(own)).total;
+    let (mut low, mut high) = (0.0, accuracy);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if total(middle) > accuracy { high = middle } else { low = middle }
+    }
+    low
 }
 
 /// The fresh states to solve, with their weights.
@@ -177,24 +191,26 @@ mod tests {
     fn what_later_steps_did_not_use_is_left_to_the_earlier() {
         let design = DesignSpecification { accuracy: Some(0.5), ..DesignSpecification::default() };
         let last = Aim::of(&design, 9, 9, None).unwrap();
-        assert!((last.own - 0.5 / 3.0).abs() < 1e-12 && last.first == LEAST, "{last:?}");
+        let all = (0..9).fold(ExpectedError::default(), |after, _| after.before(last.own));
+        assert!((all.total - 0.5).abs() < 1e-9 && last.first == LEAST, "{last:?}");
         let mut diagnostics = StepDiagnostics {
             step: 9,
             design_count: 400,
             all_bank_share: 0.0,
             uncertified_share: 0.0,
             duality_gap: 0.0,
-            expected_error: Some(last.expected_error(0.1)),
+            expected_error: Some(last.expected_error(0.05)),
             value: None,
             policy: None,
         };
         let next = Aim::of(&design, 8, 8, Some(&diagnostics)).unwrap();
-        assert!((next.own - (0.24_f64 / 8.0).sqrt()).abs() < 1e-12, "{next:?}");
-        assert_eq!(next.first, (400.0 * MARGIN * 0.1 / next.own).ceil() as usize);
+        let all = (0..8).fold(ExpectedError { own: 0.05, total: 0.05 }, |after, _| after.before(next.own));
+        assert!((all.total - 0.5).abs() < 1e-9 && next.own > last.own, "{next:?}");
+        assert_eq!(next.first, (400.0 * MARGIN * 0.05 / next.own).ceil() as usize);
         // A step that missed its aim leaves half of an even share to each.
         diagnostics.expected_error = Some(ExpectedError { own: 2.0, total: 2.0 });
         let least = Aim::of(&design, 8, 8, Some(&diagnostics)).unwrap();
-        assert!((least.own - 0.25 / 3.0).abs() < 1e-12 && least.first == 400, "{least:?}");
+        assert!((least.own - 0.5 * last.own).abs() < 1e-12 && least.first == 400, "{least:?}");
         assert_eq!(Aim::of(&DesignSpecification::default(), 8, 8, None), None);
     }
 }
