@@ -446,9 +446,12 @@ async fn an_evaluation_over_http_equals_one_in_process_and_its_sessions() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_evaluation_is_cancelled_within_a_second_in_every_stage() {
     let app = App::start().await;
-    let many = json!({ "paths": 50_000, "problem": { "radius": { "paths": 20_000 } } });
-    for phase in ["solving", "simulating"] {
-        let (_, job) = app.post("/evaluate", &small(many.clone())).await;
+    let long = [
+        ("solving", json!({ "problem": { "radius": { "paths": 20_000 } } })),
+        ("simulating", json!({ "paths": 50_000 })),
+    ];
+    for (phase, larger) in long {
+        let (_, job) = app.post("/evaluate", &small(larger)).await;
         let job = job["job"].as_str().unwrap().to_owned();
         let running = app.until(&job, |job| job["progress"]["phase"] == phase).await;
         assert_eq!(running["progress"]["steps_total"], 25);
