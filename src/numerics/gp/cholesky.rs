@@ -36,15 +36,6 @@ pub struct Cholesky {
     lower: DMatrix<f64>,
 }
 
-/// Adds `sum v v'` over the vectors v, one after the other in `vectors`, to the lower triangle of a matrix of `size`
-/// rows, column by column. Cost `size` / 2 for each entry of the vectors.
-pub fn add_squares(matrix: &mut [f64], size: usize, vectors: &[f64]) {
-    let vectors = MatRef::from_column_major_slice(vectors, size, vectors.len() / size);
-    let matrix = MatMut::from_column_major_slice_mut(matrix, size, size);
-    let (lower, all) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    matmul(matrix, lower, Accum::Add, vectors, all, vectors.transpose(), all, 1.0, Par::Seq);
-}
-
 impl Cholesky {
     /// Factors a symmetric matrix in its own memory, and reads only the lower triangle. `None` unless it is positive
     /// definite to working precision.
@@ -157,6 +148,15 @@ impl Cholesky {
     }
 }
 
+/// Adds `sum v v'` over the vectors v, one after the other in `vectors`, to the lower triangle of a matrix of `size`
+/// rows, column by column. Cost `size` / 2 for each entry of the vectors.
+pub fn add_squares(matrix: &mut [f64], size: usize, vectors: &[f64]) {
+    let vectors = MatRef::from_column_major_slice(vectors, size, vectors.len() / size);
+    let matrix = MatMut::from_column_major_slice_mut(matrix, size, size);
+    let (lower, all) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    matmul(matrix, lower, Accum::Add, vectors, all, vectors.transpose(), all, 1.0, Par::Seq);
+}
+
 /// Overwrites the lower triangle of a column-major matrix with its factor; `None` if a pivot is not positive.
 fn factor_blocked(values: &mut [f64], n: usize) -> Option<()> {
     let mut memory = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
@@ -220,6 +220,25 @@ mod tests {
             let (a, b) = (i.max(j), i.min(j));
             ((a * 7 + b * 13) % 10) as f64 / 10.0 + if i == j { n as f64 } else { 0.0 }
         })
+    }
+
+    #[test]
+    fn squares_are_added_to_the_lower_triangle_alone() {
+        for (size, count) in [(1, 1), (3, 5), (7, 0), (31, 128)] {
+            let vectors: Vec<f64> =
+                (0..size * count).map(|entry| ((entry * 37 + 11) % 101) as f64 / 50.0 - 1.0).collect();
+            let before: Vec<f64> = (0..size * size).map(|entry| entry as f64).collect();
+            let mut matrix = before.clone();
+            add_squares(&mut matrix, size, &vectors);
+            for (column, row) in (0..size).flat_map(|column| (0..size).map(move |row| (column, row))) {
+                let products = vectors.chunks_exact(size).map(|v| v[row] * v[column]);
+                let added = if row < column { 0.0 } else { products.sum::<f64>() };
+                let expected = before[column * size + row] + added;
+                let found = matrix[column * size + row];
+                // Up to 128 products of at most 1, added in another order.
+                assert!((found - expected).abs() < 1e-12, "{size} {count} {row} {column}: {found} for {expected}");
+            }
+        }
     }
 
     #[test]
