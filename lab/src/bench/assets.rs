@@ -32,6 +32,10 @@ pub struct AssetsBench {
     /// Windows, each a month after the one before, the last at the end of the file
     #[arg(long, default_value_t = 60)]
     windows: usize,
+    /// Radius in units of the assets' mean deviation over the root of the months; the default is about half of that for all
+    /// funds at once
+    #[arg(long, default_value_t = 1.3)]
+    radius: f64,
     /// Print a line of JSON for each row, with the last window's answer
     #[arg(long)]
     json: bool,
@@ -50,9 +54,6 @@ pub struct AssetsBench {
 pub const RISK_AVERSION: f64 = 3.0;
 /// Interest rate per month, about the average of bills.
 pub const RATE: f64 = 0.003;
-/// Radius as a multiple of the assets' mean deviation over the square root of the months: about half of that for all
-/// funds at once.
-const RADIUS: f64 = 1.3;
 
 /// The measurements over the windows.
 #[derive(Debug, Serialize)]
@@ -139,7 +140,7 @@ fn measure(
     let mut last: Option<(AssetsSolution, f64)> = None;
     for end in rows.len() + 1 - bench.windows..=rows.len() {
         let window = &rows[end - months..end];
-        let (step, radius) = ordinary_step(window, sup, Support::None {}, RADIUS);
+        let (step, radius) = ordinary_step(window, sup, Support::None {}, bench.radius);
         let started = Instant::now();
         let found = step.solve(None);
         cold.push(started.elapsed().as_secs_f64());
