@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use ballast::report::{end_where_nobody_reads, with_causes};
 use ballast::service::process::config::Config;
 use clap::{Parser, Subcommand};
-use command::{advise, audit, backtest, backup, check, demo, frontier, healthcheck, keys, serve};
+use command::{advise, audit, backtest, backup, check, demo, frontier, healthcheck, keys, serve, solve};
 use tokio::runtime::Builder;
 
 /// Nonparametric adaptive robust control of an investor, as a service.
@@ -37,6 +37,8 @@ enum Command {
     Backtest(backtest::BacktestArgs),
     /// Report what more or less caution would cost on records like the one in a file.
     Frontier(frontier::FrontierArgs),
+    /// Solve a problem declared in formulas: say what to do first, what it is worth, and under which worst law.
+    Solve(solve::SolveArgs),
     /// Manage the keys that allow callers to use a service.
     #[command(subcommand)]
     Keys(keys::KeysCommand),
@@ -86,6 +88,7 @@ async fn outcome() -> ExitCode {
         Command::Advise(arguments) => tokio::task::block_in_place(|| advise::run(&arguments)),
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Frontier(arguments) => tokio::task::block_in_place(|| frontier::run(&arguments)),
+        Command::Solve(arguments) => tokio::task::block_in_place(|| solve::run(&arguments)),
         Command::Keys(arguments) => keys::run(arguments).await,
         Command::Audit(arguments) => audit::run(arguments).await,
         Command::Check(arguments) => check::run(arguments).await,

@@ -15,6 +15,7 @@ mod moments;
 mod record;
 mod returns;
 pub mod serve;
+pub mod solve;
 mod store_location;
 mod tls_client;
 mod traces;

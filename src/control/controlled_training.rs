@@ -15,7 +15,7 @@ use crate::control::request::completion::DEFAULT_COUNT;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, Specification, SurrogateTarget, UtilitySpecification};
-use crate::control::request::support::Support;
+use crate::control::request::support::{Interval, Support};
 use crate::control::surrogate::counts::Counts;
 use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::{FeatureSelection, Features};
@@ -27,6 +27,9 @@ use crate::control::uncertainty::laws::Laws;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::machine::streams::stream;
+
+/// Share of the noises of the design that are drawn evenly from the support.
+const FAR: f64 = 0.25;
 
 /// A controlled problem with the value of every step but the first, which is solved on request.
 pub struct ControlledPolicy<'a, P> {
@@ -53,6 +56,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         watch: &Watch,
     ) -> Result<Self, TrainError> {
         let mut specification = specification.clone();
+        let sampling_is_given = specification.design.sampling_law.is_some();
         specification.problem.utility = UtilitySpecification::Log {};
         specification.problem.trading_cost = 0.0;
         specification.problem.caution = Some(CautionLevel::Paper);
@@ -75,6 +79,11 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         let selection = FeatureSelection::new(&specification, &laws);
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
         let law = continuous_law(sampling_law, &specification.problem);
+        // The adversary goes to the ends of the support. A sampling law that is given says itself how far states go.
+        let far = match specification.problem.support_rule() {
+            Support::Between { min, max } if !sampling_is_given && !problem.has_floor() => Some(Interval { min, max }),
+            _ => None,
+        };
         let history = specification.problem.learning.law(&specification.problem.history);
         let described = problem.describe(0, start).len();
         let mut names: Vec<String> = (0..described).map(|index| format!("state_{index}")).collect();
@@ -85,7 +94,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         for step in (1..specification.problem.horizon).rev() {
             let bellman = ControlledStep { problem, laws: &laws, selection: &selection, step, next: values.last() };
             let states =
-                SimulatedStates { bellman, specification: &specification, start, history: &history, law: &law };
+                SimulatedStates { bellman, specification: &specification, start, history: &history, law: &law, far };
             if names.is_empty() {
                 values.push(ControlledValue::Constant(states.solve(0, states.features_at(0))?.floor_gain));
                 continue;
@@ -103,6 +112,11 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         Ok(ControlledPolicy { problem, laws, selection, values })
     }
 
+    /// Returns the radius of the ball around a law, in the unit of the noise.
+    pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
+        self.laws.radius(law)
+    }
+
     /// Solves the robust step at a state with the law of the noise known by then, against the value of the step after.
     /// `step` must be below the horizon.
     pub fn solve(&self, step: usize, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
@@ -118,6 +132,8 @@ struct SimulatedStates<'a, P: Controlled> {
     start: &'a P::State,
     history: &'a EmpiricalDistribution,
     law: &'a ContinuousLaw,
+    /// The support, if some noises are drawn from all of it.
+    far: Option<Interval>,
 }
 
 impl<P: Controlled> SimulatedStates<'_, P> {
@@ -129,7 +145,12 @@ impl<P: Controlled> SimulatedStates<'_, P> {
             let mut generator = stream(specification.seed, "controlled", earlier, index);
             let actions = problem.actions(earlier, &state);
             let action = actions.lowest + (actions.highest - actions.lowest) * generator.random::<f64>();
-            let log_return = admissible(self.law.draw(&mut generator), &specification.problem);
+            let log_return = match self.far {
+                Some(Interval { min, max }) if generator.random::<f64>() < FAR => {
+                    min + (max - min) * generator.random::<f64>()
+                }
+                _ => admissible(self.law.draw(&mut generator), &specification.problem),
+            };
             state = problem.next(earlier, &state, action, log_return);
             seen.push(log_return);
         }

@@ -57,6 +57,7 @@ pub mod bellman;
 pub mod cache;
 pub mod caution;
 pub mod controlled_training;
+pub mod declared_advice;
 pub mod error;
 pub mod estimate;
 pub mod evaluation;

@@ -13,5 +13,6 @@ mod monitoring;
 mod openapi;
 mod paper_map;
 mod policy_format;
+mod solve_file;
 mod threat_model;
 mod upgrade;

@@ -13,6 +13,7 @@ mod contributions;
 mod control;
 mod controlled;
 mod costs;
+mod declared;
 mod design;
 mod evaluate;
 mod exchangeability;

@@ -7,6 +7,11 @@ pub trait Field {
     /// Returns the returns at which the field is exact, ascending.
     fn returns(&self) -> &[f64];
 
+    /// Returns true if the worst value of an action is concave in it, but for dents of the surrogates.
+    fn is_concave(&self) -> bool {
+        true
+    }
+
     /// Prepares evaluation at fixed returns.
     fn at<'f>(&'f self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f>;
 

@@ -205,12 +205,13 @@ fn best_response<F: Field, T>(
     loop {
         interruption::checkpoint();
         let field = field_at(set.exact_returns(reach));
+        let is_concave = field.is_concave();
         let mut pricing: Box<dyn Pricing + '_> = match set {
             UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, &field)),
             UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, &field)),
             UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, &field)),
         };
-        let band = best_band(pricing.as_mut(), actions, dynamics, holding);
+        let band = best_band(pricing.as_mut(), (actions, is_concave), dynamics, holding);
         let trade = dynamics.trade_into(band, holding);
         let mut worst = pricing.worst(trade);
         // Other holdings trade to the ends of the band, whose worth is also reported.
@@ -225,11 +226,16 @@ fn best_response<F: Field, T>(
     }
 }
 
-/// Brackets the best action of each side, then polishes them as the prices are refined. The worth of a side is concave
-/// in the action.
-fn best_band(pricing: &mut dyn Pricing, actions: ActionInterval, dynamics: Dynamics, holding: f64) -> Band {
+/// Brackets the best action of each side, then polishes them as the prices are refined. The worth of an investor's side
+/// is concave in the action.
+fn best_band(
+    pricing: &mut dyn Pricing,
+    (actions, is_concave): (ActionInterval, bool),
+    dynamics: Dynamics,
+    holding: f64,
+) -> Band {
     let bracket = |&side: &Side| {
-        let bracket = actions.bracket(|action| pricing.rough_value(dynamics.trade(side, holding, action)));
+        let bracket = actions.bracket(is_concave, |action| pricing.rough_value(dynamics.trade(side, holding, action)));
         (side, bracket)
     };
     let mut brackets: Vec<(Side, (f64, f64))> = dynamics.sides().iter().map(bracket).collect();

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 const COARSE_ACTIONS: usize = 8;
 /// Number of falls in a row after which no further action is tried.
 const FALLS: usize = 2;
+/// Equal parts that are all tried if values are not concave.
+const FINE_ACTIONS: usize = 64;
 
 /// A closed interval of shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,17 +58,19 @@ impl From<Band> for [f64; 2] {
 }
 
 impl ActionInterval {
-    /// Returns the two actions on either side of the best of the actions that cut the interval into equal parts. Values
-    /// rise to the best and fall from there, except for dents: one fall does not end the search, two in a row do.
-    pub fn bracket(self, value: impl Fn(f64) -> f64) -> (f64, f64) {
+    /// Returns the two actions on either side of the best of the actions that cut the interval into equal parts. Concave
+    /// values rise to the best and fall from there, except for dents: one fall does not end the search, two in a row do.
+    /// If they are not concave, all of more parts are tried.
+    pub fn bracket(self, is_concave: bool, value: impl Fn(f64) -> f64) -> (f64, f64) {
         let ActionInterval { lowest, highest } = self;
-        let part = (highest - lowest) / COARSE_ACTIONS as f64;
+        let (parts, most_falls) = if is_concave { (COARSE_ACTIONS, FALLS) } else { (FINE_ACTIONS, usize::MAX) };
+        let part = (highest - lowest) / parts as f64;
         let (mut best, mut falls) = ((lowest, value(lowest)), 0);
-        for index in 1..=COARSE_ACTIONS {
+        for index in 1..=parts {
             let action = lowest + index as f64 * part;
             let tried = value(action);
             (best, falls) = if tried > best.1 { ((action, tried), 0) } else { (best, falls + 1) };
-            if falls == FALLS {
+            if falls == most_falls {
                 break;
             }
         }
@@ -85,7 +89,7 @@ mod tests {
         for best in (0..=40).map(|index| 0.2 + 0.02 * f64::from(index)) {
             let dented = |action: f64| if (action - 0.5).abs() < 0.02 { -9.0 } else { -(action - best).powi(2) };
             for value in [&dented as &dyn Fn(f64) -> f64, &|action: f64| -(action - best).powi(2)] {
-                let (low, high) = actions.bracket(value);
+                let (low, high) = actions.bracket(true, value);
                 assert!(low <= best + 1e-12 && best - 1e-12 <= high && high - low < 0.21, "{best}: [{low}, {high}]");
             }
         }

@@ -34,6 +34,12 @@ pub trait Controlled: Sync {
         true
     }
 
+    /// Returns true if the certainty equivalent is concave in the action. Otherwise the best of many even actions is found
+    /// before a search around it.
+    fn is_concave(&self) -> bool {
+        true
+    }
+
     /// Returns the utility of a worth relative to another: 0 there, with slope 1 in the gain. Concave and increasing.
     fn utility(&self, worth: f64, from: f64) -> f64;
 

@@ -2,6 +2,7 @@
 
 pub mod actions;
 pub mod controlled;
+pub mod declared;
 pub mod dynamics;
 pub mod holdings;
 pub mod investor;

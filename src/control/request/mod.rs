@@ -12,6 +12,7 @@ pub mod centre_rules;
 pub mod completion;
 pub mod contributions;
 pub mod dates;
+pub mod declared;
 pub mod evaluation;
 pub mod framework;
 pub mod frequency;

@@ -1,0 +1,72 @@
+//! `ballast solve`: the first advice of a problem declared in formulas. No server runs.
+
+use std::error::Error;
+use std::fs;
+use std::path::PathBuf;
+
+use ballast::control::declared_advice::{DeclaredAdvice, NoiseMove};
+use ballast::control::progress::Watch;
+use ballast::control::request::declared::DeclaredSpecification;
+use clap::Args;
+
+/// Moves of the worst law that are shown.
+const SHOWN: usize = 8;
+
+#[derive(Debug, Clone, Args)]
+pub struct SolveArgs {
+    /// JSON file of the declaration; docs/declared.md describes it
+    problem: PathBuf,
+    /// Print the advice as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &SolveArgs) -> Result<(), Box<dyn Error>> {
+    let file = arguments.problem.display();
+    let text = fs::read_to_string(&arguments.problem).map_err(|error| format!("{file}: {error}"))?;
+    let declared: DeclaredSpecification = serde_json::from_str(&text).map_err(|error| format!("{file}: {error}"))?;
+    let advice = DeclaredAdvice::solve(&declared, &Watch::unwatched())?;
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&advice)?);
+    } else {
+        print!("{}", describe(&declared, &advice));
+    }
+    Ok(())
+}
+
+fn describe(declared: &DeclaredSpecification, advice: &DeclaredAdvice) -> String {
+    let problem = &declared.problem;
+    let noise = &problem.noise.name;
+    let mut lines: Vec<String> =
+        advice.action.iter().map(|(name, value)| format!("{name}: {}", number(*value))).collect();
+    lines.push(format!("worth over {} periods: {}", problem.horizon, number(advice.value)));
+    lines.push(match advice.radius > 0.0 {
+        true => format!(
+            "against every law of {noise} within {} of the {} seen",
+            number(advice.radius),
+            problem.history.len()
+        ),
+        false => format!("under the law of the {} seen", problem.history.len()),
+    });
+    let mut moved: Vec<&NoiseMove> = advice.worst_law.iter().filter(|moved| moved.from != moved.to).collect();
+    moved.sort_by(|left, right| right.share.total_cmp(&left.share));
+    if !moved.is_empty() {
+        lines.push(format!("the worst law of the first {noise} moves"));
+        let shown = |moved: &&&NoiseMove| {
+            format!("  {:>5.1} %  from {} to {}", 100.0 * moved.share, number(moved.from), number(moved.to))
+        };
+        lines.extend(moved.iter().take(SHOWN).map(|moved| shown(&moved)));
+        if moved.len() > SHOWN {
+            lines.push(format!("  and {} smaller parts", moved.len() - SHOWN));
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Shows six digits, and no zeros at their end.
+fn number(value: f64) -> String {
+    let whole = value.abs().max(1.0).log10().floor() as usize;
+    let scale = 10_f64.powi(5_usize.saturating_sub(whole) as i32);
+    // No zero has a sign.
+    ((value * scale).round() / scale + 0.0).to_string()
+}

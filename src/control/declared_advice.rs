@@ -1,0 +1,86 @@
+//! The first advice of a declared problem: it is read, trained and solved at its start.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::bellman::solution::Adversary;
+use super::controlled_training::ControlledPolicy;
+use super::error::TrainError;
+use super::problem::declared::Declared;
+use super::progress::Watch;
+use super::request::declared::DeclaredSpecification;
+
+/// Least share of the mass that is reported as moved.
+const LEAST_MOVED: f64 = 1e-9;
+
+/// The first action, its worth, and the law that is worst for it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeclaredAdvice {
+    /// The best action, by its name.
+    pub action: BTreeMap<String, f64>,
+    /// V at the start: what all periods earn against the worst law. With a utility its certainty equivalent.
+    pub value: f64,
+    /// Radius of the ball, in the unit of the noise.
+    pub radius: f64,
+    /// The worst law of the first period: where the mass of the noises seen goes, ascending. Shares add up to 1.
+    pub worst_law: Vec<NoiseMove>,
+    /// Value less its lower bound by duality, both of the first step.
+    pub duality_gap: f64,
+}
+
+/// Mass of the law that is moved from one noise to another, or kept.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NoiseMove {
+    /// The noise seen.
+    pub from: f64,
+    /// The noise in its place.
+    pub to: f64,
+    /// Share of the whole mass.
+    pub share: f64,
+}
+
+impl DeclaredAdvice {
+    /// Solves a declared problem on the current rayon pool. Cost: that of a training, in which every design point
+    /// prices some hundred actions. Checked by: `tests/solver/declared.rs`.
+    ///
+    /// # Errors
+    /// A field that breaks a rule, a formula among them; a state that leaves its range; those of
+    /// [`ControlledPolicy::train`].
+    pub fn solve(declared: &DeclaredSpecification, watch: &Watch) -> Result<DeclaredAdvice, TrainError> {
+        let problem = Declared::new(&declared.problem)?;
+        let specification = problem.specification(declared)?;
+        let start = problem.start();
+        let policy = ControlledPolicy::train(&problem, &start, &specification, watch);
+        // What left its range may have spoilt what was fitted.
+        let reached = || problem.fault().map_or(Ok(()), |fault| Err(TrainError::from(fault.clone())));
+        reached()?;
+        let policy = policy?;
+        let law = specification.problem.learning.law(&specification.problem.history);
+        let found = policy.solve(0, &start, &law);
+        reached()?;
+        if !found.certainty_equivalent.is_finite() || !found.action.is_finite() {
+            return Err(TrainError::NotFinite { step: 0, point: 0, gain: found.gain, action: found.action });
+        }
+        let [low, high] = [-0.5, 0.5].map(|end| problem.noise(end));
+        let [action, _] = problem.named();
+        Ok(DeclaredAdvice {
+            action: BTreeMap::from([(action.to_owned(), found.action)]),
+            value: found.certainty_equivalent,
+            radius: policy.radius(&law) * (high - low),
+            worst_law: moves(&found.adversary, &problem),
+            duality_gap: found.duality_gap,
+        })
+    }
+}
+
+fn moves(adversary: &Adversary, problem: &Declared) -> Vec<NoiseMove> {
+    let Adversary::Transport { support, moves } = adversary else { return Vec::new() };
+    let moved = moves.iter().filter(|moved| moved.mass > LEAST_MOVED);
+    let named = moved.map(|moved| NoiseMove {
+        from: problem.noise(support[moved.from]),
+        to: problem.noise(support[moved.to]),
+        share: moved.mass,
+    });
+    named.collect()
+}

@@ -1,0 +1,230 @@
+//! A problem declared in formulas, as a controlled problem.
+//!
+//! The solver's noise runs from -1/2 to 1/2 over the support, so that its tolerances fit any unit. What was earned so far is carried beside the states. The worth of a path is
+//!
+//!   reward_0 + discount reward_1 + ... + discount^T end,
+//!
+//! and V at a state is the worth still to come. The state is described without what is carried, on which nothing
+//! depends.
+
+mod formula;
+mod reading;
+mod sampling;
+
+use std::cell::RefCell;
+use std::sync::OnceLock;
+
+use self::formula::Formula;
+use super::actions::ActionInterval;
+use super::controlled::Controlled;
+use super::utility::RelativeUtility;
+use crate::control::error::FieldError;
+use crate::control::request::specification::UtilitySpecification;
+
+/// Rounding of a state at the edge of its range, as a share of the range.
+const EDGE: f64 = 1e-9;
+/// Least amount of which a power or a logarithm is computed.
+const LEAST_AMOUNT: f64 = 1e-300;
+
+/// A declared problem whose formulas are parsed and whose rules hold.
+#[derive(Debug)]
+pub struct Declared {
+    /// States, the action, the noise, `t`, `T` and the parameters, in the order of the values of a formula.
+    names: Vec<String>,
+    ranges: Vec<[f64; 2]>,
+    start: Vec<f64>,
+    parameters: Vec<f64>,
+    bounds: [Formula; 2],
+    next: Vec<Formula>,
+    reward: Option<Formula>,
+    /// The worth at the end, or the amount whose utility counts.
+    end: Formula,
+    utility: Option<UtilitySpecification>,
+    discount: f64,
+    horizon: usize,
+    noise: [f64; 2],
+    /// Size of the amounts, which makes payoffs numbers around 1.
+    unit: f64,
+    /// Mean earnings of random paths from each step on.
+    to_come: Vec<f64>,
+    /// The first state that left its range.
+    left: OnceLock<FieldError>,
+}
+
+/// The states, and what was earned on the way to them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EarnedState {
+    /// In the order of their names.
+    pub values: Vec<f64>,
+    /// Rewards so far, discounted.
+    pub earned: f64,
+}
+
+thread_local! {
+    /// Memory for the values of the names, and for a formula's own.
+    static MEMORY: RefCell<(Vec<f64>, Vec<f64>)> = const { RefCell::new((Vec::new(), Vec::new())) };
+}
+
+impl Declared {
+    /// Returns the state at the start.
+    pub fn start(&self) -> EarnedState {
+        EarnedState { values: self.start.clone(), earned: 0.0 }
+    }
+
+    /// Returns the name of the action and that of the noise.
+    pub fn named(&self) -> [&str; 2] {
+        [0, 1].map(|place| self.names[self.ranges.len() + place].as_str())
+    }
+
+    /// Returns the noise in its own unit from that of the solver.
+    pub fn noise(&self, scaled: f64) -> f64 {
+        let [low, high] = self.noise;
+        low + (scaled + 0.5) * (high - low)
+    }
+
+    /// Returns the noise of the solver from one in its own unit.
+    fn scaled(&self, noise: f64) -> f64 {
+        let [low, high] = self.noise;
+        (noise - low) / (high - low) - 0.5
+    }
+
+    /// Returns why the problem cannot be solved as declared: a state left its range.
+    pub fn fault(&self) -> Option<&FieldError> {
+        self.left.get()
+    }
+
+    /// Evaluates formulas at a state, an action and a noise.
+    fn at<T>(
+        &self,
+        step: usize,
+        state: &[f64],
+        [action, noise]: [f64; 2],
+        evaluate: impl FnOnce(&dyn Fn(&Formula) -> f64) -> T,
+    ) -> T {
+        MEMORY.with_borrow_mut(|(values, stack)| {
+            values.clear();
+            values.extend(state);
+            values.extend([action, noise, step as f64, self.horizon as f64]);
+            values.extend(&self.parameters);
+            let stack = RefCell::new(stack);
+            evaluate(&|formula| formula.value(values, &mut stack.borrow_mut()))
+        })
+    }
+
+    fn bounds_at(&self, step: usize, state: &EarnedState) -> [f64; 2] {
+        self.at(step, &state.values, [0.0; 2], |value| [0, 1].map(|end| value(&self.bounds[end])))
+    }
+
+    /// Returns the state after a period, with the action and the noise in their own units.
+    fn after(&self, step: usize, state: &EarnedState, action: f64, noise: f64) -> EarnedState {
+        let (mut values, reward) = self.at(step, &state.values, [action, noise], |value| {
+            let next: Vec<f64> = self.next.iter().map(value).collect();
+            (next, self.reward.as_ref().map_or(0.0, value))
+        });
+        for (place, value) in values.iter_mut().enumerate() {
+            let [low, high] = self.ranges[place];
+            let slack = EDGE * (high - low);
+            if !(low - slack..=high + slack).contains(value) {
+                self.left.get_or_init(|| self.leaving(place, *value, (step, state), [action, noise]));
+            }
+            *value = if value.is_nan() { low } else { value.clamp(low, high) };
+        }
+        EarnedState { values, earned: state.earned + self.discount.powi(step as i32) * reward }
+    }
+
+    fn leaving(&self, place: usize, value: f64, (step, state): (usize, &EarnedState), moved: [f64; 2]) -> FieldError {
+        let [low, high] = self.ranges[place];
+        let rule = format!("must stay from {low} to {high}; it leaves at {}", self.point(step, &state.values, &moved));
+        FieldError::new(format!("problem.next.{}", self.names[place]), value, rule)
+    }
+
+    /// Names a point in words; `moved` are the action and the noise.
+    fn point(&self, step: usize, state: &[f64], moved: &[f64]) -> String {
+        let values = state.iter().chain(moved).map(|value| (1e6 * value).round() / 1e6);
+        let named: Vec<String> =
+            self.names.iter().zip(values).map(|(name, value)| format!("{name} = {value}")).collect();
+        format!("{}, t = {step}", named.join(", "))
+    }
+
+    /// Returns the worth of ending in a state.
+    fn ended(&self, step: usize, state: &EarnedState) -> f64 {
+        let end = self.at(step, &state.values, [0.0; 2], |value| value(&self.end));
+        match self.utility {
+            None => state.earned + self.discount.powi(self.horizon as i32) * end,
+            Some(_) => end,
+        }
+    }
+
+    /// Returns the utility relative to an amount if it counts ratios.
+    fn of_ratio(&self, from: f64) -> Option<RelativeUtility> {
+        let utility = self.utility?;
+        let is_of_ratio = !matches!(utility, UtilitySpecification::Exponential { .. });
+        is_of_ratio.then(|| RelativeUtility::new(utility, from))
+    }
+
+    /// Returns the risk aversion of an exponential utility, in units of the amounts.
+    fn risk_aversion(&self) -> Option<f64> {
+        match self.utility {
+            Some(UtilitySpecification::Exponential { risk_aversion, .. }) => Some(risk_aversion * self.unit),
+            _ => None,
+        }
+    }
+}
+
+impl Controlled for Declared {
+    type State = EarnedState;
+
+    fn actions(&self, step: usize, state: &EarnedState) -> ActionInterval {
+        let [lowest, highest] = self.bounds_at(step, state);
+        ActionInterval { lowest, highest: highest.max(lowest) }
+    }
+
+    fn next(&self, step: usize, state: &EarnedState, action: f64, scaled: f64) -> EarnedState {
+        self.after(step, state, action, self.noise(scaled))
+    }
+
+    fn describe(&self, _: usize, state: &EarnedState) -> Vec<f64> {
+        state.values.clone()
+    }
+
+    /// Returns the worth itself at the horizon. Before it, what was earned and what random paths earn from there; with a
+    /// utility, the amount as if this were the end.
+    fn baseline(&self, step: usize, state: &EarnedState) -> f64 {
+        match self.to_come.get(step) {
+            Some(to_come) if self.utility.is_none() => state.earned + to_come,
+            _ => self.ended(step, state),
+        }
+    }
+
+    fn has_floor(&self) -> bool {
+        false
+    }
+
+    fn is_concave(&self) -> bool {
+        false
+    }
+
+    fn utility(&self, worth: f64, from: f64) -> f64 {
+        if let Some(utility) = self.of_ratio(from) {
+            return utility.value((worth.max(LEAST_AMOUNT) / from).ln());
+        }
+        let gain = (worth - from) / self.unit;
+        self.risk_aversion().map_or(gain, |k| -(-k * gain).exp_m1() / k)
+    }
+
+    fn certainty_equivalent(&self, utility: f64, from: f64) -> f64 {
+        if let Some(relative) = self.of_ratio(from) {
+            return from * relative.inverse(utility).exp();
+        }
+        let gain = self.risk_aversion().map_or(utility, |k| -(-k * utility).ln_1p() / k);
+        from + self.unit * gain
+    }
+
+    fn gain(&self, worth: f64, baseline: f64) -> f64 {
+        if self.of_ratio(baseline).is_some() { (worth / baseline).ln() } else { (worth - baseline) / self.unit }
+    }
+
+    fn worth(&self, gain: f64, baseline: f64) -> f64 {
+        if self.of_ratio(baseline).is_some() { baseline * gain.exp() } else { baseline + self.unit * gain }
+    }
+}

@@ -1,0 +1,234 @@
+//! A declaration is read once: every name, number and formula is checked before anything is computed.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+use super::Declared;
+use super::formula::{FUNCTIONS, Formula};
+use crate::control::error::FieldError;
+use crate::control::request::centre::CentreSpecification;
+use crate::control::request::declared::{DeclaredProblem, DeclaredSpecification, DeclaredUtility};
+use crate::control::request::framework::Framework;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::specification::{
+    DesignSpecification, ProblemSpecification, Specification, UtilitySpecification,
+};
+use crate::control::request::support::Support;
+
+/// Most states of a problem.
+const MOST_STATES: usize = 6;
+/// Most parameters.
+const MOST_PARAMETERS: usize = 100;
+/// Largest number that may be declared.
+const LARGEST: f64 = 1e12;
+/// Most letters of a name.
+const MOST_LETTERS: usize = 40;
+
+impl Declared {
+    /// Reads a declaration.
+    ///
+    /// # Errors
+    /// The first field that breaks a rule. For a formula the rule begins with its column.
+    pub fn new(problem: &DeclaredProblem) -> Result<Declared, FieldError> {
+        let names = names(problem)?;
+        numbers(problem)?;
+        let (states, moved) = (problem.states.len(), problem.states.len() + 2);
+        // A formula may not use what is not known where it is evaluated.
+        let at = |last: usize| -> Vec<&str> {
+            names
+                .iter()
+                .enumerate()
+                .map(|(place, name)| if (states..last).contains(&place) { "" } else { name })
+                .collect()
+        };
+        let (of_state, of_all) = (at(moved), at(states));
+        let parse = |field: String, text: &str, names: &[&str]| {
+            Formula::parse(text, names).map_err(|fault| FieldError::new(field, text, fault.to_string()))
+        };
+        let action = problem.actions.iter().next();
+        let (name, bounds) = action.ok_or_else(|| FieldError::new("problem.actions", "{}", "must have one action"))?;
+        let bound = |end: &str, text: &str| parse(format!("problem.actions.{name}.{end}"), text, &of_state);
+        let next = |state: &String| {
+            let field = format!("problem.next.{state}");
+            let text =
+                problem.next.get(state).ok_or_else(|| FieldError::new(&field, "", "must be given for each state"))?;
+            parse(field, text, &of_all)
+        };
+        let (field, end) = match (&problem.utility, &problem.end) {
+            (None, Some(end)) => ("problem.end", end.as_str()),
+            (None, None) => ("problem.end", "0"),
+            (Some(utility), None) => ("problem.utility.of", utility.of()),
+            (Some(_), Some(end)) => {
+                return Err(FieldError::new(
+                    "problem.end",
+                    end,
+                    "must be absent with a utility, which has its own amount",
+                ));
+            }
+        };
+        if let (Some(_), Some(reward)) = (&problem.utility, &problem.reward) {
+            let rule = "must be absent with a utility, which is of the amount at the end alone";
+            return Err(FieldError::new("problem.reward", reward, rule));
+        }
+        let mut declared = Declared {
+            ranges: problem.states.values().map(|state| [state.low, state.high]).collect(),
+            start: problem.states.values().map(|state| state.start).collect(),
+            parameters: problem.parameters.values().copied().collect(),
+            bounds: [bound("low", &bounds.low)?, bound("high", &bounds.high)?],
+            next: problem.states.keys().map(next).collect::<Result<_, _>>()?,
+            reward: problem.reward.as_deref().map(|text| parse("problem.reward".into(), text, &of_all)).transpose()?,
+            end: parse(field.into(), end, &of_state)?,
+            utility: problem.utility.as_ref().map(DeclaredUtility::specification),
+            discount: problem.discount,
+            horizon: problem.horizon,
+            noise: [problem.noise.low, problem.noise.high],
+            unit: 1.0,
+            to_come: Vec::new(),
+            left: OnceLock::new(),
+            names: names.clone(),
+        };
+        (declared.unit, declared.to_come) = declared.sampled(problem)?;
+        Ok(declared)
+    }
+
+    /// Returns what the solver of controlled problems needs to know: the noise in its unit, and the settings.
+    ///
+    /// # Errors
+    /// A number of design points, or a rule for the radius, that this problem cannot have.
+    pub fn specification(&self, declared: &DeclaredSpecification) -> Result<Specification, FieldError> {
+        let problem = &declared.problem;
+        let [low, high] = self.noise;
+        let radius = problem.radius.map(|rule| match rule {
+            RadiusRule::RootN { kappa } => RadiusRule::RootN { kappa: kappa / (high - low) },
+            RadiusRule::Fixed { radius } => RadiusRule::Fixed { radius: radius / (high - low) },
+            rule => rule,
+        });
+        if let Some(rule @ (RadiusRule::Concentration { .. } | RadiusRule::ChiSquare { .. })) = radius {
+            let rule = rule.name();
+            return Err(FieldError::new("problem.radius.rule", rule, "must be bridge, calibrated, root_n or fixed"));
+        }
+        let mut investor =
+            ProblemSpecification::of(problem.history.iter().map(|noise| self.scaled(*noise)).collect(), 0.0);
+        investor.framework = problem.framework;
+        investor.horizon = problem.horizon;
+        investor.learning = problem.learning;
+        investor.centre = CentreSpecification::default();
+        investor.radius = radius;
+        investor.support = Some(Support::Between { min: -0.5, max: 0.5 });
+        let design = DesignSpecification { count: declared.design.count, ..DesignSpecification::default() };
+        let surrogate = declared.surrogate.clone();
+        Ok(Specification { design, surrogate, ..Specification::of(investor, declared.seed) })
+    }
+}
+
+impl DeclaredUtility {
+    fn specification(&self) -> UtilitySpecification {
+        match *self {
+            DeclaredUtility::Exponential { risk_aversion, .. } => UtilitySpecification::exponential(risk_aversion),
+            DeclaredUtility::Power { risk_aversion, .. } => UtilitySpecification::Power { risk_aversion },
+            DeclaredUtility::Log { .. } => UtilitySpecification::Log {},
+        }
+    }
+}
+
+/// Returns the names that formulas may use, in the order of their values. All are different.
+fn names(problem: &DeclaredProblem) -> Result<Vec<String>, FieldError> {
+    counted("problem.states", problem.states.len(), 1, MOST_STATES)?;
+    counted("problem.actions", problem.actions.len(), 1, 1)?;
+    counted("problem.parameters", problem.parameters.len(), 0, MOST_PARAMETERS)?;
+    if let Some(unknown) = problem.next.keys().find(|name| !problem.states.contains_key(*name)) {
+        return Err(FieldError::new(format!("problem.next.{unknown}"), unknown, "must be the name of a state"));
+    }
+    let of = |field: &'static str, names: Vec<&String>| -> Vec<(&'static str, String)> {
+        names.into_iter().map(|name| (field, name.clone())).collect()
+    };
+    let mut all = of("problem.states", problem.states.keys().collect());
+    all.extend(of("problem.actions", problem.actions.keys().collect()));
+    all.push(("problem.noise.name", problem.noise.name.clone()));
+    all.extend(["t", "T"].map(|name| ("", name.to_owned())));
+    all.extend(of("problem.parameters", problem.parameters.keys().collect()));
+    let mut known: BTreeMap<&str, &str> = BTreeMap::new();
+    // `t` and `T` come first, so the other use of the name is at fault.
+    known.extend([("t", "the period"), ("T", "the horizon")]);
+    for (field, name) in all.iter().filter(|(field, _)| !field.is_empty()) {
+        let mut letters = name.chars();
+        let is_name = letters.next().is_some_and(|first| first.is_alphabetic() || first == '_')
+            && letters.all(|letter| letter.is_alphanumeric() || letter == '_')
+            && name.chars().count() <= MOST_LETTERS;
+        if !is_name {
+            let rule = format!("must be a letter and then letters, digits or `_`, at most {MOST_LETTERS} in all");
+            return Err(FieldError::new(*field, name, rule));
+        }
+        if FUNCTIONS.contains(&name.as_str()) {
+            return Err(FieldError::new(*field, name, "must not be the name of a function"));
+        }
+        if let Some(other) = known.insert(name, field) {
+            return Err(FieldError::new(*field, name, format!("must not be a name of {other} too")));
+        }
+    }
+    Ok(all.into_iter().map(|(_, name)| name).collect())
+}
+
+fn counted(field: &str, count: usize, least: usize, most: usize) -> Result<(), FieldError> {
+    let rule = || if least == most { format!("must have {least}") } else { format!("must have {least} to {most}") };
+    if (least..=most).contains(&count) { Ok(()) } else { Err(FieldError::new(field, count, rule())) }
+}
+
+/// Checks the numbers.
+fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
+    let is_number = |field: String, value: f64| match value.abs() <= LARGEST {
+        true => Ok(()),
+        false => Err(FieldError::new(field, value, format!("must be a number from -{LARGEST:e} to {LARGEST:e}"))),
+    };
+    let range = |field: String, low: f64, high: f64| {
+        is_number(format!("{field}.low"), low)?;
+        is_number(format!("{field}.high"), high)?;
+        // A range that rounding could close.
+        let least = 1e-9 * low.abs().max(high.abs());
+        if high - low > least {
+            Ok(())
+        } else {
+            Err(FieldError::new(format!("{field}.high"), high, format!("must be above `low`, {low}")))
+        }
+    };
+    for (name, state) in &problem.states {
+        let field = format!("problem.states.{name}");
+        range(field.clone(), state.low, state.high)?;
+        if !(state.low..=state.high).contains(&state.start) {
+            let rule = format!("must be from `low`, {}, to `high`, {}", state.low, state.high);
+            return Err(FieldError::new(format!("{field}.start"), state.start, rule));
+        }
+    }
+    let noise = &problem.noise;
+    range("problem.noise".into(), noise.low, noise.high)?;
+    for (index, value) in problem.history.iter().enumerate() {
+        if !(noise.low..=noise.high).contains(value) {
+            let rule = format!("must be from `noise.low`, {}, to `noise.high`, {}", noise.low, noise.high);
+            return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
+        }
+    }
+    for (name, value) in &problem.parameters {
+        is_number(format!("problem.parameters.{name}"), *value)?;
+    }
+    if !(problem.discount > 0.0 && problem.discount <= 1.0) {
+        return Err(FieldError::new("problem.discount", problem.discount, "must be above 0 and at most 1"));
+    }
+    if problem.utility.is_some() && problem.discount != 1.0 {
+        let rule = "must be absent with a utility, which is of the amount at the end";
+        return Err(FieldError::new("problem.discount", problem.discount, rule));
+    }
+    match problem.utility {
+        Some(DeclaredUtility::Exponential { risk_aversion, .. })
+            if !(risk_aversion > 0.0 && risk_aversion <= LARGEST) =>
+        {
+            Err(FieldError::new("problem.utility.risk_aversion", risk_aversion, "must be above 0"))
+        }
+        Some(DeclaredUtility::Power { risk_aversion, .. }) if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
+            Err(FieldError::new("problem.utility.risk_aversion", risk_aversion, "must be above 1 and at most 100"))
+        }
+        _ if !matches!(problem.framework, Framework::Adaptive | Framework::Static | Framework::PlugIn) => {
+            Err(FieldError::new("problem.framework", problem.framework.name(), "must be adaptive, static or plug_in"))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,153 @@
+//! A problem declared in formulas: its states, its action, the noise whose law is learned, and what is earned.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use crate::control::request::framework::Framework;
+use crate::control::request::learning::Learning;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::specification::{SurrogateSpecification, default_seed};
+
+/// A declared problem, with the settings of its training.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeclaredSpecification {
+    /// The problem.
+    pub problem: DeclaredProblem,
+    /// States that the surrogates are trained on.
+    #[serde(default)]
+    pub design: DeclaredDesign,
+    /// Settings of the surrogates.
+    #[serde(default)]
+    pub surrogate: SurrogateSpecification,
+    /// Seed of all random draws.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+}
+
+/// The states that the surrogates of a declared problem are trained on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeclaredDesign {
+    /// Number of design points per step, 10 to 10,000. Default 1000.
+    #[serde(default)]
+    pub count: Option<usize>,
+}
+
+/// `V_t(x, F) = max_a min_{F' in C_t(F)} E_{F'}[ reward + discount V_{t+1}(next, F + Z) ]`, and `V_T = end`. With a
+/// utility the value is the certainty equivalent of the amount at the end.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeclaredProblem {
+    /// States by name, 1 to 6.
+    pub states: BTreeMap<String, DeclaredState>,
+    /// The action by its name: one.
+    pub actions: BTreeMap<String, ActionBounds>,
+    /// The noise.
+    pub noise: Noise,
+    /// Numbers by name, for the formulas.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, f64>,
+    /// Formula of each state after a period.
+    pub next: BTreeMap<String, String>,
+    /// Formula of what a period earns. Default: nothing.
+    #[serde(default)]
+    pub reward: Option<String>,
+    /// Formula of the worth of the state at the end; absent if there is a utility, which has its own.
+    #[serde(default)]
+    pub end: Option<String>,
+    /// Factor per period on what comes after it, above 0 and at most 1. Default 1.
+    #[serde(default = "no_discount")]
+    pub discount: f64,
+    /// Utility of an amount at the end. Default: the sum of the rewards and the end itself.
+    #[serde(default)]
+    pub utility: Option<DeclaredUtility>,
+    /// Number of decisions, T, 1 to 520.
+    pub horizon: usize,
+    /// Noises observed before the start, oldest first.
+    pub history: Vec<f64>,
+    /// The framework: `adaptive`, `static` or `plug_in`. Default: `adaptive`.
+    #[serde(default)]
+    pub framework: Framework,
+    /// Weights of older noises in the learned law. Default: `equal`.
+    #[serde(default)]
+    pub learning: Learning,
+    /// Rule for the radius of the ball, in the unit of the noise. Default: `bridge`.
+    #[serde(default)]
+    pub radius: Option<RadiusRule>,
+}
+
+/// A state: where it starts, and the range that it never leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeclaredState {
+    /// Value at the start.
+    pub start: f64,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+}
+
+/// The bounds of an action: formulas of the states, the parameters, `t` and `T`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActionBounds {
+    /// Lowest action.
+    pub low: String,
+    /// Highest action.
+    pub high: String,
+}
+
+/// The noise, observed each period, and its support.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Its name in the formulas.
+    pub name: String,
+    /// Lowest value.
+    pub low: f64,
+    /// Highest value.
+    pub high: f64,
+}
+
+/// A utility of the amount that a formula of the states gives at the end.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum DeclaredUtility {
+    /// `(1 - exp(-risk_aversion x)) / risk_aversion`.
+    Exponential {
+        /// Absolute risk aversion, per unit of the amount.
+        risk_aversion: f64,
+        /// Formula of the amount.
+        of: String,
+    },
+    /// `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)` of a positive amount.
+    Power {
+        /// Relative risk aversion, above 1 and at most 100.
+        risk_aversion: f64,
+        /// Formula of the amount.
+        of: String,
+    },
+    /// `ln x` of a positive amount.
+    Log {
+        /// Formula of the amount.
+        of: String,
+    },
+}
+
+impl DeclaredUtility {
+    /// Returns the formula of the amount.
+    pub fn of(&self) -> &str {
+        match self {
+            DeclaredUtility::Exponential { of, .. }
+            | DeclaredUtility::Power { of, .. }
+            | DeclaredUtility::Log { of } => of,
+        }
+    }
+}
+
+fn no_discount() -> f64 {
+    1.0
+}
