@@ -27,7 +27,6 @@ fn the_page_shows_the_example_and_its_answer() {
     let answer: Value = serde_json::from_slice(&json).unwrap();
     let order = answer["action"]["order"].as_f64().unwrap();
     assert!(printed.starts_with(&format!("order: {}\n", (1e4 * order).round() / 1e4)), "{printed} for {order}");
-    assert_eq!(json, solve(&[EXAMPLE, "--json"]).stdout, "not the same twice");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use crate::support::policies::advisor;
 use ballast::control::declared_advice::DeclaredAdvice;
 use ballast::control::error::TrainError;
 use ballast::control::policy::advisor::AdviceMode;
+use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
 use ballast::control::request::declared::DeclaredSpecification;
@@ -160,6 +161,14 @@ fn a_fixed_cost_is_solved_globally() {
         // An even order is at most half a thousandth from the best, which changes the worth by at most 5 for each.
         assert!((advice.value - best).abs() < 3e-3, "{stock}, {fixed}: {} for {best}", advice.value);
     }
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let mut request = example("store");
+    request["design"]["count"] = json!(20);
+    let on = |threads| TrainingPool::new(threads).unwrap().install(|| solved(&request).unwrap());
+    assert_eq!(on(1), on(3));
 }
 
 /// The paper's own problem, declared.
