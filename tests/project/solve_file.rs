@@ -42,6 +42,9 @@ fn a_fault_of_the_file_names_the_field() {
         let fault = String::from_utf8(refused.stderr).unwrap();
         assert!(!refused.status.success() && page.contains(fault.trim_end()), "{fault}");
     }
+    fs::write(&file, read(EXAMPLE).replacen("\"price\": 9,", "\"price\": 9, \"price\": 90,", 1)).unwrap();
+    let fault = String::from_utf8(solve(&[file.to_str().unwrap()]).stderr).unwrap();
+    assert!(fault.contains("`price` stands twice at line 6"), "{fault}");
     fs::write(&file, read(EXAMPLE).replacen("\"end\"", "\"ending\"", 1)).unwrap();
     let fault = String::from_utf8(solve(&[file.to_str().unwrap()]).stderr).unwrap();
     assert!(fault.contains("unknown field `ending`") && fault.contains("line 9"), "{fault}");

@@ -209,6 +209,16 @@ fn a_declared_investor_is_the_investor() {
 }
 
 #[test]
+fn a_problem_that_earns_nothing_is_refused() {
+    let mut request = example("stock");
+    for field in ["reward", "end"] {
+        request["problem"].as_object_mut().unwrap().remove(field);
+    }
+    let refused = solved(&request).unwrap_err().to_string();
+    assert!(refused.contains("problem.end") && refused.contains("must be given without a reward"), "{refused}");
+}
+
+#[test]
 fn what_breaks_a_rule_is_refused_with_its_field_and_column() {
     let long = "1+".repeat(1_500) + "1";
     let deep = format!("{}1{}", "(".repeat(80), ")".repeat(80));
@@ -246,6 +256,21 @@ fn what_breaks_a_rule_is_refused_with_its_field_and_column() {
         ("/framework", json!("known_law"), "problem.framework", "must be adaptive, static or plug_in"),
         ("/horizon", json!(0), "problem.horizon", ""),
         ("/horizon", json!(100_000), "problem.horizon", ""),
+        ("/horizon", json!(1_000_000_000_000_000_u64), "problem.horizon", "must lie in [1, 520]"),
+        ("/history", json!([5, 5, 5]), "problem.history", "must have two different values"),
+        ("/history", json!([]), "problem.history", "must have two different values"),
+        (
+            "/radius",
+            json!({ "rule": "root_n", "kappa": 5000.0 }),
+            "problem.radius.kappa",
+            "must be a number in [0, 4000]",
+        ),
+        (
+            "/radius",
+            json!({ "rule": "fixed", "radius": 500.0 }),
+            "problem.radius.radius",
+            "must be a number in [0, 400]",
+        ),
         ("/radius", json!({ "rule": "chi_square" }), "problem.radius.rule", "must be bridge"),
         ("/radius", json!({ "rule": "root_n", "kappa": -1.0 }), "problem.radius.kappa", ""),
     ];

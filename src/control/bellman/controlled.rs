@@ -17,7 +17,7 @@ use crate::control::surrogate::features::{FeatureSelection, Features};
 use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::control::uncertainty::laws::{LawSummary, Laws};
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::search::chebyshev::local_cubic;
+use crate::numerics::search::chebyshev::{even, local_cubic};
 
 /// Nodes at which gains are predicted if the description of the next state depends on the action. If changing the
 /// description costs, a value has kinks. Cubics are then good to a twentieth of the jump of its second derivative times
@@ -161,12 +161,12 @@ impl<P: Controlled> ControlledField<'_, P> {
         let Some(value) = next else { return Vec::new() };
         let nodes = |(law, &log_return): (&LawSummary, &f64)| {
             let law = selection.of_law(law);
-            let mut at = even(EVEN_NODES, 1.0, 2.0);
+            let mut at = even(1.0, 2.0, EVEN_NODES);
             let described = |&share: &f64| self.described(&self.next(share, log_return));
             let mut descriptions: Vec<Vec<f64>> = at.iter().map(described).collect();
             if descriptions[0].len() == 1 {
                 let [low, high] = range(&descriptions.concat());
-                at = even(FINE_NODES, low, high);
+                at = even(low, high, FINE_NODES);
                 if high - low <= ROUNDING * low.abs().max(high.abs()) {
                     at.truncate(1);
                 }
@@ -182,11 +182,6 @@ impl<P: Controlled> ControlledField<'_, P> {
         };
         laws.summaries_with(self.law, returns).iter().zip(returns).map(nodes).collect()
     }
-}
-
-/// Returns even nodes from one end to the other.
-fn even(count: usize, low: f64, high: f64) -> Vec<f64> {
-    (0..count).map(|index| low + (high - low) * index as f64 / (count - 1) as f64).collect()
 }
 
 /// Returns the least and the largest.

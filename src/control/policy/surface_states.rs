@@ -15,6 +15,7 @@ use crate::control::request::specification::{InitialLaws, ProblemSpecification, 
 use crate::control::surrogate::stored::StepSurrogates;
 use crate::numerics::law::moments::CentralMoments;
 use crate::numerics::machine::interruption;
+use crate::numerics::search::chebyshev;
 
 /// Numbers of columns and rows.
 const POINTS: [usize; 2] = [21, 31];
@@ -259,6 +260,5 @@ impl SurfaceStates {
 
 /// Returns even values between two ends; `None` if they are no interval.
 fn even([low, high]: [f64; 2], count: usize) -> Option<Vec<f64>> {
-    let at = |index: usize| low + (high - low) * index as f64 / (count - 1) as f64;
-    (high > low).then(|| (0..count).map(at).collect())
+    (high > low).then(|| chebyshev::even(low, high, count))
 }

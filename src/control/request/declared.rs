@@ -1,8 +1,11 @@
 //! A problem declared in formulas: its states, its action, the noise whose law is learned, and what is earned.
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::marker::PhantomData;
 
 use serde::Deserialize;
+use serde::de::{Deserializer, Error, MapAccess, Visitor};
 
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::Learning;
@@ -41,15 +44,18 @@ pub struct DeclaredDesign {
 #[serde(deny_unknown_fields)]
 pub struct DeclaredProblem {
     /// States by name, 1 to 6.
+    #[serde(deserialize_with = "distinct")]
     pub states: BTreeMap<String, DeclaredState>,
     /// The action by its name: one.
+    #[serde(deserialize_with = "distinct")]
     pub actions: BTreeMap<String, ActionBounds>,
     /// The noise.
     pub noise: Noise,
     /// Numbers by name, for the formulas.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "distinct")]
     pub parameters: BTreeMap<String, f64>,
     /// Formula of each state after a period.
+    #[serde(deserialize_with = "distinct")]
     pub next: BTreeMap<String, String>,
     /// Formula of what a period earns. Default: nothing.
     #[serde(default)]
@@ -150,4 +156,30 @@ impl DeclaredUtility {
 
 fn no_discount() -> f64 {
     1.0
+}
+
+/// Reads an object by name, and refuses a name that stands twice: the last would be taken in silence.
+fn distinct<'de, D: Deserializer<'de>, V: Deserialize<'de>>(source: D) -> Result<BTreeMap<String, V>, D::Error> {
+    source.deserialize_map(DistinctNames(PhantomData))
+}
+
+struct DistinctNames<V>(PhantomData<V>);
+
+impl<'de, V: Deserialize<'de>> Visitor<'de> for DistinctNames<V> {
+    type Value = BTreeMap<String, V>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("an object by name")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+        let mut found = BTreeMap::new();
+        while let Some((name, value)) = map.next_entry::<String, V>()? {
+            if found.contains_key(&name) {
+                return Err(A::Error::custom(format!("`{name}` stands twice")));
+            }
+            found.insert(name, value);
+        }
+        Ok(found)
+    }
 }

@@ -30,7 +30,7 @@ const LARGEST_NUMERATOR: f64 = 1e9;
 /// Allowed constants c of the concentration inequality, per squared log-return.
 const CONCENTRATION_RATE: (f64, f64) = (1e-9, 1e12);
 /// Allowed constants kappa of a radius of kappa / sqrt(n), in log-return.
-const KAPPA: (f64, f64) = (0.0, 100.0);
+pub const KAPPA: (f64, f64) = (0.0, 100.0);
 
 impl Bounded for RadiusRule {
     const BOUNDS: &'static [FieldBounds] = &[

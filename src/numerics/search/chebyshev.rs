@@ -39,6 +39,11 @@ impl Chebyshev {
     }
 }
 
+/// Returns even values from one end to the other, two at least.
+pub fn even(low: f64, high: f64, count: usize) -> Vec<f64> {
+    (0..count).map(|index| low + (high - low) * index as f64 / (count - 1) as f64).collect()
+}
+
 /// Returns the first index and the weights of the cubic through the four nodes around `position`, or fewer on a shorter
 /// grid.
 ///

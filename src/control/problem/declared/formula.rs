@@ -226,27 +226,24 @@ impl<'t> Parser<'t> {
     }
 
     fn sum(&mut self) -> Result<(), FormulaError> {
-        self.product()?;
-        while let Some(sign) = self.sign(&["+", "-"]) {
-            self.product()?;
-            self.code.push(Instruction::Two(if sign == "+" {
-                |left, right| left + right
-            } else {
-                |left, right| left - right
-            }));
-        }
-        Ok(())
+        self.left_to_right(Self::product, ["+", "-"], [|left, right| left + right, |left, right| left - right])
     }
 
     fn product(&mut self) -> Result<(), FormulaError> {
-        self.signed()?;
-        while let Some(sign) = self.sign(&["*", "/"]) {
-            self.signed()?;
-            self.code.push(Instruction::Two(if sign == "*" {
-                |left, right| left * right
-            } else {
-                |left, right| left / right
-            }));
+        self.left_to_right(Self::signed, ["*", "/"], [|left, right| left * right, |left, right| left / right])
+    }
+
+    /// Parses parts with two operators between them, which are applied from the left.
+    fn left_to_right(
+        &mut self,
+        part: fn(&mut Self) -> Result<(), FormulaError>,
+        signs: [&str; 2],
+        operators: [fn(f64, f64) -> f64; 2],
+    ) -> Result<(), FormulaError> {
+        part(self)?;
+        while let Some(sign) = self.sign(&signs) {
+            part(self)?;
+            self.code.push(Instruction::Two(operators[usize::from(sign == signs[1])]));
         }
         Ok(())
     }

@@ -115,17 +115,27 @@ impl Declared {
         self.at(step, &state.values, [0.0; 2], |value| [0, 1].map(|end| value(&self.bounds[end])))
     }
 
-    /// Returns the state after a period, with the action and the noise in their own units.
-    fn after(&self, step: usize, state: &EarnedState, action: f64, noise: f64) -> EarnedState {
-        let (mut values, reward) = self.at(step, &state.values, [action, noise], |value| {
-            let next: Vec<f64> = self.next.iter().map(value).collect();
+    /// Evaluates `next` and `reward`, with the action and the noise in their own units.
+    fn period(&self, step: usize, state: &EarnedState, moved: [f64; 2]) -> (Vec<f64>, f64) {
+        self.at(step, &state.values, moved, |value| {
+            let next = self.next.iter().map(value).collect();
             (next, self.reward.as_ref().map_or(0.0, value))
-        });
+        })
+    }
+
+    /// Returns the state after a period whose formulas have these values. Keeps states within their ranges, and the first
+    /// that left its own.
+    fn after(
+        &self,
+        (step, state): (usize, &EarnedState),
+        moved: [f64; 2],
+        (mut values, reward): (Vec<f64>, f64),
+    ) -> EarnedState {
         for (place, value) in values.iter_mut().enumerate() {
             let [low, high] = self.ranges[place];
             let slack = EDGE * (high - low);
             if !(low - slack..=high + slack).contains(value) {
-                self.left.get_or_init(|| self.leaving(place, *value, (step, state), [action, noise]));
+                self.left.get_or_init(|| self.leaving(place, *value, (step, state), moved));
             }
             *value = if value.is_nan() { low } else { value.clamp(low, high) };
         }
@@ -180,7 +190,8 @@ impl Controlled for Declared {
     }
 
     fn next(&self, step: usize, state: &EarnedState, action: f64, scaled: f64) -> EarnedState {
-        self.after(step, state, action, self.noise(scaled))
+        let moved = [action, self.noise(scaled)];
+        self.after((step, state), moved, self.period(step, state, moved))
     }
 
     fn describe(&self, _: usize, state: &EarnedState) -> Vec<f64> {

@@ -6,10 +6,13 @@ use std::sync::OnceLock;
 use super::Declared;
 use super::formula::{FUNCTIONS, Formula};
 use crate::control::error::FieldError;
+use crate::control::request::bounds::{whole, within};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::declared::{DeclaredProblem, DeclaredSpecification, DeclaredUtility};
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::radius_rules::{FIXED_RADIUS, KAPPA};
+use crate::control::request::rules::HORIZON;
 use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, UtilitySpecification,
 };
@@ -56,6 +59,9 @@ impl Declared {
         };
         let (field, end) = match (&problem.utility, &problem.end) {
             (None, Some(end)) => ("problem.end", end.as_str()),
+            (None, None) if problem.reward.is_none() => {
+                return Err(FieldError::new("problem.end", "", "must be given without a reward and a utility"));
+            }
             (None, None) => ("problem.end", "0"),
             (Some(utility), None) => ("problem.utility.of", utility.of()),
             (Some(_), Some(end)) => {
@@ -207,6 +213,11 @@ fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
             return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
         }
     }
+    if problem.history.windows(2).all(|pair| pair[0] == pair[1]) {
+        let found = problem.history.first().map_or("no values".to_owned(), |value| format!("{value} alone"));
+        return Err(FieldError::new("problem.history", found, "must have two different values at least"));
+    }
+    sizes(problem)?;
     for (name, value) in &problem.parameters {
         is_number(format!("problem.parameters.{name}"), *value)?;
     }
@@ -231,4 +242,19 @@ fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Checks the horizon and the radius, in the unit of the noise.
+fn sizes(problem: &DeclaredProblem) -> Result<(), FieldError> {
+    whole("problem.horizon", problem.horizon, &HORIZON)?;
+    // The bounds of an investor's radius, whose support has a width of 1 here.
+    let width = problem.noise.high - problem.noise.low;
+    match problem.radius {
+        Some(RadiusRule::RootN { kappa }) => within("problem.radius.kappa", kappa, KAPPA.0, KAPPA.1 * width)?,
+        Some(RadiusRule::Fixed { radius }) => {
+            within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1 * width)?;
+        }
+        _ => {}
+    }
+    Ok(())
 }

@@ -23,7 +23,7 @@ impl Declared {
     /// The field of the formula, and the point.
     pub(super) fn sampled(&self, problem: &DeclaredProblem) -> Result<(f64, Vec<f64>), FieldError> {
         let (mut largest, mut to_come): (f64, Vec<f64>) = (0.0, vec![0.0; self.horizon]);
-        let paths = TRIED.div_ceil(self.horizon.max(1));
+        let paths = TRIED.div_ceil(self.horizon);
         for path in 0..paths {
             let mut generator = stream(1, "declared", 0, path);
             // Some paths go one way all the time, and so as far as any.
@@ -38,9 +38,9 @@ impl Declared {
                 let [low, high] = self.checked_bounds(problem, step, &state)?;
                 let action = low + place(0) * (high - low);
                 let noise = self.noise[0] + place(1) * (self.noise[1] - self.noise[0]);
-                let reward = self.checked_period(problem, step, &state, [action, noise])?;
+                let (next, reward) = self.checked_period(problem, step, &state, [action, noise])?;
                 earned.push(state.earned);
-                state = self.after(step, &state, action, noise);
+                state = self.after((step, &state), [action, noise], (next, reward));
                 if let Some(fault) = self.left.get() {
                     return Err(fault.clone());
                 }
@@ -72,24 +72,21 @@ impl Declared {
         Ok(bounds)
     }
 
-    /// Checks the formulas of a period, and returns its reward.
+    /// Checks the formulas of a period, and returns their values.
     fn checked_period(
         &self,
         problem: &DeclaredProblem,
         step: usize,
         state: &EarnedState,
         moved: [f64; 2],
-    ) -> Result<f64, FieldError> {
+    ) -> Result<(Vec<f64>, f64), FieldError> {
         let at = || self.point(step, &state.values, &moved);
-        let (next, reward) = self.at(step, &state.values, moved, |value| {
-            let next: Vec<f64> = self.next.iter().map(value).collect();
-            (next, self.reward.as_ref().map_or(0.0, value))
-        });
-        for ((name, text), value) in problem.next.iter().zip(next) {
-            self.is_amount(&format!("problem.next.{name}"), text, value, &at)?;
+        let (next, reward) = self.period(step, state, moved);
+        for ((name, text), value) in problem.next.iter().zip(&next) {
+            self.is_amount(&format!("problem.next.{name}"), text, *value, &at)?;
         }
         self.is_amount("problem.reward", problem.reward.as_deref().unwrap_or_default(), reward, &at)?;
-        Ok(reward)
+        Ok((next, reward))
     }
 
     /// Checks the end at a state, and returns its size.
