@@ -13,7 +13,7 @@
 use std::error::Error;
 
 use ballast::control::controlled_training::ControlledPolicy;
-use ballast::control::problem::actions::ActionInterval;
+use ballast::control::problem::actions::{ActionInterval, ActionSet};
 use ballast::control::problem::controlled::Controlled;
 use ballast::control::progress::Watch;
 use ballast::control::request::specification::Specification;
@@ -55,13 +55,14 @@ struct Book {
 impl Controlled for Seller {
     type State = Book;
 
-    /// The actions are the shares held through the period.
-    fn actions(&self, _: usize, _: &Book) -> ActionInterval {
-        ActionInterval { lowest: 0.0, highest: 1.0 }
+    /// The action is the number of shares held through the period.
+    fn actions(&self, _: usize, _: &Book) -> Vec<ActionSet> {
+        vec![ActionSet::Interval(ActionInterval { lowest: 0.0, highest: 1.0 })]
     }
 
-    fn next(&self, _: usize, state: &Book, shares: f64, log_return: f64) -> Book {
+    fn next(&self, _: usize, state: &Book, actions: &[f64], log_return: f64) -> Book {
         let Book { price, wealth, shares: before } = *state;
+        let shares = actions[0];
         let traded = wealth - self.cost * price * (shares - before).abs();
         let next = price * log_return.exp();
         Book { price: next, wealth: (traded - shares * price) * (1.0 + RATE) + shares * next, shares }
@@ -117,7 +118,7 @@ fn by_the_library(seller: &Seller) -> Result<(f64, f64), Box<dyn Error>> {
     let start = Book { price: PRICE, wealth: 0.0, shares: 0.0 };
     let policy = ControlledPolicy::train(seller, &start, &specification, &Watch::unwatched())?;
     let found = policy.solve(0, &start, &EmpiricalDistribution::new(&HISTORY));
-    Ok((found.certainty_equivalent, found.action))
+    Ok((found.certainty_equivalent, found.actions[0]))
 }
 
 /// Spacing of the lattice of log-returns, and the largest return in units of it.

@@ -7,6 +7,7 @@ use clap::Subcommand;
 mod accuracy;
 mod action;
 mod assets;
+mod declared;
 mod horizons;
 mod kernels;
 mod summary;
@@ -25,6 +26,8 @@ pub enum Bench {
     /// Time the robust step of several assets, from a cold start and from a warm start at the solution of the month
     /// before.
     Assets(assets::AssetsBench),
+    /// Time the problems of `examples/problems`, and the investor declared in formulas beside its own solver.
+    Declared(declared::DeclaredBench),
     /// Time GET /action on loopback, next to GET /livez.
     Action(action::ActionBench),
 }
@@ -35,6 +38,7 @@ pub fn run(bench: Bench) -> Result<(), Box<dyn Error>> {
         Bench::Accuracy(arguments) => accuracy::run(&arguments),
         Bench::Horizons(arguments) => horizons::run(&arguments),
         Bench::Assets(arguments) => assets::run(&arguments),
+        Bench::Declared(arguments) => declared::run(&arguments),
         Bench::Kernels(arguments) => kernels::run(&arguments),
         Bench::Action(arguments) => tokio::runtime::Runtime::new()?.block_on(action::run(&arguments)),
     }

@@ -27,12 +27,11 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::caution;
+use super::progress::Parts;
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
-use progress::Parts;
 
 mod assets;
 mod files;
-mod progress;
 
 #[derive(Debug, Clone, Args)]
 pub struct BacktestArgs {

@@ -12,6 +12,7 @@ pub mod healthcheck;
 mod host;
 pub mod keys;
 mod moments;
+mod progress;
 mod record;
 mod returns;
 pub mod serve;

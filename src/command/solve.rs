@@ -5,9 +5,12 @@ use std::fs;
 use std::path::PathBuf;
 
 use ballast::control::declared_advice::{DeclaredAdvice, NoiseMove};
-use ballast::control::progress::Watch;
+use ballast::control::progress::{StepProgress, Watch};
+use ballast::control::request::completion::DEFAULT_COUNT;
 use ballast::control::request::declared::DeclaredSpecification;
 use clap::Args;
+
+use super::progress::Parts;
 
 /// Moves of the worst law that are shown.
 const SHOWN: usize = 8;
@@ -25,7 +28,14 @@ pub fn run(arguments: &SolveArgs) -> Result<(), Box<dyn Error>> {
     let file = arguments.problem.display();
     let text = fs::read_to_string(&arguments.problem).map_err(|error| format!("{file}: {error}"))?;
     let declared: DeclaredSpecification = serde_json::from_str(&text).map_err(|error| format!("{file}: {error}"))?;
-    let advice = DeclaredAdvice::solve(&declared, &Watch::unwatched())?;
+    let steps = declared.problem.horizon.saturating_sub(1);
+    let of_step = declared.design.count.unwrap_or(DEFAULT_COUNT);
+    let states = Parts::new(steps * of_step, "states");
+    // The steps are solved from the last to the second.
+    let progress = |at: StepProgress| states.reached(steps.saturating_sub(at.step) * of_step + at.done);
+    let solved = DeclaredAdvice::solve(&declared, &Watch { progress: &progress, ..Watch::unwatched() });
+    states.finish();
+    let advice = solved?;
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&advice)?);
     } else {
@@ -38,7 +48,7 @@ fn describe(declared: &DeclaredSpecification, advice: &DeclaredAdvice) -> String
     let problem = &declared.problem;
     let noise = &problem.noise.name;
     let mut lines: Vec<String> =
-        advice.action.iter().map(|(name, value)| format!("{name}: {}", number(*value))).collect();
+        advice.actions.iter().map(|(name, value)| format!("{name}: {}", number(*value))).collect();
     lines.push(format!("worth over {} periods: {}", problem.horizon, number(advice.value)));
     lines.push(match advice.radius > 0.0 {
         true => format!(
@@ -48,6 +58,10 @@ fn describe(declared: &DeclaredSpecification, advice: &DeclaredAdvice) -> String
         ),
         false => format!("under the law of the {} seen", problem.history.len()),
     });
+    if !advice.several_peaks.is_empty() {
+        let named = advice.several_peaks.join(" and ");
+        lines.push(format!("the worth has several peaks along {named}: 65 even values were tried first"));
+    }
     let mut moved: Vec<&NoiseMove> = advice.worst_law.iter().filter(|moved| moved.from != moved.to).collect();
     moved.sort_by(|left, right| right.share.total_cmp(&left.share));
     if !moved.is_empty() {

@@ -5,8 +5,10 @@ use std::ops::Range;
 
 use rand::RngExt;
 
-use crate::control::bellman::controlled::{ControlledSolution, ControlledStep, ControlledValue};
+use crate::control::bellman::controlled::{ControlledSolution, ControlledStep};
+use crate::control::bellman::controlled_value::ControlledValue;
 use crate::control::error::{FieldError, TrainError};
+use crate::control::problem::actions::ActionSet;
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::progress::Watch;
@@ -120,8 +122,23 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
     /// Solves the robust step at a state with the law of the noise known by then, against the value of the step after.
     /// `step` must be below the horizon.
     pub fn solve(&self, step: usize, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
+        self.step(step).solve(state, law)
+    }
+
+    /// Returns the worths of even actions, as [`ControlledStep::along`] does.
+    pub fn along(
+        &self,
+        step: usize,
+        (state, law): (&P::State, &EmpiricalDistribution),
+        actions: &[f64],
+        place: usize,
+    ) -> Vec<f64> {
+        self.step(step).along(state, law, actions, place)
+    }
+
+    fn step(&self, step: usize) -> ControlledStep<'_, P> {
         let ControlledPolicy { problem, laws, selection, values } = self;
-        ControlledStep { problem: *problem, laws, selection, step, next: values.get(step) }.solve(state, law)
+        ControlledStep { problem: *problem, laws, selection, step, next: values.get(step) }
     }
 }
 
@@ -143,15 +160,15 @@ impl<P: Controlled> SimulatedStates<'_, P> {
         let mut seen = Vec::with_capacity(self.bellman.step);
         for earlier in 0..self.bellman.step {
             let mut generator = stream(specification.seed, "controlled", earlier, index);
-            let actions = problem.actions(earlier, &state);
-            let action = actions.lowest + (actions.highest - actions.lowest) * generator.random::<f64>();
+            let drawn = |set: ActionSet| set.at(generator.random::<f64>());
+            let actions: Vec<f64> = problem.actions(earlier, &state).into_iter().map(drawn).collect();
             let log_return = match self.far {
                 Some(Interval { min, max }) if generator.random::<f64>() < FAR => {
                     min + (max - min) * generator.random::<f64>()
                 }
                 _ => admissible(self.law.draw(&mut generator), &specification.problem),
             };
-            state = problem.next(earlier, &state, action, log_return);
+            state = problem.next(earlier, &state, &actions, log_return);
             seen.push(log_return);
         }
         let mut law = self.history.clone();
@@ -176,7 +193,8 @@ impl<P: Controlled> Candidates for SimulatedStates<'_, P> {
 
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
         let (state, law) = self.state(index);
-        let ControlledSolution { action, gain, duality_gap, certified, .. } = self.bellman.solve(&state, &law);
+        let ControlledSolution { actions, gain, duality_gap, certified, .. } = self.bellman.solve(&state, &law);
+        let action = actions[0];
         if !gain.is_finite() || !action.is_finite() {
             return Err(TrainError::NotFinite { step: self.bellman.step, point: index, gain, action });
         }
@@ -188,7 +206,7 @@ impl<P: Controlled> Candidates for SimulatedStates<'_, P> {
             largest_gain: f64::INFINITY,
             floor_gains: vec![gain],
             between: Vec::new(),
-            policy_targets: vec![action],
+            policy_targets: actions,
             duality_gap,
             certified,
         })

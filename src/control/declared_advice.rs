@@ -14,11 +14,17 @@ use super::request::declared::DeclaredSpecification;
 /// Least share of the mass that is reported as moved.
 const LEAST_MOVED: f64 = 1e-9;
 
-/// The first action, its worth, and the law that is worst for it.
+/// The worth falls between two peaks by at least this share of how much it varies. The errors of surrogates are smaller.
+const DENT: f64 = 0.01;
+
+/// The first actions, their worth, and the law that is worst for them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeclaredAdvice {
-    /// The best action, by its name.
-    pub action: BTreeMap<String, f64>,
+    /// The best actions, by name.
+    pub actions: BTreeMap<String, f64>,
+    /// Actions along which the worth has several peaks, the others as advised. Of these 65 even ones were tried before
+    /// a search around the best.
+    pub several_peaks: Vec<String>,
     /// V at the start: what all periods earn against the worst law. With a utility its certainty equivalent.
     pub value: f64,
     /// Radius of the ball, in the unit of the noise.
@@ -59,19 +65,36 @@ impl DeclaredAdvice {
         let law = specification.problem.learning.law(&specification.problem.history);
         let found = policy.solve(0, &start, &law);
         reached()?;
-        if !found.certainty_equivalent.is_finite() || !found.action.is_finite() {
-            return Err(TrainError::NotFinite { step: 0, point: 0, gain: found.gain, action: found.action });
+        if let Some(&action) = found.actions.iter().find(|action| !action.is_finite() || !found.gain.is_finite()) {
+            return Err(TrainError::NotFinite { step: 0, point: 0, gain: found.gain, action });
         }
         let [low, high] = [-0.5, 0.5].map(|end| problem.noise(end));
-        let [action, _] = problem.named();
+        let names = problem.actions_named();
+        let along = |place: usize| policy.along(0, (&start, &law), &found.actions, place);
+        let has_several = |place: &usize| problem.is_interval(*place) && has_several_peaks(&along(*place));
         Ok(DeclaredAdvice {
-            action: BTreeMap::from([(action.to_owned(), found.action)]),
+            actions: names.iter().cloned().zip(found.actions.iter().copied()).collect(),
+            several_peaks: (0..names.len()).filter(has_several).map(|place| names[place].clone()).collect(),
             value: found.certainty_equivalent,
             radius: policy.radius(&law) * (high - low),
             worst_law: moves(&found.adversary, &problem),
             duality_gap: found.duality_gap,
         })
     }
+}
+
+/// Returns true if values rise again after they fell.
+fn has_several_peaks(values: &[f64]) -> bool {
+    let [least, most] = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(*value), most.max(*value)]);
+    // The lower of the highest values on both sides, less the value.
+    let mut highest_before = f64::NEG_INFINITY;
+    (0..values.len()).any(|place| {
+        highest_before = highest_before.max(values[place]);
+        let highest_after = values[place..].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        highest_before.min(highest_after) - values[place] > DENT * (most - least)
+    })
 }
 
 fn moves(adversary: &Adversary, problem: &Declared) -> Vec<NoiseMove> {

@@ -385,7 +385,8 @@ fn mutations(sound: &Value) -> Vec<(String, Value)> {
 /// A mutated policy is rejected with the field named, or its advice is still within the bounds of an allocation.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_mutated_policy_is_refused_or_advises_within_bounds() {
-    let app = App::start().await;
+    // A fast machine sends more than the default allows in a second.
+    let app = App::configured(|config| config.limits = Limits::new([0; 3], 16)).await;
     let mut request = specification(2);
     request["design"]["count"] = json!(10);
     let sound: Value = serde_json::from_slice(&trained(&request)).unwrap();

@@ -25,7 +25,7 @@ fn the_page_shows_the_example_and_its_answer() {
     assert!(answered.status.success() && page.contains(&format!("```text\n{printed}```\n")), "{printed}");
     let json = solve(&[EXAMPLE, "--json"]).stdout;
     let answer: Value = serde_json::from_slice(&json).unwrap();
-    let order = answer["action"]["order"].as_f64().unwrap();
+    let order = answer["actions"]["order"].as_f64().unwrap();
     assert!(printed.starts_with(&format!("order: {}\n", (1e4 * order).round() / 1e4)), "{printed} for {order}");
 }
 

@@ -5,8 +5,8 @@ use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsW
 use ballast::control::progress::Watch;
 use ballast::report::FileError;
 
-use super::progress::Parts;
 use super::{BacktestArgs, BacktestError, ReportOfRecord, Window, page, refused};
+use crate::command::progress::Parts;
 use crate::command::returns::SeveralReturns;
 
 pub mod files;

@@ -2,31 +2,37 @@
 //!
 //!   V_t(x, F^) = max_a  min_{F in C(F^)}  E_F[ V_(t+1)( S(x, a, Z), R(F^, Z) ) ].
 //!
-//! Gains of the next state are predicted at every return of the support. If the state's description depends on the
-//! action, they are also predicted at even actions, or at even values of a description of one number, with local cubics
-//! between. The dynamics themselves are followed for every action. The investor's own step (`super::BellmanStep`) knows that wealth is affine in the action, and predicts
-//! at fewer returns.
+//! Actions are searched along lines (`action_search.rs`). If one number describes the next state, its gains are predicted
+//! at even values of that number and at a few returns, for all lines (`controlled_value.rs::GainTable`). Otherwise
+//! they are predicted at every return of the support, and at even actions of a line if the description depends on the
+//! action. The dynamics themselves are followed for every action. The investor's own step (`super::BellmanStep`) knows
+//! that wealth is affine in the action, and predicts at fewer actions.
 
-use super::field::{Field, Payoffs, places};
+use std::borrow::Cow;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use super::action_search::{ActionChoices, ActionLine, LineSearch, SearchedActions, best_of_all};
+use super::controlled_value::{ControlledValue, GainNodes, GainTable, range};
+use super::field::{Field, Payoffs};
 use super::solution::Adversary;
-use super::{BestResponse, best_response};
+use super::{BestResponse, best_response, pricing};
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::surrogate::features::{FeatureSelection, Features};
-use crate::control::surrogate::value_surrogate::ValueSurrogate;
-use crate::control::uncertainty::laws::{LawSummary, Laws};
+use crate::control::uncertainty::laws::Laws;
+use crate::control::uncertainty::{Reach, UncertaintySet};
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::search::chebyshev::{even, local_cubic};
+use crate::numerics::search::chebyshev::even;
 
 /// Nodes at which gains are predicted if the description of the next state depends on the action. If changing the
 /// description costs, a value has kinks. Cubics are then good to a twentieth of the jump of its second derivative times
 /// the distance's square.
 const EVEN_NODES: usize = 33;
-/// Nodes of a description of one number. The value of a stock has kinks, between which 33 were too few.
-const FINE_NODES: usize = 129;
-/// Descriptions that differ by no more than this share are one.
-const ROUNDING: f64 = 1e-12;
+/// Even actions whose worths show the peaks.
+const SHOWN_ACTIONS: usize = 65;
 
 /// The robust step of a controlled problem at every state of one step.
 pub struct ControlledStep<'a, P> {
@@ -42,29 +48,12 @@ pub struct ControlledStep<'a, P> {
     pub next: Option<&'a ControlledValue>,
 }
 
-/// The gain of a step over its baseline.
-pub enum ControlledValue {
-    /// One gain for all states, if the state has no features.
-    Constant(f64),
-    /// Gains predicted from the features of a state.
-    Surrogate(Box<ValueSurrogate>),
-}
-
-impl ControlledValue {
-    fn gain(&self, features: &Features) -> f64 {
-        match self {
-            ControlledValue::Constant(gain) => *gain,
-            ControlledValue::Surrogate(surrogate) => surrogate.prediction(features)[0],
-        }
-    }
-}
-
 /// The solution of a controlled problem's robust step at one state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlledSolution {
-    /// The best action.
-    pub action: f64,
-    /// Its certainty equivalent against the worst law, an amount at the horizon.
+    /// The best actions, one for each set of them.
+    pub actions: Vec<f64>,
+    /// Their certainty equivalent against the worst law, an amount at the horizon.
     pub certainty_equivalent: f64,
     /// The gain of the certainty equivalent over the state's baseline.
     pub gain: f64,
@@ -72,7 +61,7 @@ pub struct ControlledSolution {
     pub duality_gap: f64,
     /// True if no mass wants to leave the window of returns.
     pub certified: bool,
-    /// The worst law for the action.
+    /// The worst law for the actions.
     pub adversary: Adversary,
 }
 
@@ -82,111 +71,181 @@ impl<P: Controlled> ControlledStep<'_, P> {
         self.selection.of_law(&self.laws.summary(law)).after(self.problem.describe(self.step, state))
     }
 
-    /// Solves the step. The search runs over the shares of the interval of actions, from 1 to 2, so that its tolerances
-    /// fit any unit. Cost: a prediction at each of some hundreds of returns, and some thirty actions priced; a hundred if
-    /// the problem is not concave.
+    /// Solves the step. Cost with one action: a prediction at each of some hundreds of returns, and some thirty actions
+    /// priced; a hundred if the problem is not concave. Several actions take some ten searches of one, or twenty.
     pub fn solve(&self, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
+        let at = self.at(state, law);
+        best_of_all(&at.choices, &at)
+    }
+
+    /// Returns the certainty equivalents of even actions, from the lowest to the highest one of the set in a place, the
+    /// others as they are given. They are good enough to show where the peaks are.
+    pub fn along(&self, state: &P::State, law: &EmpiricalDistribution, actions: &[f64], place: usize) -> Vec<f64> {
+        let at = self.at(state, law);
+        let line = at.choices.axis(actions, place);
+        even(0.0, 1.0, SHOWN_ACTIONS).into_iter().map(|share| at.roughly(&line.at(1.0 + share))).collect()
+    }
+
+    fn at<'a>(&'a self, state: &'a P::State, law: &'a EmpiricalDistribution) -> ControlledState<'a, P> {
+        let baseline = self.problem.baseline(self.step, state);
+        let choices = ActionChoices::of(self.problem.actions(self.step, state));
         let set = self.laws.uncertainty_set(law);
-        let (problem, actions) = (self.problem, self.problem.actions(self.step, state));
-        let baseline = problem.baseline(self.step, state);
-        let shares = ActionInterval { lowest: 1.0, highest: if actions.highest > actions.lowest { 2.0 } else { 1.0 } };
-        let field = |returns: Vec<f64>| ControlledField { step: self, state, law, actions, baseline, returns };
+        let described = match self.next {
+            Some(_) => self.problem.describe(self.step, state).len(),
+            None => 0,
+        };
+        let spread = if described == 1 { choices.spread() } else { Vec::new() };
+        ControlledState { step: self, state, law, set, baseline, choices, spread, table: RefCell::default() }
+    }
+}
+
+/// The robust step at one state.
+struct ControlledState<'a, P: Controlled> {
+    step: &'a ControlledStep<'a, P>,
+    state: &'a P::State,
+    law: &'a EmpiricalDistribution,
+    set: Cow<'a, UncertaintySet>,
+    /// The baseline of this state.
+    baseline: f64,
+    choices: ActionChoices,
+    /// Actions over all that may be chosen, if the next state is described by one number; otherwise none.
+    spread: Vec<Vec<f64>>,
+    /// Gains for all lines, if the description is one number.
+    table: RefCell<Option<Rc<GainTable>>>,
+}
+
+impl SearchedActions for ControlledSolution {
+    fn actions(&self) -> &[f64] {
+        &self.actions
+    }
+
+    fn gain(&self) -> f64 {
+        self.gain
+    }
+}
+
+impl<P: Controlled> LineSearch for ControlledState<'_, P> {
+    type Found = ControlledSolution;
+
+    fn is_concave(&self) -> bool {
+        self.step.problem.is_concave()
+    }
+
+    fn on_line(&self, line: &ActionLine) -> ControlledSolution {
+        // Shares from 1 to 2 fit the tolerances of the search in any unit.
+        let shares = ActionInterval { lowest: 1.0, highest: if line.is_point() { 1.0 } else { 2.0 } };
         // The cost of trading is part of the problem itself.
         let free = (Dynamics::plain(0.0, 0.0), 0.0);
-        best_response(&set, shares, free, field, |_, BestResponse { trade, worst, .. }| {
-            let certain = |value: f64| problem.certainty_equivalent(value, baseline);
+        let field = |returns: Vec<f64>| ControlledField::new(self, line, returns);
+        let certain = |value: f64| self.step.problem.certainty_equivalent(value, self.baseline);
+        best_response(&self.set, shares, free, field, |_, BestResponse { trade, worst, .. }| {
             let certainty_equivalent = certain(worst.value);
             ControlledSolution {
-                action: action_at(actions, trade.action),
+                actions: line.at(trade.action),
                 certainty_equivalent,
-                gain: problem.gain(certainty_equivalent, baseline),
+                gain: self.step.problem.gain(certainty_equivalent, self.baseline),
                 duality_gap: certainty_equivalent - certain(worst.dual),
                 certified: worst.certified,
                 adversary: worst.adversary,
             }
         })
     }
-}
 
-/// Returns the action at a share of the interval, from 1 to 2.
-fn action_at(actions: ActionInterval, share: f64) -> f64 {
-    actions.lowest + (share - 1.0) * (actions.highest - actions.lowest)
-}
-
-/// The next state's value, from one state.
-struct ControlledField<'a, P: Controlled> {
-    step: &'a ControlledStep<'a, P>,
-    state: &'a P::State,
-    law: &'a EmpiricalDistribution,
-    actions: ActionInterval,
-    /// The baseline of this state.
-    baseline: f64,
-    returns: Vec<f64>,
-}
-
-/// Gains of the next state after one return: at even nodes, with local cubics between.
-#[derive(Clone)]
-struct GainNodes {
-    /// Shares of the interval of actions, or values of the description if it is one number.
-    at: Vec<f64>,
-    gains: Vec<f64>,
-}
-
-impl GainNodes {
-    fn gain(&self, at: f64) -> f64 {
-        let (first, weights) = local_cubic(&self.at, at);
-        self.gains[first..].iter().zip(weights).map(|(gain, weight)| gain * weight).sum()
+    /// Returns a certainty equivalent.
+    fn roughly(&self, actions: &[f64]) -> f64 {
+        let line = ActionLine::point(actions);
+        let field = ControlledField::new(self, &line, self.set.exact_returns(Reach::FIRST));
+        let value = pricing(&self.set, &field).rough_value(Trade { action: 1.0, kept: 1.0 });
+        self.step.problem.certainty_equivalent(value, self.baseline)
     }
 }
 
-impl<P: Controlled> ControlledField<'_, P> {
-    fn next(&self, share: f64, log_return: f64) -> P::State {
-        self.step.problem.next(self.step.step, self.state, action_at(self.actions, share), log_return)
+/// The next state's value, from one state and along a line of actions.
+struct ControlledField<'a, P: Controlled> {
+    state: &'a ControlledState<'a, P>,
+    line: &'a ActionLine,
+    returns: Vec<f64>,
+    table: Option<Rc<GainTable>>,
+    /// Gains by the return, without a table.
+    known: RefCell<BTreeMap<u64, Rc<GainNodes>>>,
+}
+
+impl<'a, P: Controlled> ControlledField<'a, P> {
+    fn new(state: &'a ControlledState<'a, P>, line: &'a ActionLine, returns: Vec<f64>) -> Self {
+        let mut field = ControlledField { state, line, returns, table: None, known: RefCell::default() };
+        field.table = field.tabulated();
+        field
+    }
+
+    fn next(&self, actions: &[f64], log_return: f64) -> P::State {
+        self.state.step.problem.next(self.state.step.step, self.state.state, actions, log_return)
     }
 
     fn described(&self, next: &P::State) -> Vec<f64> {
-        self.step.problem.describe(self.step.step + 1, next)
+        self.state.step.problem.describe(self.state.step.step + 1, next)
     }
 
     fn utility(&self, gain: f64, next: &P::State) -> f64 {
-        let problem = self.step.problem;
-        let worth = problem.worth(gain, problem.baseline(self.step.step + 1, next));
-        problem.utility(worth, self.baseline)
+        let ControlledStep { problem, step, .. } = *self.state.step;
+        let worth = problem.worth(gain, problem.baseline(step + 1, next));
+        problem.utility(worth, self.state.baseline)
     }
 
-    /// Returns the gains of the next state after each return; none at the horizon. A description of one number has its
-    /// nodes in its own range: where it is a kinked function of the action, the gain of it is not kinked.
-    fn gains(&self, returns: &[f64]) -> Vec<GainNodes> {
-        let ControlledStep { problem, laws, selection, next, .. } = *self.step;
-        let Some(value) = next else { return Vec::new() };
-        let nodes = |(law, &log_return): (&LawSummary, &f64)| {
-            let law = selection.of_law(law);
-            let mut at = even(1.0, 2.0, EVEN_NODES);
-            let described = |&share: &f64| self.described(&self.next(share, log_return));
-            let mut descriptions: Vec<Vec<f64>> = at.iter().map(described).collect();
-            if descriptions[0].len() == 1 {
-                let [low, high] = range(&descriptions.concat());
-                at = even(low, high, FINE_NODES);
-                if high - low <= ROUNDING * low.abs().max(high.abs()) {
-                    at.truncate(1);
-                }
-                descriptions = at.iter().map(|&described| vec![described]).collect();
-            } else if descriptions.iter().all(|described| *described == descriptions[0]) {
-                at.truncate(1);
+    /// Returns a gain as it counts: a floor cannot be lost.
+    fn kept(&self, gain: f64) -> f64 {
+        if self.state.step.problem.has_floor() { gain.max(0.0) } else { gain }
+    }
+
+    /// Returns the gains for all lines, if one number describes the next state.
+    fn tabulated(&self) -> Option<Rc<GainTable>> {
+        let value = self.state.step.next.filter(|_| !self.state.spread.is_empty())?;
+        let mut table = self.state.table.borrow_mut();
+        // A window of returns that grows needs another table.
+        if table.as_ref().is_none_or(|table| !table.covers(&self.returns)) {
+            let ControlledStep { laws, selection, .. } = *self.state.step;
+            let summaries = laws.summaries_with(self.state.law, &self.returns);
+            let mut laws: Vec<Features> = summaries.iter().map(|law| selection.of_law(law)).collect();
+            let number = |(actions, log_return): (&Vec<f64>, &f64)| self.described(&self.next(actions, *log_return))[0];
+            let reached = self.state.spread.iter().flat_map(|actions| self.returns.iter().map(move |z| (actions, z)));
+            let nodes = value.nodes(&laws[laws.len() / 2].clone().after(vec![0.0]), range(reached.map(number)));
+            if laws.iter().all(|law| *law == laws[0]) {
+                laws.truncate(1);
             }
-            let gain = |described: &Vec<f64>| {
-                let gain = value.gain(&law.clone().after(described.clone()));
-                if problem.has_floor() { gain.max(0.0) } else { gain }
-            };
-            GainNodes { gains: descriptions.iter().take(at.len()).map(gain).collect(), at }
-        };
-        laws.summaries_with(self.law, returns).iter().zip(returns).map(nodes).collect()
+            let returns = self.returns[..laws.len()].to_vec();
+            let floor = if self.state.step.problem.has_floor() { 0.0 } else { f64::NEG_INFINITY };
+            *table = Some(Rc::new(GainTable::new(value, (returns, &laws), nodes, floor)));
+        }
+        table.clone()
     }
-}
 
-/// Returns the least and the largest.
-fn range(values: &[f64]) -> [f64; 2] {
-    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
+    /// Returns the gains of the next state after each return; none at the horizon.
+    fn gains(&self, returns: &[f64]) -> Vec<Rc<GainNodes>> {
+        let ControlledStep { laws, selection, next, .. } = *self.state.step;
+        let Some(value) = next else { return Vec::new() };
+        if let Some(table) = &self.table {
+            return table.rows(returns);
+        }
+        let mut known = self.known.borrow_mut();
+        let unknown = returns.iter().copied().filter(|log_return| !known.contains_key(&log_return.to_bits()));
+        let unknown: Vec<f64> = unknown.collect();
+        for (law, &log_return) in laws.summaries_with(self.state.law, &unknown).iter().zip(&unknown) {
+            let nodes = self.nodes(value, &selection.of_law(law), log_return);
+            known.insert(log_return.to_bits(), Rc::new(nodes));
+        }
+        returns.iter().map(|log_return| Rc::clone(&known[&log_return.to_bits()])).collect()
+    }
+
+    /// Returns the gains after one return along the line.
+    fn nodes(&self, value: &ControlledValue, law: &Features, log_return: f64) -> GainNodes {
+        let mut at = if self.line.is_point() { vec![1.0] } else { even(1.0, 2.0, EVEN_NODES) };
+        let described = |share: &f64| self.described(&self.next(&self.line.at(*share), log_return));
+        let descriptions: Vec<Vec<f64>> = at.iter().map(described).collect();
+        if descriptions.iter().all(|described| *described == descriptions[0]) {
+            at.truncate(1);
+        }
+        let gain = |described: Vec<f64>| self.kept(value.gain(&law.clone().after(described)));
+        GainNodes { gains: descriptions.into_iter().take(at.len()).map(gain).collect(), at: Rc::new(at) }
+    }
 }
 
 impl<P: Controlled> Field for ControlledField<'_, P> {
@@ -195,7 +254,7 @@ impl<P: Controlled> Field for ControlledField<'_, P> {
     }
 
     fn is_concave(&self) -> bool {
-        self.step.problem.is_concave()
+        self.state.is_concave()
     }
 
     fn at<'f>(&'f self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
@@ -204,8 +263,9 @@ impl<P: Controlled> Field for ControlledField<'_, P> {
 
     fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
         // Without a floor nothing is certain, and nothing is beyond the support.
-        let has_floor = self.step.problem.has_floor();
-        if has_floor { self.utility(0.0, &self.next(trade.action, log_return)) } else { f64::NEG_INFINITY }
+        let has_floor = self.state.step.problem.has_floor();
+        let least = || self.utility(0.0, &self.next(&self.line.at(trade.action), log_return));
+        if has_floor { least() } else { f64::NEG_INFINITY }
     }
 }
 
@@ -213,26 +273,21 @@ struct ControlledRows<'f, P: Controlled> {
     field: &'f ControlledField<'f, P>,
     returns: Vec<f64>,
     /// Return by return; empty at the horizon.
-    gains: Vec<GainNodes>,
+    gains: Vec<Rc<GainNodes>>,
 }
 
 impl<'f, P: Controlled> Payoffs<'f> for ControlledRows<'f, P> {
     fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
-        let places = places(&self.returns, returns);
-        let unknown = returns.iter().zip(&places).filter(|(_, place)| place.is_none());
-        let unknown: Vec<f64> = unknown.map(|(log_return, _)| *log_return).collect();
-        let mut computed = self.field.gains(&unknown).into_iter();
-        let known = |place: usize| self.gains.get(place).cloned();
-        let gains = places.iter().filter_map(|place| place.map_or_else(|| computed.next(), known)).collect();
-        Box::new(ControlledRows { field: self.field, returns: returns.to_vec(), gains })
+        self.field.at(returns)
     }
 
     fn payoff(&self, trade: Trade) -> Vec<f64> {
+        let actions = self.field.line.at(trade.action);
+        let along_line = self.field.table.is_none();
         let payoff = |(index, &log_return): (usize, &f64)| {
-            let next = self.field.next(trade.action, log_return);
+            let next = self.field.next(&actions, log_return);
             let gain = self.gains.get(index).map_or(0.0, |nodes| {
-                let described = self.field.described(&next);
-                nodes.gain(if described.len() == 1 { described[0] } else { trade.action })
+                nodes.gain(if along_line { trade.action } else { self.field.described(&next)[0] })
             });
             self.field.utility(gain, &next)
         };

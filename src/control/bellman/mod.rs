@@ -20,7 +20,9 @@
 //!
 //! Uncertainty sets differ in how an action is priced (`Pricing`); the search for the best one is shared.
 
+mod action_search;
 pub mod controlled;
+pub mod controlled_value;
 pub mod field;
 pub mod gain_field;
 pub mod next_value;
@@ -206,11 +208,7 @@ fn best_response<F: Field, T>(
         interruption::checkpoint();
         let field = field_at(set.exact_returns(reach));
         let is_concave = field.is_concave();
-        let mut pricing: Box<dyn Pricing + '_> = match set {
-            UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, &field)),
-            UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, &field)),
-            UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, &field)),
-        };
+        let mut pricing = pricing(set, &field);
         let band = best_band(pricing.as_mut(), (actions, is_concave), dynamics, holding);
         let trade = dynamics.trade_into(band, holding);
         let mut worst = pricing.worst(trade);
@@ -223,6 +221,15 @@ fn best_response<F: Field, T>(
             return then(pricing.as_ref(), BestResponse { band, trade, worst });
         }
         (reach, growths) = (reach.doubled(), growths + 1);
+    }
+}
+
+/// Returns the prices of a field against a set of laws.
+fn pricing<'f>(set: &'f UncertaintySet, field: &'f dyn Field) -> Box<dyn Pricing + 'f> {
+    match set {
+        UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, field)),
+        UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, field)),
+        UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, field)),
     }
 }
 

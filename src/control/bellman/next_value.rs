@@ -52,7 +52,7 @@ impl NextValue {
     pub fn depends_on_wealth(&self, selection: &FeatureSelection) -> bool {
         match self {
             NextValue::Terminal | NextValue::Constant(..) => false,
-            NextValue::Surrogate(surrogate) => selection.has_wealth() && surrogate.scaling.active.first() == Some(&0),
+            NextValue::Surrogate(surrogate) => selection.has_wealth() && surrogate.uses_first(),
             NextValue::Exact(..) => selection.has_wealth(),
         }
     }

@@ -1,5 +1,5 @@
-//! The set A of actions: the share of wealth that may be held in the risky asset; and the band, the policy's no-trade
-//! region.
+//! The set A of actions: for the investor the share of wealth that may be held in the risky asset; and the band, the
+//! policy's no-trade region.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,13 +11,22 @@ const FALLS: usize = 2;
 /// Equal parts that are all tried if values are not concave.
 const FINE_ACTIONS: usize = 64;
 
-/// A closed interval of shares of wealth.
+/// A closed interval of actions. An investor's are shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ActionInterval {
-    /// A share of wealth.
+    /// The lowest action.
     pub lowest: f64,
-    /// A share of wealth.
+    /// The highest action.
     pub highest: f64,
+}
+
+/// The choice of one action of a controlled problem.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ActionSet {
+    /// Any number of an interval.
+    Interval(ActionInterval),
+    /// One of these, of which there is one at least.
+    Values(Vec<f64>),
 }
 
 /// The policy at one state: a holding inside is kept, one outside trades to the nearer end. If trading costs nothing
@@ -29,6 +38,16 @@ pub struct Band {
     pub low: f64,
     /// A share of wealth, at least the lower one.
     pub high: f64,
+}
+
+impl ActionSet {
+    /// Returns the action at a share of the set, from 0 to 1.
+    pub fn at(&self, share: f64) -> f64 {
+        match self {
+            ActionSet::Interval(ActionInterval { lowest, highest }) => lowest + (highest - lowest) * share,
+            ActionSet::Values(values) => values[((values.len() as f64 * share) as usize).min(values.len() - 1)],
+        }
+    }
 }
 
 impl Band {

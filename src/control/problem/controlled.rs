@@ -5,7 +5,7 @@
 //! faster solver, because wealth after a period is affine in the action. `examples/hedge.rs` is another, written
 //! outside this crate.
 
-use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::actions::ActionSet;
 
 /// A controlled state, its actions, and its worth at the horizon. The law of the noise is not part of it.
 ///
@@ -15,11 +15,12 @@ pub trait Controlled: Sync {
     /// X, the set of states.
     type State: Clone + Send + Sync;
 
-    /// Returns A: the actions of the period after `step`.
-    fn actions(&self, step: usize, state: &Self::State) -> ActionInterval;
+    /// Returns A: what each action of the period after `step` may be, the others being what they are.
+    fn actions(&self, step: usize, state: &Self::State) -> Vec<ActionSet>;
 
-    /// Returns S(x, a, z): the state after a period in which the noise was z.
-    fn next(&self, step: usize, state: &Self::State, action: f64, noise: f64) -> Self::State;
+    /// Returns S(x, a, z): the state after a period in which the noise was z. There is one action for each set of
+    /// [`Self::actions`].
+    fn next(&self, step: usize, state: &Self::State, actions: &[f64], noise: f64) -> Self::State;
 
     /// Returns the features of a state: as few numbers as its gain depends on.
     fn describe(&self, step: usize, state: &Self::State) -> Vec<f64>;
@@ -34,8 +35,8 @@ pub trait Controlled: Sync {
         true
     }
 
-    /// Returns true if the certainty equivalent is concave in the action. Otherwise the best of many even actions is found
-    /// before a search around it.
+    /// Returns true if the certainty equivalent is concave in the actions. Otherwise the best of many even actions is found
+    /// before a search around it, and a search over several actions starts several times.
     fn is_concave(&self) -> bool {
         true
     }

@@ -1,7 +1,7 @@
 //! The investor as a controlled problem: wealth alone, with the share held if trading costs, and with contributions and
 //! withdrawals.
 
-use super::actions::ActionInterval;
+use super::actions::{ActionInterval, ActionSet};
 use super::controlled::Controlled;
 use super::dynamics::Dynamics;
 use super::utility::RelativeUtility;
@@ -32,13 +32,14 @@ impl Investor {
 impl Controlled for Investor {
     type State = Position;
 
-    fn actions(&self, step: usize, state: &Position) -> ActionInterval {
+    fn actions(&self, step: usize, state: &Position) -> Vec<ActionSet> {
         let [lowest, highest] = self.problem.action_interval;
-        ActionInterval { lowest, highest: self.periods[step].highest_action(state.wealth, highest) }
+        let highest = self.periods[step].highest_action(state.wealth, highest);
+        vec![ActionSet::Interval(ActionInterval { lowest, highest })]
     }
 
-    fn next(&self, step: usize, state: &Position, action: f64, noise: f64) -> Position {
-        let (wealth, holding) = self.periods[step].next(state.wealth, state.holding, action, noise);
+    fn next(&self, step: usize, state: &Position, actions: &[f64], noise: f64) -> Position {
+        let (wealth, holding) = self.periods[step].next(state.wealth, state.holding, actions[0], noise);
         Position { wealth, holding }
     }
 

@@ -46,9 +46,9 @@ pub struct DeclaredProblem {
     /// States by name, 1 to 6.
     #[serde(deserialize_with = "distinct")]
     pub states: BTreeMap<String, DeclaredState>,
-    /// The action by its name: one.
+    /// Actions by name, 1 to 3.
     #[serde(deserialize_with = "distinct")]
-    pub actions: BTreeMap<String, ActionBounds>,
+    pub actions: BTreeMap<String, DeclaredAction>,
     /// The noise.
     pub noise: Noise,
     /// Numbers by name, for the formulas.
@@ -96,14 +96,19 @@ pub struct DeclaredState {
     pub high: f64,
 }
 
-/// The bounds of an action: formulas of the states, the parameters, `t` and `T`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// An action: any number between two bounds, or one of some values.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ActionBounds {
-    /// Lowest action.
-    pub low: String,
-    /// Highest action.
-    pub high: String,
+pub struct DeclaredAction {
+    /// Formula of the lowest action, of the states, the parameters, `t` and `T`.
+    #[serde(default)]
+    pub low: Option<String>,
+    /// Formula of the highest action, of the same.
+    #[serde(default)]
+    pub high: Option<String>,
+    /// The actions that there are, instead of bounds.
+    #[serde(default)]
+    pub values: Option<Vec<f64>>,
 }
 
 /// The noise, observed each period, and its support.

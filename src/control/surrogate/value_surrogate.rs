@@ -76,6 +76,11 @@ impl ValueSurrogate {
         self.surrogate.at(&self.within_reach(features))
     }
 
+    /// Returns true if the first feature is an input.
+    pub fn uses_first(&self) -> bool {
+        self.scaling.active.first() == Some(&0)
+    }
+
     /// Returns the nearest input to `features` from which the process predicts.
     fn within_reach(&self, features: &Features) -> Vec<f64> {
         let inputs = self.scaling.apply(features).into_iter().enumerate();

@@ -15,7 +15,7 @@ use std::cell::RefCell;
 use std::sync::OnceLock;
 
 use self::formula::Formula;
-use super::actions::ActionInterval;
+use super::actions::{ActionInterval, ActionSet};
 use super::controlled::Controlled;
 use super::utility::RelativeUtility;
 use crate::control::error::FieldError;
@@ -29,12 +29,12 @@ const LEAST_AMOUNT: f64 = 1e-300;
 /// A declared problem whose formulas are parsed and whose rules hold.
 #[derive(Debug)]
 pub struct Declared {
-    /// States, the action, the noise, `t`, `T` and the parameters, in the order of the values of a formula.
+    /// States, actions, the noise, `t`, `T` and the parameters, in the order of the values of a formula.
     names: Vec<String>,
     ranges: Vec<[f64; 2]>,
     start: Vec<f64>,
     parameters: Vec<f64>,
-    bounds: [Formula; 2],
+    actions: Vec<Action>,
     next: Vec<Formula>,
     reward: Option<Formula>,
     /// The worth at the end, or the amount whose utility counts.
@@ -49,6 +49,15 @@ pub struct Declared {
     to_come: Vec<f64>,
     /// The first state that left its range.
     left: OnceLock<FieldError>,
+}
+
+/// The choice of one action.
+#[derive(Debug)]
+enum Action {
+    /// The formulas of its bounds.
+    Bounds([Formula; 2]),
+    /// All of its values.
+    Values(Vec<f64>),
 }
 
 /// The states, and what was earned on the way to them.
@@ -71,9 +80,14 @@ impl Declared {
         EarnedState { values: self.start.clone(), earned: 0.0 }
     }
 
-    /// Returns the name of the action and that of the noise.
-    pub fn named(&self) -> [&str; 2] {
-        [0, 1].map(|place| self.names[self.ranges.len() + place].as_str())
+    /// Returns the names of the actions.
+    pub fn actions_named(&self) -> &[String] {
+        &self.names[self.ranges.len()..][..self.actions.len()]
+    }
+
+    /// Returns true if the action in a place may be any number between its bounds.
+    pub fn is_interval(&self, place: usize) -> bool {
+        matches!(self.actions[place], Action::Bounds(_))
     }
 
     /// Returns the noise in its own unit from that of the solver.
@@ -93,31 +107,31 @@ impl Declared {
         self.left.get()
     }
 
-    /// Evaluates formulas at a state, an action and a noise.
+    /// Evaluates formulas at a state and what moves it: actions and a noise, or nothing if they are not known.
     fn at<T>(
         &self,
         step: usize,
         state: &[f64],
-        [action, noise]: [f64; 2],
+        moved: Option<(&[f64], f64)>,
         evaluate: impl FnOnce(&dyn Fn(&Formula) -> f64) -> T,
     ) -> T {
         MEMORY.with_borrow_mut(|(values, stack)| {
             values.clear();
             values.extend(state);
-            values.extend([action, noise, step as f64, self.horizon as f64]);
+            match moved {
+                Some((actions, noise)) => values.extend(actions.iter().chain([&noise])),
+                None => values.resize(state.len() + self.actions.len() + 1, 0.0),
+            }
+            values.extend([step as f64, self.horizon as f64]);
             values.extend(&self.parameters);
             let stack = RefCell::new(stack);
             evaluate(&|formula| formula.value(values, &mut stack.borrow_mut()))
         })
     }
 
-    fn bounds_at(&self, step: usize, state: &EarnedState) -> [f64; 2] {
-        self.at(step, &state.values, [0.0; 2], |value| [0, 1].map(|end| value(&self.bounds[end])))
-    }
-
-    /// Evaluates `next` and `reward`, with the action and the noise in their own units.
-    fn period(&self, step: usize, state: &EarnedState, moved: [f64; 2]) -> (Vec<f64>, f64) {
-        self.at(step, &state.values, moved, |value| {
+    /// Evaluates `next` and `reward`, with the actions and the noise in their own units.
+    fn period(&self, step: usize, state: &EarnedState, moved: (&[f64], f64)) -> (Vec<f64>, f64) {
+        self.at(step, &state.values, Some(moved), |value| {
             let next = self.next.iter().map(value).collect();
             (next, self.reward.as_ref().map_or(0.0, value))
         })
@@ -128,7 +142,7 @@ impl Declared {
     fn after(
         &self,
         (step, state): (usize, &EarnedState),
-        moved: [f64; 2],
+        moved: (&[f64], f64),
         (mut values, reward): (Vec<f64>, f64),
     ) -> EarnedState {
         for (place, value) in values.iter_mut().enumerate() {
@@ -142,15 +156,23 @@ impl Declared {
         EarnedState { values, earned: state.earned + self.discount.powi(step as i32) * reward }
     }
 
-    fn leaving(&self, place: usize, value: f64, (step, state): (usize, &EarnedState), moved: [f64; 2]) -> FieldError {
+    fn leaving(
+        &self,
+        place: usize,
+        value: f64,
+        (step, state): (usize, &EarnedState),
+        moved: (&[f64], f64),
+    ) -> FieldError {
         let [low, high] = self.ranges[place];
-        let rule = format!("must stay from {low} to {high}; it leaves at {}", self.point(step, &state.values, &moved));
+        let at = self.point(step, &state.values, Some(moved));
+        let rule = format!("must stay from {low} to {high}; it leaves at {at}");
         FieldError::new(format!("problem.next.{}", self.names[place]), value, rule)
     }
 
-    /// Names a point in words; `moved` are the action and the noise.
-    fn point(&self, step: usize, state: &[f64], moved: &[f64]) -> String {
-        let values = state.iter().chain(moved).map(|value| (1e6 * value).round() / 1e6);
+    /// Names a point in words.
+    fn point(&self, step: usize, state: &[f64], moved: Option<(&[f64], f64)>) -> String {
+        let moved = moved.into_iter().flat_map(|(actions, noise)| actions.iter().copied().chain([noise]));
+        let values = state.iter().copied().chain(moved).map(|value| (1e6 * value).round() / 1e6);
         let named: Vec<String> =
             self.names.iter().zip(values).map(|(name, value)| format!("{name} = {value}")).collect();
         format!("{}, t = {step}", named.join(", "))
@@ -158,7 +180,7 @@ impl Declared {
 
     /// Returns the worth of ending in a state.
     fn ended(&self, step: usize, state: &EarnedState) -> f64 {
-        let end = self.at(step, &state.values, [0.0; 2], |value| value(&self.end));
+        let end = self.at(step, &state.values, None, |value| value(&self.end));
         match self.utility {
             None => state.earned + self.discount.powi(self.horizon as i32) * end,
             Some(_) => end,
@@ -184,13 +206,20 @@ impl Declared {
 impl Controlled for Declared {
     type State = EarnedState;
 
-    fn actions(&self, step: usize, state: &EarnedState) -> ActionInterval {
-        let [lowest, highest] = self.bounds_at(step, state);
-        ActionInterval { lowest, highest: highest.max(lowest) }
+    fn actions(&self, step: usize, state: &EarnedState) -> Vec<ActionSet> {
+        self.at(step, &state.values, None, |value| {
+            let set = |action: &Action| match action {
+                Action::Bounds([low, high]) => {
+                    ActionSet::Interval(ActionInterval { lowest: value(low), highest: value(high) })
+                }
+                Action::Values(values) => ActionSet::Values(values.clone()),
+            };
+            self.actions.iter().map(set).collect()
+        })
     }
 
-    fn next(&self, step: usize, state: &EarnedState, action: f64, scaled: f64) -> EarnedState {
-        let moved = [action, self.noise(scaled)];
+    fn next(&self, step: usize, state: &EarnedState, actions: &[f64], scaled: f64) -> EarnedState {
+        let moved = (actions, self.noise(scaled));
         self.after((step, state), moved, self.period(step, state, moved))
     }
 

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use super::Declared;
 use super::formula::{FUNCTIONS, Formula};
+use super::{Action, Declared};
 use crate::control::error::FieldError;
 use crate::control::request::bounds::{whole, within};
 use crate::control::request::centre::CentreSpecification;
-use crate::control::request::declared::{DeclaredProblem, DeclaredSpecification, DeclaredUtility};
+use crate::control::request::declared::{DeclaredAction, DeclaredProblem, DeclaredSpecification, DeclaredUtility};
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::radius_rules::{FIXED_RADIUS, KAPPA};
@@ -20,6 +20,9 @@ use crate::control::request::support::Support;
 
 /// Most states of a problem.
 const MOST_STATES: usize = 6;
+/// Most actions, and most choices of all that have values.
+const MOST_ACTIONS: usize = 3;
+const MOST_CHOICES: usize = 64;
 /// Most parameters.
 const MOST_PARAMETERS: usize = 100;
 /// Largest number that may be declared.
@@ -35,7 +38,7 @@ impl Declared {
     pub fn new(problem: &DeclaredProblem) -> Result<Declared, FieldError> {
         let names = names(problem)?;
         numbers(problem)?;
-        let (states, moved) = (problem.states.len(), problem.states.len() + 2);
+        let (states, moved) = (problem.states.len(), problem.states.len() + problem.actions.len() + 1);
         // A formula may not use what is not known where it is evaluated.
         let at = |last: usize| -> Vec<&str> {
             names
@@ -48,9 +51,9 @@ impl Declared {
         let parse = |field: String, text: &str, names: &[&str]| {
             Formula::parse(text, names).map_err(|fault| FieldError::new(field, text, fault.to_string()))
         };
-        let action = problem.actions.iter().next();
-        let (name, bounds) = action.ok_or_else(|| FieldError::new("problem.actions", "{}", "must have one action"))?;
-        let bound = |end: &str, text: &str| parse(format!("problem.actions.{name}.{end}"), text, &of_state);
+        let action = |(name, action): (&String, &DeclaredAction)| {
+            action.read(name, |end, text| parse(format!("problem.actions.{name}.{end}"), text, &of_state))
+        };
         let next = |state: &String| {
             let field = format!("problem.next.{state}");
             let text =
@@ -80,7 +83,7 @@ impl Declared {
             ranges: problem.states.values().map(|state| [state.low, state.high]).collect(),
             start: problem.states.values().map(|state| state.start).collect(),
             parameters: problem.parameters.values().copied().collect(),
-            bounds: [bound("low", &bounds.low)?, bound("high", &bounds.high)?],
+            actions: problem.actions.iter().map(action).collect::<Result<_, _>>()?,
             next: problem.states.keys().map(next).collect::<Result<_, _>>()?,
             reward: problem.reward.as_deref().map(|text| parse("problem.reward".into(), text, &of_all)).transpose()?,
             end: parse(field.into(), end, &of_state)?,
@@ -127,6 +130,26 @@ impl Declared {
     }
 }
 
+impl DeclaredAction {
+    /// Reads what the action may be; `bound` parses the formula of one end.
+    fn read(
+        &self,
+        name: &str,
+        bound: impl Fn(&str, &str) -> Result<Formula, FieldError>,
+    ) -> Result<Action, FieldError> {
+        match (&self.low, &self.high, &self.values) {
+            (Some(low), Some(high), None) => Ok(Action::Bounds([bound("low", low)?, bound("high", high)?])),
+            (None, None, Some(values)) => Ok(Action::Values(values.clone())),
+            (low, high, values) => {
+                let given = [("low", low.is_some()), ("high", high.is_some()), ("values", values.is_some())];
+                let given: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
+                let rule = "must have `low` and `high`, or `values`";
+                Err(FieldError::new(format!("problem.actions.{name}"), given.join(", "), rule))
+            }
+        }
+    }
+}
+
 impl DeclaredUtility {
     fn specification(&self) -> UtilitySpecification {
         match *self {
@@ -140,7 +163,7 @@ impl DeclaredUtility {
 /// Returns the names that formulas may use, in the order of their values. All are different.
 fn names(problem: &DeclaredProblem) -> Result<Vec<String>, FieldError> {
     counted("problem.states", problem.states.len(), 1, MOST_STATES)?;
-    counted("problem.actions", problem.actions.len(), 1, 1)?;
+    counted("problem.actions", problem.actions.len(), 1, MOST_ACTIONS)?;
     counted("problem.parameters", problem.parameters.len(), 0, MOST_PARAMETERS)?;
     if let Some(unknown) = problem.next.keys().find(|name| !problem.states.contains_key(*name)) {
         return Err(FieldError::new(format!("problem.next.{unknown}"), unknown, "must be the name of a state"));
@@ -182,10 +205,6 @@ fn counted(field: &str, count: usize, least: usize, most: usize) -> Result<(), F
 
 /// Checks the numbers.
 fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
-    let is_number = |field: String, value: f64| match value.abs() <= LARGEST {
-        true => Ok(()),
-        false => Err(FieldError::new(field, value, format!("must be a number from -{LARGEST:e} to {LARGEST:e}"))),
-    };
     let range = |field: String, low: f64, high: f64| {
         is_number(format!("{field}.low"), low)?;
         is_number(format!("{field}.high"), high)?;
@@ -218,6 +237,7 @@ fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
         return Err(FieldError::new("problem.history", found, "must have two different values at least"));
     }
     sizes(problem)?;
+    choices(problem)?;
     for (name, value) in &problem.parameters {
         is_number(format!("problem.parameters.{name}"), *value)?;
     }
@@ -242,6 +262,33 @@ fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
         }
         _ => Ok(()),
     }
+}
+
+fn is_number(field: String, value: f64) -> Result<(), FieldError> {
+    match value.abs() <= LARGEST {
+        true => Ok(()),
+        false => Err(FieldError::new(field, value, format!("must be a number from -{LARGEST:e} to {LARGEST:e}"))),
+    }
+}
+
+/// Checks the actions that have values.
+fn choices(problem: &DeclaredProblem) -> Result<(), FieldError> {
+    let mut choices = 1_usize;
+    for (name, values) in problem.actions.iter().filter_map(|(name, action)| Some((name, action.values.as_ref()?))) {
+        choices = choices.saturating_mul(values.len());
+        let field = format!("problem.actions.{name}.values");
+        if !(1..=MOST_CHOICES).contains(&choices) {
+            let rule = format!("must have 1 to {MOST_CHOICES} numbers, multiplied over all actions that have them");
+            return Err(FieldError::new(field, values.len(), rule));
+        }
+        for (index, value) in values.iter().enumerate() {
+            is_number(format!("{field}[{index}]"), *value)?;
+            if values[..index].contains(value) {
+                return Err(FieldError::new(format!("{field}[{index}]"), *value, "must be there once"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Checks the horizon and the radius, in the unit of the noise.

@@ -3,8 +3,9 @@
 
 use rand::RngExt;
 
-use super::{Declared, EarnedState};
+use super::{Controlled, Declared, EarnedState};
 use crate::control::error::FieldError;
+use crate::control::problem::actions::{ActionInterval, ActionSet};
 use crate::control::request::declared::DeclaredProblem;
 use crate::numerics::machine::streams::stream;
 
@@ -27,20 +28,20 @@ impl Declared {
         for path in 0..paths {
             let mut generator = stream(1, "declared", 0, path);
             // Some paths go one way all the time, and so as far as any.
-            let always =
-                (path % 4 == 1).then(|| [generator.random::<bool>(), generator.random::<bool>()].map(f64::from));
-            let mut place = |end: usize| -> f64 {
+            let mut end = || f64::from(generator.random::<bool>());
+            let always: Option<Vec<f64>> = (path % 4 == 1).then(|| (0..=self.actions.len()).map(|_| end()).collect());
+            let mut place = |index: usize| -> f64 {
                 let even = (1.0 + 2.0 * AT_AN_END) * generator.random::<f64>() - AT_AN_END;
-                always.map_or(even.clamp(0.0, 1.0), |always| always[end])
+                always.as_ref().map_or(even.clamp(0.0, 1.0), |always| always[index])
             };
             let (mut state, mut earned) = (self.start(), Vec::with_capacity(self.horizon));
             for step in 0..self.horizon {
-                let [low, high] = self.checked_bounds(problem, step, &state)?;
-                let action = low + place(0) * (high - low);
-                let noise = self.noise[0] + place(1) * (self.noise[1] - self.noise[0]);
-                let (next, reward) = self.checked_period(problem, step, &state, [action, noise])?;
+                let sets = self.checked_actions(problem, step, &state)?;
+                let actions: Vec<f64> = sets.iter().enumerate().map(|(index, set)| set.at(place(index))).collect();
+                let moved = (actions.as_slice(), self.noise(place(actions.len()) - 0.5));
+                let (next, reward) = self.checked_period(problem, step, &state, moved)?;
                 earned.push(state.earned);
-                state = self.after((step, &state), [action, noise], (next, reward));
+                state = self.after((step, &state), moved, (next, reward));
                 if let Some(fault) = self.left.get() {
                     return Err(fault.clone());
                 }
@@ -52,24 +53,25 @@ impl Declared {
         Ok((if largest > 0.0 { largest } else { 1.0 }, to_come))
     }
 
-    fn checked_bounds(
+    fn checked_actions(
         &self,
         problem: &DeclaredProblem,
         step: usize,
         state: &EarnedState,
-    ) -> Result<[f64; 2], FieldError> {
-        let bounds = self.bounds_at(step, state);
-        let (name, texts) =
-            problem.actions.iter().next().map_or(("", ["", ""]), |(name, bounds)| (name, [&bounds.low, &bounds.high]));
-        let at = || self.point(step, &state.values, &[]);
-        for ((end, text), value) in ["low", "high"].iter().zip(texts).zip(bounds) {
-            self.is_amount(&format!("problem.actions.{name}.{end}"), text, value, &at)?;
+    ) -> Result<Vec<ActionSet>, FieldError> {
+        let sets = Controlled::actions(self, step, state);
+        let at = || self.point(step, &state.values, None);
+        for ((name, action), set) in problem.actions.iter().zip(&sets) {
+            let ActionSet::Interval(ActionInterval { lowest, highest }) = set else { continue };
+            let [low, high] = [&action.low, &action.high].map(|text| text.as_deref().unwrap_or_default());
+            self.is_amount(&format!("problem.actions.{name}.low"), low, *lowest, &at)?;
+            self.is_amount(&format!("problem.actions.{name}.high"), high, *highest, &at)?;
+            if lowest > highest {
+                let rule = format!("must not be below `low`; they are {highest} and {lowest} at {}", at());
+                return Err(FieldError::new(format!("problem.actions.{name}.high"), high, rule));
+            }
         }
-        if bounds[0] > bounds[1] {
-            let rule = format!("must not be below `low`; they are {} and {} at {}", bounds[1], bounds[0], at());
-            return Err(FieldError::new(format!("problem.actions.{name}.high"), texts[1], rule));
-        }
-        Ok(bounds)
+        Ok(sets)
     }
 
     /// Checks the formulas of a period, and returns their values.
@@ -78,9 +80,9 @@ impl Declared {
         problem: &DeclaredProblem,
         step: usize,
         state: &EarnedState,
-        moved: [f64; 2],
+        moved: (&[f64], f64),
     ) -> Result<(Vec<f64>, f64), FieldError> {
-        let at = || self.point(step, &state.values, &moved);
+        let at = || self.point(step, &state.values, Some(moved));
         let (next, reward) = self.period(step, state, moved);
         for ((name, text), value) in problem.next.iter().zip(&next) {
             self.is_amount(&format!("problem.next.{name}"), text, *value, &at)?;
@@ -91,12 +93,12 @@ impl Declared {
 
     /// Checks the end at a state, and returns its size.
     fn checked_end(&self, problem: &DeclaredProblem, step: usize, state: &EarnedState) -> Result<f64, FieldError> {
-        let end = self.at(step, &state.values, [0.0; 2], |value| value(&self.end));
+        let end = self.at(step, &state.values, None, |value| value(&self.end));
         let (field, text) = match &problem.utility {
             Some(utility) => ("problem.utility.of", utility.of()),
             None => ("problem.end", problem.end.as_deref().unwrap_or_default()),
         };
-        let at = || self.point(step, &state.values, &[]);
+        let at = || self.point(step, &state.values, None);
         self.is_amount(field, text, end, &at)?;
         if end <= 0.0 && self.of_ratio(1.0).is_some() {
             return Err(FieldError::new(field, text, format!("must be positive; it is {end} at {}", at())));

@@ -36,6 +36,16 @@ impl Parts {
 
     pub fn one_more(&self) {
         self.bar.inc(1);
+        self.say();
+    }
+
+    /// Shows that so many parts are done.
+    pub fn reached(&self, done: usize) {
+        self.bar.set_position(done as u64);
+        self.say();
+    }
+
+    fn say(&self) {
         let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
         if self.is_terminal || Instant::now() < *next {
             return;
