@@ -202,18 +202,15 @@ impl<'a, P: Controlled> ControlledField<'a, P> {
         let mut table = self.state.table.borrow_mut();
         // A window of returns that grows needs another table.
         if table.as_ref().is_none_or(|table| !table.covers(&self.returns)) {
-            let ControlledStep { laws, selection, .. } = *self.state.step;
-            let summaries = laws.summaries_with(self.state.law, &self.returns);
-            let mut laws: Vec<Features> = summaries.iter().map(|law| selection.of_law(law)).collect();
+            let ControlledStep { laws, selection, problem, .. } = *self.state.step;
+            let of_laws = |returns: &[f64]| -> Vec<Features> {
+                laws.summaries_with(self.state.law, returns).iter().map(|law| selection.of_law(law)).collect()
+            };
             let number = |(actions, log_return): (&Vec<f64>, &f64)| self.described(&self.next(actions, *log_return))[0];
             let reached = self.state.spread.iter().flat_map(|actions| self.returns.iter().map(move |z| (actions, z)));
-            let nodes = value.nodes(&laws[laws.len() / 2].clone().after(vec![0.0]), range(reached.map(number)));
-            if laws.iter().all(|law| *law == laws[0]) {
-                laws.truncate(1);
-            }
-            let returns = self.returns[..laws.len()].to_vec();
-            let floor = if self.state.step.problem.has_floor() { 0.0 } else { f64::NEG_INFINITY };
-            *table = Some(Rc::new(GainTable::new(value, (returns, &laws), nodes, floor)));
+            let floor = if problem.has_floor() { 0.0 } else { f64::NEG_INFINITY };
+            let reached = range(reached.map(number));
+            *table = Some(Rc::new(GainTable::new(value, self.returns.clone(), of_laws, reached, floor)));
         }
         table.clone()
     }

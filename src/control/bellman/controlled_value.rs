@@ -7,9 +7,15 @@ use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::numerics::search::chebyshev::{even, local_cubic};
 
 /// Least and largest number of nodes of a description of one number. They are doubled until cubics predict the gain
-/// halfway between to this share of its range. The value of a stock has kinks, and needs all of them.
+/// halfway between to this share of its range, or to this gain. After the doubling they err by an eighth of that or less.
+/// The value of a stock has kinks, and needs all of them.
 const TABLE_NODES: [usize; 2] = [9, 513];
-const NODE_ERROR: f64 = 1e-5;
+const NODE_ERROR: f64 = 5e-5;
+const LEAST_ERROR: f64 = 3e-7;
+/// Largest number of returns of a table. Between them others are put until cubics predict the gain halfway as well, which
+/// is judged at a few nodes.
+const TABLE_RETURNS: usize = 400;
+const JUDGED_NODES: usize = 3;
 /// Descriptions that differ by no more than this share are one.
 const ROUNDING: f64 = 1e-12;
 /// The gain of a step over its baseline.
@@ -54,7 +60,7 @@ impl ControlledValue {
             let [lowest, highest] = range(gains.iter().copied());
             let halfway = nodes.iter().zip(&gains).skip(1).step_by(2);
             let worst = halfway.map(|(at, gain)| (coarse.gain(*at) - gain).abs()).fold(0.0, f64::max);
-            if worst <= NODE_ERROR * (highest - lowest) {
+            if worst <= (NODE_ERROR * (highest - lowest)).max(LEAST_ERROR) {
                 break;
             }
         }
@@ -72,7 +78,9 @@ pub struct GainNodes {
 
 /// Gains of next states that one number describes.
 pub struct GainTable {
-    /// One, if the law does not change with the return.
+    /// The returns that the table was made for, of which it has more between.
+    coarse: Vec<f64>,
+    /// Those that it has: one, if the law does not change with the return.
     returns: Vec<f64>,
     nodes: Rc<Vec<f64>>,
     /// Return by return, node by node.
@@ -88,17 +96,47 @@ impl GainNodes {
 }
 
 impl GainTable {
-    /// Tabulates the gains of `value` at `nodes` of the description, under the law that follows each return, where they
-    /// are above a floor.
-    pub fn new(value: &ControlledValue, (returns, laws): (Vec<f64>, &[Features]), nodes: Vec<f64>, floor: f64) -> Self {
-        let of_law = |law: &Features| value.gains_along(&law.clone().after(vec![nodes[0]]), &nodes);
-        let gains = laws.iter().flat_map(of_law).map(|gain| gain.max(floor)).collect();
-        GainTable { returns, nodes: Rc::new(nodes), gains }
+    /// Tabulates the gains of `value` over a range of the description, after returns and more between them, whose laws
+    /// have the features `of_laws`. No gain is below the floor.
+    pub fn new(
+        value: &ControlledValue,
+        coarse: Vec<f64>,
+        of_laws: impl Fn(&[f64]) -> Vec<Features>,
+        range: [f64; 2],
+        floor: f64,
+    ) -> Self {
+        let mut laws = of_laws(&coarse);
+        let nodes = value.nodes(&laws[laws.len() / 2].clone().after(vec![0.0]), range);
+        let row = |law: &Features, nodes: &[f64]| value.gains_along(&law.clone().after(vec![nodes[0]]), nodes);
+        let mut returns = coarse.clone();
+        if laws.iter().all(|law| *law == laws[0]) {
+            returns.truncate(1);
+            laws.truncate(1);
+        }
+        let judged: Vec<f64> =
+            (0..JUDGED_NODES).map(|part| nodes[part * (nodes.len() - 1) / (JUDGED_NODES - 1)]).collect();
+        let judged_rows = |laws: &[Features]| laws.iter().flat_map(|law| row(law, &judged)).collect::<Vec<f64>>();
+        let mut known = judged_rows(&laws);
+        while returns.len() > 1 && returns.len() < TABLE_RETURNS {
+            let halfway: Vec<f64> = returns.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+            let between = of_laws(&halfway);
+            let found = judged_rows(&between);
+            let predicted = halfway.iter().flat_map(|at| row_at(&returns, &known, JUDGED_NODES, *at));
+            let worst = predicted.zip(&found).map(|(predicted, found)| (predicted - found).abs()).fold(0.0, f64::max);
+            let [lowest, highest] = self::range(known.iter().chain(&found).copied());
+            (returns, laws) = (alternated(returns, halfway, 1), alternated(laws, between, 1));
+            known = alternated(known, found, JUDGED_NODES);
+            if worst <= (NODE_ERROR * (highest - lowest)).max(LEAST_ERROR) {
+                break;
+            }
+        }
+        let gains = laws.iter().flat_map(|law| row(law, &nodes)).map(|gain| gain.max(floor)).collect();
+        GainTable { coarse, returns, nodes: Rc::new(nodes), gains }
     }
 
     /// Returns true if the table was made for these returns, or does not depend on them.
     pub fn covers(&self, returns: &[f64]) -> bool {
-        self.returns.len() == 1 || self.returns == returns
+        self.returns.len() == 1 || self.coarse == returns
     }
 
     /// Returns the gains after each return.
@@ -109,18 +147,57 @@ impl GainTable {
         }
     }
 
-    /// Returns the gains after one return: local cubics of those tabulated.
     fn row(&self, log_return: f64) -> Rc<GainNodes> {
-        let (first, weights) = local_cubic(&self.returns, log_return);
-        let mut gains = vec![0.0; self.nodes.len()];
-        for (row, weight) in self.gains.chunks_exact(self.nodes.len()).skip(first).zip(weights) {
-            gains.iter_mut().zip(row).for_each(|(sum, gain)| *sum += weight * gain);
-        }
+        let gains = row_at(&self.returns, &self.gains, self.nodes.len(), log_return);
         Rc::new(GainNodes { at: Rc::clone(&self.nodes), gains })
     }
+}
+
+/// Returns the row of a table at one return: local cubics of the rows of `width` gains that it has.
+fn row_at(returns: &[f64], gains: &[f64], width: usize, log_return: f64) -> Vec<f64> {
+    let (first, weights) = local_cubic(returns, log_return);
+    let mut row = vec![0.0; width];
+    for (known, weight) in gains.chunks_exact(width).skip(first).zip(weights) {
+        row.iter_mut().zip(known).for_each(|(sum, gain)| *sum += weight * gain);
+    }
+    row
+}
+
+/// Puts each `width` of `between` after as many of `known`, of which there are one set more.
+fn alternated<T>(known: Vec<T>, between: Vec<T>, width: usize) -> Vec<T> {
+    let (mut known, mut between) = (known.into_iter(), between.into_iter());
+    let mut all = Vec::with_capacity(known.len() + between.len());
+    while known.len() > 0 {
+        all.extend(known.by_ref().take(width));
+        all.extend(between.by_ref().take(width));
+    }
+    all
 }
 
 /// Returns the least and the largest.
 pub fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_with_rows_between_is_exact_for_cubics() {
+        let cubic = |at: f64, node: f64| at.powi(3) - node * at;
+        let rows =
+            |returns: &[f64]| returns.iter().flat_map(|at| [cubic(*at, 1.0), cubic(*at, 2.0)]).collect::<Vec<f64>>();
+        let (returns, halfway) = (vec![-1.0, 0.0, 0.5, 2.0], vec![-0.5, 0.25, 1.25]);
+        let all = alternated(returns.clone(), halfway.clone(), 1);
+        assert_eq!(all, [-1.0, -0.5, 0.0, 0.25, 0.5, 1.25, 2.0]);
+        assert_eq!(alternated(rows(&returns), rows(&halfway), 2), rows(&all));
+        for at in [-1.0, -0.7, 0.1, 1.9] {
+            let row = row_at(&all, &rows(&all), 2, at);
+            assert!(
+                (row[0] - cubic(at, 1.0)).abs() < 1e-12 && (row[1] - cubic(at, 2.0)).abs() < 1e-12,
+                "{at}: {row:?}"
+            );
+        }
+    }
 }
