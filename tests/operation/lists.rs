@@ -72,8 +72,8 @@ const PAGE: Duration = Duration::from_millis(100);
 const PAGE_BESIDE_A_DATABASE: Duration = Duration::from_millis(400);
 /// The time limit of another tenant's list while eight lists at a time read all the sessions.
 const OTHER_LIST: Duration = Duration::from_millis(400);
-/// Sessions that are opened at the same time.
-const AT_ONCE: usize = 24;
+/// Sessions that are opened at the same time. More wait too long for a connection beside other tests.
+const AT_ONCE: usize = 12;
 
 fn sessions() -> usize {
     std::env::var("BALLAST_LISTED_SESSIONS").map_or(SESSIONS, |count| count.parse().expect("a number"))
