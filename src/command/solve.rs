@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use ballast::control::declared_advice::{DeclaredAdvice, NoiseMove};
+use ballast::control::problem::actions::FINE_ACTIONS;
 use ballast::control::progress::{StepProgress, Watch};
 use ballast::control::request::completion::DEFAULT_COUNT;
 use ballast::control::request::declared::DeclaredSpecification;
@@ -30,7 +31,7 @@ pub fn run(arguments: &SolveArgs) -> Result<(), Box<dyn Error>> {
     let declared: DeclaredSpecification = serde_json::from_str(&text).map_err(|error| format!("{file}: {error}"))?;
     let steps = declared.problem.horizon.saturating_sub(1);
     let of_step = declared.design.count.unwrap_or(DEFAULT_COUNT);
-    let states = Parts::new(steps * of_step, "states");
+    let states = Parts::new(steps.saturating_mul(of_step), "states");
     // The steps are solved from the last to the second.
     let progress = |at: StepProgress| states.reached(steps.saturating_sub(at.step) * of_step + at.done);
     let solved = DeclaredAdvice::solve(&declared, &Watch { progress: &progress, ..Watch::unwatched() });
@@ -60,7 +61,8 @@ fn describe(declared: &DeclaredSpecification, advice: &DeclaredAdvice) -> String
     });
     if !advice.several_peaks.is_empty() {
         let named = advice.several_peaks.join(" and ");
-        lines.push(format!("the worth has several peaks along {named}: 65 even values were tried first"));
+        let tried = FINE_ACTIONS + 1;
+        lines.push(format!("the worth has several peaks along {named}: {tried} even values were tried first"));
     }
     let mut moved: Vec<&NoiseMove> = advice.worst_law.iter().filter(|moved| moved.from != moved.to).collect();
     moved.sort_by(|left, right| right.share.total_cmp(&left.share));

@@ -132,7 +132,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         (state, law): (&P::State, &EmpiricalDistribution),
         actions: &[f64],
         place: usize,
-    ) -> Vec<f64> {
+    ) -> Option<Vec<f64>> {
         self.step(step).along(state, law, actions, place)
     }
 
@@ -193,15 +193,12 @@ impl<P: Controlled> Candidates for SimulatedStates<'_, P> {
 
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
         let (state, law) = self.state(index);
-        let ControlledSolution { actions, gain, duality_gap, certified, .. } = self.bellman.solve(&state, &law);
-        let action = actions[0];
-        if !gain.is_finite() || !action.is_finite() {
-            return Err(TrainError::NotFinite { step: self.bellman.step, point: index, gain, action });
-        }
+        let found = self.bellman.solve(&state, &law).finite(self.bellman.step, index)?;
+        let ControlledSolution { actions, gain, duality_gap, certified, .. } = found;
         Ok(DesignPoint {
             wealth: 1.0,
             features,
-            action,
+            action: actions[0],
             floor_gain: gain,
             largest_gain: f64::INFINITY,
             floor_gains: vec![gain],

@@ -10,6 +10,7 @@ use super::error::TrainError;
 use super::problem::declared::Declared;
 use super::progress::Watch;
 use super::request::declared::DeclaredSpecification;
+use crate::numerics::statistics::summary::range;
 
 /// Least share of the mass that is reported as moved.
 const LEAST_MOVED: f64 = 1e-9;
@@ -22,8 +23,8 @@ const DENT: f64 = 0.01;
 pub struct DeclaredAdvice {
     /// The best actions, by name.
     pub actions: BTreeMap<String, f64>,
-    /// Actions along which the worth has several peaks, the others as advised. Of these 65 even ones were tried before
-    /// a search around the best.
+    /// Actions along which the worth has several peaks, the others as advised. Many even ones were tried
+    /// before a search around the best.
     pub several_peaks: Vec<String>,
     /// V at the start: what all periods earn against the worst law. With a utility its certainty equivalent.
     pub value: f64,
@@ -65,13 +66,11 @@ impl DeclaredAdvice {
         let law = specification.problem.learning.law(&specification.problem.history);
         let found = policy.solve(0, &start, &law);
         reached()?;
-        if let Some(&action) = found.actions.iter().find(|action| !action.is_finite() || !found.gain.is_finite()) {
-            return Err(TrainError::NotFinite { step: 0, point: 0, gain: found.gain, action });
-        }
+        let found = found.finite(0, 0)?;
         let [low, high] = [-0.5, 0.5].map(|end| problem.noise(end));
         let names = problem.actions_named();
         let along = |place: usize| policy.along(0, (&start, &law), &found.actions, place);
-        let has_several = |place: &usize| problem.is_interval(*place) && has_several_peaks(&along(*place));
+        let has_several = |place: &usize| along(*place).is_some_and(|worths| has_several_peaks(&worths));
         Ok(DeclaredAdvice {
             actions: names.iter().cloned().zip(found.actions.iter().copied()).collect(),
             several_peaks: (0..names.len()).filter(has_several).map(|place| names[place].clone()).collect(),
@@ -85,9 +84,7 @@ impl DeclaredAdvice {
 
 /// Returns true if values rise again after they fell.
 fn has_several_peaks(values: &[f64]) -> bool {
-    let [least, most] = values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(*value), most.max(*value)]);
+    let [least, most] = range(values.iter().copied());
     // The lower of the highest values on both sides, less the value.
     let mut highest_before = f64::NEG_INFINITY;
     (0..values.len()).any(|place| {

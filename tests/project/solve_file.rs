@@ -48,6 +48,9 @@ fn a_fault_of_the_file_names_the_field() {
     fs::write(&file, read(EXAMPLE).replacen("\"end\"", "\"ending\"", 1)).unwrap();
     let fault = String::from_utf8(solve(&[file.to_str().unwrap()]).stderr).unwrap();
     assert!(fault.contains("unknown field `ending`") && fault.contains("line 9"), "{fault}");
+    fs::write(&file, read(EXAMPLE).replacen("\"horizon\": 12", "\"horizon\": 9000000000000000000", 1)).unwrap();
+    let fault = String::from_utf8(solve(&[file.to_str().unwrap()]).stderr).unwrap();
+    assert!(fault.contains("problem.horizon is 9000000000000000000: must lie in [1, 520]"), "{fault}");
     let absent = String::from_utf8(solve(&["no such file"]).stderr).unwrap();
     assert!(absent.contains("no such file: "), "{absent}");
 }

@@ -2,9 +2,9 @@
 //! beside its own solver.
 
 use std::error::Error;
-use std::time::Instant;
 
 use ballast::control::declared_advice::DeclaredAdvice;
+use ballast::control::error::TrainError;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
@@ -16,7 +16,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::accuracy::BASIS_POINTS;
-use super::summary::median;
+use super::summary::timed;
 
 #[derive(Debug, Args)]
 pub struct DeclaredBench {
@@ -47,7 +47,7 @@ pub fn run(bench: &DeclaredBench) -> Result<(), Box<dyn Error>> {
     println!("{:<12}{:>6}{:>8}{:>10}  first actions", "problem", "T", "states", "seconds");
     for (name, text) in OTHERS.into_iter().chain([("investor", INVESTOR)]) {
         let declared: DeclaredSpecification = serde_json::from_str(text)?;
-        let (seconds, advice) = timed(bench.runs, || pool.install(|| solved(&declared)))?;
+        let (seconds, advice) = timed_result(bench.runs, || pool.install(|| solved(&declared)))?;
         let actions: Vec<String> = advice.actions.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
         let (horizon, count) = (declared.problem.horizon, declared.design.count.unwrap_or_default());
         println!("{name:<12}{horizon:>6}{count:>8}{seconds:>10.2}  {}", actions.join(", "));
@@ -67,8 +67,8 @@ fn beside_the_investor(bench: &DeclaredBench, pool: &TrainingPool) -> Result<(),
         "support": { "rule": "between", "min": problem["noise"]["low"], "max": problem["noise"]["high"] },
         "radius": problem["radius"] },
         "design": { "count": bench.count } }))?;
-    let (in_formulas, advice) = timed(bench.runs, || pool.install(|| solved(&declared)))?;
-    let (by_its_own, investor) = timed(bench.runs, || {
+    let (in_formulas, advice) = timed_result(bench.runs, || pool.install(|| solved(&declared)))?;
+    let (by_its_own, investor) = timed_result(bench.runs, || {
         let training = Training::new(&own)?;
         Ok(Advisor::new(pool.install(|| training.run(&Watch::unwatched()))?))
     })?;
@@ -85,20 +85,13 @@ fn beside_the_investor(bench: &DeclaredBench, pool: &TrainingPool) -> Result<(),
     Ok(())
 }
 
-fn solved(declared: &DeclaredSpecification) -> Result<DeclaredAdvice, Box<dyn Error + Send + Sync>> {
-    Ok(DeclaredAdvice::solve(declared, &Watch::unwatched())?)
+fn solved(declared: &DeclaredSpecification) -> Result<DeclaredAdvice, TrainError> {
+    DeclaredAdvice::solve(declared, &Watch::unwatched())
 }
 
 /// Returns the median of some runs in seconds, and what the last one found.
-fn timed<T>(
-    runs: usize,
-    work: impl Fn() -> Result<T, Box<dyn Error + Send + Sync>>,
-) -> Result<(f64, T), Box<dyn Error>> {
-    let (mut seconds, mut found) = (Vec::new(), None);
-    for _ in 0..runs.max(1) {
-        let started = Instant::now();
-        found = Some(work().map_err(|error| error.to_string())?);
-        seconds.push(started.elapsed().as_secs_f64());
-    }
-    Ok((median(&seconds), found.ok_or("no run")?))
+fn timed_result<T>(runs: usize, work: impl Fn() -> Result<T, TrainError>) -> Result<(f64, T), Box<dyn Error>> {
+    let mut found = None;
+    let seconds = timed(runs, || found = Some(work()));
+    Ok((seconds, found.ok_or("no run")??))
 }

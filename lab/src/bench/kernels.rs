@@ -4,7 +4,6 @@ use std::error::Error;
 use std::hint::black_box;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use ballast::numerics::gp::cholesky::Cholesky;
 use ballast::numerics::gp::fit::{Bounds, fit};
@@ -16,7 +15,7 @@ use nalgebra::DMatrix;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-use super::summary::median;
+use super::summary::timed;
 
 #[derive(Debug, Args)]
 pub struct KernelsBench {
@@ -81,15 +80,6 @@ pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
         println!("inner value at radius {radius}: {:.15}", inner.worst_expectation(radius));
     }
     Ok(())
-}
-
-fn timed(runs: usize, mut work: impl FnMut()) -> f64 {
-    let seconds = |_| {
-        let started = Instant::now();
-        work();
-        started.elapsed().as_secs_f64()
-    };
-    median(&(0..runs.max(1)).map(seconds).collect::<Vec<f64>>())
 }
 
 fn normals(generator: &mut impl Rng, count: usize) -> Vec<f64> {

@@ -1,9 +1,21 @@
 //! Summary figures of a measurement.
 
+use std::time::Instant;
+
 use ballast::numerics::statistics::summary::quantile;
 
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
+}
+
+/// Returns the median of some runs, in seconds.
+pub fn timed(runs: usize, mut work: impl FnMut()) -> f64 {
+    let seconds = |_| {
+        let started = Instant::now();
+        work();
+        started.elapsed().as_secs_f64()
+    };
+    median(&(0..runs.max(1)).map(seconds).collect::<Vec<f64>>())
 }
 
 /// Returns the largest resident memory of this process so far, in MB; `None` if the system does not report it.

@@ -8,9 +8,9 @@
 use crate::control::problem::actions::{ActionInterval, ActionSet};
 use crate::numerics::search::chebyshev::even;
 
-/// Even values of each action, by the number of actions: where a search starts, and over all of which a description of one
-/// number is followed.
-const STARTS: [usize; 3] = [9, 5, 4];
+/// Even values of each action among which a search starts: of two actions, and of more.
+const STARTS: [usize; 2] = [5, 4];
+/// Even values of each action over which a description of one number is followed: of one action, of two, and of more.
 const SPREAD: [usize; 3] = [33, 9, 5];
 /// Rounds of searches along lines.
 const MOST_ROUNDS: usize = 20;
@@ -100,24 +100,20 @@ impl ActionChoices {
         ActionChoices { intervals: sets.into_iter().map(intervals).collect() }
     }
 
-    /// Returns the line of one action over all that it may be, the others as they are given.
-    pub fn axis(&self, actions: &[f64], place: usize) -> ActionLine {
-        let all = &self.intervals[place];
-        let ends = [
-            all.iter().map(|of| of.lowest).fold(f64::INFINITY, f64::min),
-            all.iter().map(|of| of.highest).fold(f64::NEG_INFINITY, f64::max),
-        ];
-        let [from, to] = ends.map(|end| {
+    /// Returns the line of one action over its interval, the others as they are given; `None` if it has none.
+    pub fn axis(&self, actions: &[f64], place: usize) -> Option<ActionLine> {
+        let of = self.intervals[place].iter().find(|of| of.is_open())?;
+        let [from, to] = [of.lowest, of.highest].map(|end| {
             let mut actions = actions.to_vec();
             actions[place] = end;
             actions
         });
-        ActionLine { from, to }
+        Some(ActionLine { from, to })
     }
 
     /// Returns actions spread over all that may be chosen.
     pub fn spread(&self) -> Vec<Vec<f64>> {
-        let count = by_number(SPREAD, self.intervals.len());
+        let count = SPREAD[self.intervals.len().clamp(1, SPREAD.len()) - 1];
         product(self.intervals.iter().map(|of| of.iter().flat_map(|of| of.even(count)).collect::<Vec<f64>>()))
     }
 
@@ -136,10 +132,6 @@ impl ActionInterval {
     fn is_open(self) -> bool {
         self.highest > self.lowest
     }
-}
-
-fn by_number(counts: [usize; 3], number: usize) -> usize {
-    counts[number.clamp(1, counts.len()) - 1]
 }
 
 /// Returns all lists with one element of each of `sets`.
@@ -181,7 +173,7 @@ fn best_of<L: LineSearch>(intervals: &[ActionInterval], lines: &L) -> L::Found {
 
 /// Returns the points from which a search starts: the best of even ones, and the next that is no neighbour of it.
 fn starts(intervals: &[ActionInterval], open: usize, lines: &impl LineSearch) -> (Vec<f64>, Option<Vec<f64>>) {
-    let count = by_number(STARTS, open);
+    let count = STARTS[usize::from(open > 2)];
     let points = product(intervals.iter().map(|of| of.even(count)));
     let mut worths: Vec<(f64, Vec<f64>)> = points.into_iter().map(|point| (lines.roughly(&point), point)).collect();
     worths.sort_by(|left, right| right.0.total_cmp(&left.0));

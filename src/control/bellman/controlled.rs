@@ -10,15 +10,15 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use super::action_search::{ActionChoices, ActionLine, LineSearch, SearchedActions, best_of_all};
-use super::controlled_value::{ControlledValue, GainNodes, GainTable, range};
-use super::field::{Field, Payoffs};
+use super::controlled_value::{ControlledValue, GainNodes, GainTable};
+use super::field::{Field, Payoffs, places};
 use super::solution::Adversary;
 use super::{BestResponse, best_response, pricing};
-use crate::control::problem::actions::ActionInterval;
+use crate::control::error::TrainError;
+use crate::control::problem::actions::{ActionInterval, FINE_ACTIONS};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::surrogate::features::{FeatureSelection, Features};
@@ -26,13 +26,12 @@ use crate::control::uncertainty::laws::Laws;
 use crate::control::uncertainty::{Reach, UncertaintySet};
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::search::chebyshev::even;
+use crate::numerics::statistics::summary::range;
 
 /// Nodes at which gains are predicted if the description of the next state depends on the action. If changing the
 /// description costs, a value has kinks. Cubics are then good to a twentieth of the jump of its second derivative times
 /// the distance's square.
 const EVEN_NODES: usize = 33;
-/// Even actions whose worths show the peaks.
-const SHOWN_ACTIONS: usize = 65;
 
 /// The robust step of a controlled problem at every state of one step.
 pub struct ControlledStep<'a, P> {
@@ -78,12 +77,20 @@ impl<P: Controlled> ControlledStep<'_, P> {
         best_of_all(&at.choices, &at)
     }
 
-    /// Returns the certainty equivalents of even actions, from the lowest to the highest one of the set in a place, the
-    /// others as they are given. They are good enough to show where the peaks are.
-    pub fn along(&self, state: &P::State, law: &EmpiricalDistribution, actions: &[f64], place: usize) -> Vec<f64> {
+    /// Returns the certainty equivalents of the even actions that a search begins with, from the lowest to the highest
+    /// one of the interval in a place, the others as they are given. They are good enough to show where the peaks are.
+    /// `None` if the set in this place is no interval.
+    pub fn along(
+        &self,
+        state: &P::State,
+        law: &EmpiricalDistribution,
+        actions: &[f64],
+        place: usize,
+    ) -> Option<Vec<f64>> {
         let at = self.at(state, law);
-        let line = at.choices.axis(actions, place);
-        even(0.0, 1.0, SHOWN_ACTIONS).into_iter().map(|share| at.roughly(&line.at(1.0 + share))).collect()
+        let line = at.choices.axis(actions, place)?;
+        let worths = at.rough_worths(&line, even(1.0, 2.0, FINE_ACTIONS + 1));
+        Some(worths)
     }
 
     fn at<'a>(&'a self, state: &'a P::State, law: &'a EmpiricalDistribution) -> ControlledState<'a, P> {
@@ -112,6 +119,20 @@ struct ControlledState<'a, P: Controlled> {
     spread: Vec<Vec<f64>>,
     /// Gains for all lines, if the description is one number.
     table: RefCell<Option<Rc<GainTable>>>,
+}
+
+impl ControlledSolution {
+    /// Returns the solution if its actions and its gain are numbers.
+    ///
+    /// # Errors
+    /// [`TrainError::NotFinite`] with the step and the design point.
+    pub fn finite(self, step: usize, point: usize) -> Result<Self, TrainError> {
+        let gain = self.gain;
+        match self.actions.iter().find(|action| !action.is_finite() || !gain.is_finite()) {
+            Some(&action) => Err(TrainError::NotFinite { step, point, gain, action }),
+            None => Ok(self),
+        }
+    }
 }
 
 impl SearchedActions for ControlledSolution {
@@ -153,10 +174,17 @@ impl<P: Controlled> LineSearch for ControlledState<'_, P> {
 
     /// Returns a certainty equivalent.
     fn roughly(&self, actions: &[f64]) -> f64 {
-        let line = ActionLine::point(actions);
-        let field = ControlledField::new(self, &line, self.set.exact_returns(Reach::FIRST));
-        let value = pricing(&self.set, &field).rough_value(Trade { action: 1.0, kept: 1.0 });
-        self.step.problem.certainty_equivalent(value, self.baseline)
+        self.rough_worths(&ActionLine::point(actions), vec![1.0])[0]
+    }
+}
+
+impl<P: Controlled> ControlledState<'_, P> {
+    /// Returns the certainty equivalents at shares of a line, without finding exactly where the worst law puts its mass.
+    fn rough_worths(&self, line: &ActionLine, shares: Vec<f64>) -> Vec<f64> {
+        let field = ControlledField::new(self, line, self.set.exact_returns(Reach::FIRST));
+        let pricing = pricing(&self.set, &field);
+        let certain = |value: f64| self.step.problem.certainty_equivalent(value, self.baseline);
+        shares.into_iter().map(|share| certain(pricing.rough_value(Trade { action: share, kept: 1.0 }))).collect()
     }
 }
 
@@ -166,13 +194,11 @@ struct ControlledField<'a, P: Controlled> {
     line: &'a ActionLine,
     returns: Vec<f64>,
     table: Option<Rc<GainTable>>,
-    /// Gains by the return, without a table.
-    known: RefCell<BTreeMap<u64, Rc<GainNodes>>>,
 }
 
 impl<'a, P: Controlled> ControlledField<'a, P> {
     fn new(state: &'a ControlledState<'a, P>, line: &'a ActionLine, returns: Vec<f64>) -> Self {
-        let mut field = ControlledField { state, line, returns, table: None, known: RefCell::default() };
+        let mut field = ControlledField { state, line, returns, table: None };
         field.table = field.tabulated();
         field
     }
@@ -191,9 +217,9 @@ impl<'a, P: Controlled> ControlledField<'a, P> {
         problem.utility(worth, self.state.baseline)
     }
 
-    /// Returns a gain as it counts: a floor cannot be lost.
-    fn kept(&self, gain: f64) -> f64 {
-        if self.state.step.problem.has_floor() { gain.max(0.0) } else { gain }
+    /// Returns the least gain: a floor cannot be lost.
+    fn least_gain(&self) -> f64 {
+        if self.state.step.problem.has_floor() { 0.0 } else { f64::NEG_INFINITY }
     }
 
     /// Returns the gains for all lines, if one number describes the next state.
@@ -202,15 +228,14 @@ impl<'a, P: Controlled> ControlledField<'a, P> {
         let mut table = self.state.table.borrow_mut();
         // A window of returns that grows needs another table.
         if table.as_ref().is_none_or(|table| !table.covers(&self.returns)) {
-            let ControlledStep { laws, selection, problem, .. } = *self.state.step;
+            let ControlledStep { laws, selection, .. } = *self.state.step;
             let of_laws = |returns: &[f64]| -> Vec<Features> {
                 laws.summaries_with(self.state.law, returns).iter().map(|law| selection.of_law(law)).collect()
             };
             let number = |(actions, log_return): (&Vec<f64>, &f64)| self.described(&self.next(actions, *log_return))[0];
             let reached = self.state.spread.iter().flat_map(|actions| self.returns.iter().map(move |z| (actions, z)));
-            let floor = if problem.has_floor() { 0.0 } else { f64::NEG_INFINITY };
-            let reached = range(reached.map(number));
-            *table = Some(Rc::new(GainTable::new(value, self.returns.clone(), of_laws, reached, floor)));
+            let (returns, reached) = (self.returns.clone(), range(reached.map(number)));
+            *table = Some(Rc::new(GainTable::new(value, returns, of_laws, reached, self.least_gain())));
         }
         table.clone()
     }
@@ -222,14 +247,9 @@ impl<'a, P: Controlled> ControlledField<'a, P> {
         if let Some(table) = &self.table {
             return table.rows(returns);
         }
-        let mut known = self.known.borrow_mut();
-        let unknown = returns.iter().copied().filter(|log_return| !known.contains_key(&log_return.to_bits()));
-        let unknown: Vec<f64> = unknown.collect();
-        for (law, &log_return) in laws.summaries_with(self.state.law, &unknown).iter().zip(&unknown) {
-            let nodes = self.nodes(value, &selection.of_law(law), log_return);
-            known.insert(log_return.to_bits(), Rc::new(nodes));
-        }
-        returns.iter().map(|log_return| Rc::clone(&known[&log_return.to_bits()])).collect()
+        let summaries = laws.summaries_with(self.state.law, returns);
+        let nodes = |(law, log_return)| Rc::new(self.nodes(value, &selection.of_law(law), log_return));
+        summaries.iter().zip(returns.iter().copied()).map(nodes).collect()
     }
 
     /// Returns the gains after one return along the line.
@@ -240,7 +260,7 @@ impl<'a, P: Controlled> ControlledField<'a, P> {
         if descriptions.iter().all(|described| *described == descriptions[0]) {
             at.truncate(1);
         }
-        let gain = |described: Vec<f64>| self.kept(value.gain(&law.clone().after(described)));
+        let gain = |described: Vec<f64>| value.gain(&law.clone().after(described)).max(self.least_gain());
         GainNodes { gains: descriptions.into_iter().take(at.len()).map(gain).collect(), at: Rc::new(at) }
     }
 }
@@ -275,7 +295,13 @@ struct ControlledRows<'f, P: Controlled> {
 
 impl<'f, P: Controlled> Payoffs<'f> for ControlledRows<'f, P> {
     fn moved_to(&self, returns: &[f64]) -> Box<dyn Payoffs<'f> + 'f> {
-        self.field.at(returns)
+        let places = places(&self.returns, returns);
+        let unknown = returns.iter().zip(&places).filter(|(_, place)| place.is_none());
+        let unknown: Vec<f64> = unknown.map(|(log_return, _)| *log_return).collect();
+        let mut computed = self.field.gains(&unknown).into_iter();
+        let known = |place: usize| self.gains.get(place).cloned();
+        let gains = places.iter().filter_map(|place| place.map_or_else(|| computed.next(), known)).collect();
+        Box::new(ControlledRows { field: self.field, returns: returns.to_vec(), gains })
     }
 
     fn payoff(&self, trade: Trade) -> Vec<f64> {

@@ -5,6 +5,7 @@ use std::rc::Rc;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::numerics::search::chebyshev::{even, local_cubic};
+use crate::numerics::statistics::summary::range;
 
 /// Least and largest number of nodes of a description of one number. They are doubled until cubics predict the gain
 /// halfway between to this share of its range, or to this gain. After the doubling they err by an eighth of that or less.
@@ -57,10 +58,9 @@ impl ControlledValue {
             let coarse = GainNodes { at: Rc::new(nodes), gains };
             nodes = even(low, high, 2 * coarse.at.len() - 1);
             gains = self.gains_along(features, &nodes);
-            let [lowest, highest] = range(gains.iter().copied());
             let halfway = nodes.iter().zip(&gains).skip(1).step_by(2);
             let worst = halfway.map(|(at, gain)| (coarse.gain(*at) - gain).abs()).fold(0.0, f64::max);
-            if worst <= (NODE_ERROR * (highest - lowest)).max(LEAST_ERROR) {
+            if suffices(worst, &gains) {
                 break;
             }
         }
@@ -78,9 +78,7 @@ pub struct GainNodes {
 
 /// Gains of next states that one number describes.
 pub struct GainTable {
-    /// The returns that the table was made for, of which it has more between.
-    coarse: Vec<f64>,
-    /// Those that it has: one, if the law does not change with the return.
+    /// One, if the law does not change with the return.
     returns: Vec<f64>,
     nodes: Rc<Vec<f64>>,
     /// Return by return, node by node.
@@ -100,15 +98,14 @@ impl GainTable {
     /// have the features `of_laws`. No gain is below the floor.
     pub fn new(
         value: &ControlledValue,
-        coarse: Vec<f64>,
+        mut returns: Vec<f64>,
         of_laws: impl Fn(&[f64]) -> Vec<Features>,
-        range: [f64; 2],
+        reached: [f64; 2],
         floor: f64,
     ) -> Self {
-        let mut laws = of_laws(&coarse);
-        let nodes = value.nodes(&laws[laws.len() / 2].clone().after(vec![0.0]), range);
+        let mut laws = of_laws(&returns);
+        let nodes = value.nodes(&laws[laws.len() / 2].clone().after(vec![0.0]), reached);
         let row = |law: &Features, nodes: &[f64]| value.gains_along(&law.clone().after(vec![nodes[0]]), nodes);
-        let mut returns = coarse.clone();
         if laws.iter().all(|law| *law == laws[0]) {
             returns.truncate(1);
             laws.truncate(1);
@@ -123,20 +120,19 @@ impl GainTable {
             let found = judged_rows(&between);
             let predicted = halfway.iter().flat_map(|at| row_at(&returns, &known, JUDGED_NODES, *at));
             let worst = predicted.zip(&found).map(|(predicted, found)| (predicted - found).abs()).fold(0.0, f64::max);
-            let [lowest, highest] = self::range(known.iter().chain(&found).copied());
             (returns, laws) = (alternated(returns, halfway, 1), alternated(laws, between, 1));
             known = alternated(known, found, JUDGED_NODES);
-            if worst <= (NODE_ERROR * (highest - lowest)).max(LEAST_ERROR) {
+            if suffices(worst, &known) {
                 break;
             }
         }
         let gains = laws.iter().flat_map(|law| row(law, &nodes)).map(|gain| gain.max(floor)).collect();
-        GainTable { coarse, returns, nodes: Rc::new(nodes), gains }
+        GainTable { returns, nodes: Rc::new(nodes), gains }
     }
 
-    /// Returns true if the table was made for these returns, or does not depend on them.
+    /// Returns true if the table ends where these returns do, or does not depend on them.
     pub fn covers(&self, returns: &[f64]) -> bool {
-        self.returns.len() == 1 || self.coarse == returns
+        self.returns.len() == 1 || [self.returns.first(), self.returns.last()] == [returns.first(), returns.last()]
     }
 
     /// Returns the gains after each return.
@@ -151,6 +147,12 @@ impl GainTable {
         let gains = row_at(&self.returns, &self.gains, self.nodes.len(), log_return);
         Rc::new(GainNodes { at: Rc::clone(&self.nodes), gains })
     }
+}
+
+/// Returns true if cubics that were off by `worst` before a doubling need no other. `gains` are all that are known.
+fn suffices(worst: f64, gains: &[f64]) -> bool {
+    let [lowest, highest] = range(gains.iter().copied());
+    worst <= (NODE_ERROR * (highest - lowest)).max(LEAST_ERROR)
 }
 
 /// Returns the row of a table at one return: local cubics of the rows of `width` gains that it has.
@@ -172,11 +174,6 @@ fn alternated<T>(known: Vec<T>, between: Vec<T>, width: usize) -> Vec<T> {
         all.extend(between.by_ref().take(width));
     }
     all
-}
-
-/// Returns the least and the largest.
-pub fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 #[cfg(test)]

@@ -16,7 +16,8 @@ use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::ProblemSpecification;
-use crate::numerics::statistics::summary::{Clustered, Estimate, interpolated_quantile};
+use crate::numerics::search::chebyshev::even;
+use crate::numerics::statistics::summary::{Clustered, Estimate, interpolated_quantile, range};
 
 /// Number of bins of the histograms.
 const BINS: usize = 40;
@@ -89,9 +90,8 @@ impl Costs {
 
 /// Returns the edges of [`BINS`] even bins from the smallest value to the largest.
 fn edges(values: &[Vec<f64>]) -> Vec<f64> {
-    let all = || values.iter().flatten().copied();
-    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
-    (0..=BINS).map(|bin| low + (high - low) * bin as f64 / BINS as f64).collect()
+    let [low, high] = range(values.iter().flatten().copied());
+    even(low, high, BINS + 1)
 }
 
 /// Counts the values in each bin between even edges.

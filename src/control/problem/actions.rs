@@ -9,7 +9,7 @@ const COARSE_ACTIONS: usize = 8;
 /// Number of falls in a row after which no further action is tried.
 const FALLS: usize = 2;
 /// Equal parts that are all tried if values are not concave.
-const FINE_ACTIONS: usize = 64;
+pub const FINE_ACTIONS: usize = 64;
 
 /// A closed interval of actions. An investor's are shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,10 +41,10 @@ pub struct Band {
 }
 
 impl ActionSet {
-    /// Returns the action at a share of the set, from 0 to 1.
+    /// Returns the action at a share of the set, from 0 to 1. An interval whose ends are in the wrong order is its lowest.
     pub fn at(&self, share: f64) -> f64 {
         match self {
-            ActionSet::Interval(ActionInterval { lowest, highest }) => lowest + (highest - lowest) * share,
+            ActionSet::Interval(ActionInterval { lowest, highest }) => lowest + (highest - lowest).max(0.0) * share,
             ActionSet::Values(values) => values[((values.len() as f64 * share) as usize).min(values.len() - 1)],
         }
     }

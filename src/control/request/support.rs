@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::numerics::statistics::summary::range;
+
 /// Number of standard deviations on either side of the mean that `worst_seen` always includes, however calm the
 /// extremes seen.
 pub const LEAST_DEVIATIONS: f64 = 5.0;
@@ -68,8 +70,7 @@ impl LawExtent {
         let count = log_returns.clone().count().max(1) as f64;
         let mean = log_returns.clone().sum::<f64>() / count;
         let variance = log_returns.clone().map(|z| (z - mean).powi(2)).sum::<f64>() / count;
-        let ends = [log_returns.clone().fold(f64::INFINITY, f64::min), log_returns.fold(f64::NEG_INFINITY, f64::max)];
-        LawExtent { ends, mean, variance }
+        LawExtent { ends: range(log_returns), mean, variance }
     }
 }
 

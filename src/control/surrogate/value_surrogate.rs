@@ -7,6 +7,7 @@ use super::target::TargetMap;
 use crate::control::problem::holdings::Holdings;
 use crate::control::request::specification::Specification;
 use crate::numerics::gp::GpMean;
+use crate::numerics::statistics::summary::range;
 
 /// A Gaussian process of one or more functions of the inputs. The prediction of each at scaled input x is
 ///
@@ -118,8 +119,7 @@ impl ValueSurrogate {
 
 /// Returns the ends of an input whose values at the design points are `column`.
 fn reach(column: &[f64]) -> [f64; 2] {
-    let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let [low, high] = range(column.iter().copied());
     let beyond = REACH * (high - low);
     [low - beyond, high + beyond]
 }

@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::numerics::gp::GpMean;
 use crate::numerics::gp::matern;
+use crate::numerics::statistics::summary::range;
 
 /// Largest distance between the points, in length scales, over which the mean is interpolated.
 const LONGEST: f64 = 0.5;
@@ -25,8 +26,8 @@ impl GpMean {
         self.squared_distances(query, 1..query.len(), &mut others);
         let column = &self.inputs.as_slice()[..n];
         let points: Vec<f64> = firsts.iter().map(|first| first / self.lengthscales[0]).collect();
-        let low = points.iter().copied().fold(f64::INFINITY, f64::min);
-        let distance = points.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+        let [low, high] = range(points.iter().copied());
+        let distance = high - low;
         let interpolates = points.len() > PLACES.len() && distance > 0.0 && distance <= LONGEST;
         let mut means = Vec::with_capacity(points.len() * self.weights.len());
         if !interpolates {

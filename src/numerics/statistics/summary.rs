@@ -13,6 +13,11 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
 }
 
+/// Returns the least and the largest value; infinities in the wrong order if there is none.
+pub fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
 /// Returns the quantile of ascending, non-empty `sorted` by linear interpolation of order statistics (Hyndman and Fan,
 /// type 7).
 pub fn interpolated_quantile(sorted: &[f64], share: f64) -> f64 {

@@ -85,11 +85,6 @@ impl Declared {
         &self.names[self.ranges.len()..][..self.actions.len()]
     }
 
-    /// Returns true if the action in a place may be any number between its bounds.
-    pub fn is_interval(&self, place: usize) -> bool {
-        matches!(self.actions[place], Action::Bounds(_))
-    }
-
     /// Returns the noise in its own unit from that of the solver.
     pub fn noise(&self, scaled: f64) -> f64 {
         let [low, high] = self.noise;
