@@ -142,7 +142,15 @@ test("who gets what is shown before, and what came of it after", async () => {
   assert.match(before[2], /^Ada \w+ 1 1\.20 % to 2020-10-31$/);
   assert.match(before[4], new RegExp(`^${short(sessions[4])} 1 -0\\.50 % to 2020-10-31$`));
   await page.getByText("2 active sessions have no line").click();
-  assert.equal(await page.locator("details[open] a").count(), 2);
+  // A list is built once it is unfolded, and stays so while the lines change.
+  const left = page.locator("details[open] a");
+  await left.nth(1).waitFor();
+  assert.equal(await left.count(), 2);
+  for (const [typed, shown] of [["-0,75", "\u22120.75 %"], ["-0,5", "\u22120.50 %"]]) {
+    await page.getByLabel("Return of the others, %").fill(typed);
+    await page.getByRole("table", { name: "Returns to report" }).getByText(shown).waitFor();
+    await left.nth(1).waitFor();
+  }
   await page.getByRole("button", { name: "Report for 3" }).click();
   await page.getByRole("heading", { name: "Results" }).waitFor();
   const told = await rows("Outcomes");

@@ -104,7 +104,10 @@ function reporting(sessions, chosen, leaving) {
     button.disabled = ready === 0 || isOpen;
     button.textContent = ready === 0 ? "Report" : `Report for ${count(ready)}`;
     standing.replaceChildren(rows.length > 0 ? looked(rows, ready) : "");
-    preview.replaceChildren(rows.length > 0 ? section("What will be reported", leftOut(read.unread), withoutLine(sessions, rows), previewed(rows)) : "");
+    const isUnfolded = preview.querySelector("details")?.open === true;
+    const missing = withoutLine(sessions, rows);
+    if (missing !== "") missing.open = isUnfolded;
+    preview.replaceChildren(rows.length > 0 ? section("What will be reported", leftOut(read.unread), missing, previewed(rows)) : "");
     const unknown = [...new Set(rows.flatMap(({ entry }) => (entry && policies.of(entry.policy) === undefined ? [entry.policy] : [])))];
     if (unknown.length > 0) policies.read(unknown).then((found) => found.length > 0 && look(), (error) => leaving.aborted || say(error.message));
   };
