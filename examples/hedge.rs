@@ -117,7 +117,7 @@ fn by_the_library(seller: &Seller) -> Result<(f64, f64), Box<dyn Error>> {
     }))?;
     let start = Book { price: PRICE, wealth: 0.0, shares: 0.0 };
     let policy = ControlledPolicy::train(seller, &start, &specification, &Watch::unwatched())?;
-    let found = policy.solve(0, &start, &EmpiricalDistribution::new(&HISTORY));
+    let found = policy.step(seller, 0).solve(&start, &EmpiricalDistribution::new(&HISTORY));
     Ok((found.certainty_equivalent, found.actions[0]))
 }
 

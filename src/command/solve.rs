@@ -4,7 +4,9 @@ use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
 
-use ballast::control::declared_advice::{DeclaredAdvice, NoiseMove};
+use ballast::control::cache::Cache;
+use ballast::control::declared_training::DeclaredTraining;
+use ballast::control::policy::declared::{Decided, NoiseMove};
 use ballast::control::problem::actions::FINE_ACTIONS;
 use ballast::control::progress::{StepProgress, Watch};
 use ballast::control::request::completion::DEFAULT_COUNT;
@@ -29,42 +31,51 @@ pub fn run(arguments: &SolveArgs) -> Result<(), Box<dyn Error>> {
     let file = arguments.problem.display();
     let text = fs::read_to_string(&arguments.problem).map_err(|error| format!("{file}: {error}"))?;
     let declared: DeclaredSpecification = serde_json::from_str(&text).map_err(|error| format!("{file}: {error}"))?;
+    for warning in DeclaredTraining::with(&declared, Cache::default())?.warnings() {
+        eprintln!("warning: {}", warning.message);
+    }
     let steps = declared.problem.horizon.saturating_sub(1);
     let of_step = declared.design.count.unwrap_or(DEFAULT_COUNT);
     let states = Parts::new(steps.saturating_mul(of_step), "states");
     // The steps are solved from the last to the second.
     let progress = |at: StepProgress| states.reached(steps.saturating_sub(at.step) * of_step + at.done);
-    let solved = DeclaredAdvice::solve(&declared, &Watch { progress: &progress, ..Watch::unwatched() });
+    let decided = Decided::first(&declared, &Watch { progress: &progress, ..Watch::unwatched() });
     states.finish();
-    let advice = solved?;
+    let first = decided?;
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&advice)?);
+        println!("{}", serde_json::to_string_pretty(&first)?);
     } else {
-        print!("{}", describe(&declared, &advice));
+        print!("{}", describe(&declared, &first));
     }
     Ok(())
 }
 
-fn describe(declared: &DeclaredSpecification, advice: &DeclaredAdvice) -> String {
+fn describe(declared: &DeclaredSpecification, first: &Decided) -> String {
     let problem = &declared.problem;
     let noise = &problem.noise.name;
     let mut lines: Vec<String> =
-        advice.actions.iter().map(|(name, value)| format!("{name}: {}", number(*value))).collect();
-    lines.push(format!("worth over {} periods: {}", problem.horizon, number(advice.value)));
-    lines.push(match advice.radius > 0.0 {
+        first.actions.iter().map(|(name, value)| format!("{name}: {}", number(*value))).collect();
+    lines.push(format!("worth over {} periods: {}", problem.horizon, number(first.value)));
+    lines.push(match first.radius > 0.0 {
         true => format!(
             "against every law of {noise} within {} of the {} seen",
-            number(advice.radius),
+            number(first.radius),
             problem.history.len()
         ),
         false => format!("under the law of the {} seen", problem.history.len()),
     });
-    if !advice.several_peaks.is_empty() {
-        let named = advice.several_peaks.join(" and ");
+    if !first.several_peaks.is_empty() {
+        let named = first.several_peaks.join(" and ");
         let tried = FINE_ACTIONS + 1;
         lines.push(format!("the worth has several peaks along {named}: {tried} even values were tried first"));
     }
-    let mut moved: Vec<&NoiseMove> = advice.worst_law.iter().filter(|moved| moved.from != moved.to).collect();
+    if first.untrained_share > 0.0 {
+        let share = 100.0 * first.untrained_share;
+        lines.push(format!(
+            "{share:.0} % of the outcomes lie beyond the states that were solved: their worth is a guess"
+        ));
+    }
+    let mut moved: Vec<&NoiseMove> = first.worst_law.iter().filter(|moved| moved.from != moved.to).collect();
     moved.sort_by(|left, right| right.share.total_cmp(&left.share));
     if !moved.is_empty() {
         lines.push(format!("the worst law of the first {noise} moves"));

@@ -3,6 +3,10 @@
 //! Upper estimates from the sizes in a request alone. Every large object of a training is in one of a few classes; the
 //! constants below are the bytes of one of each, found by counting allocator requests. Checked by: `tests/estimates.rs`.
 
+pub mod declared;
+mod footprint;
+
+pub use self::footprint::Footprint;
 use super::bellman::problem::Problem;
 use super::evaluation::assets::AssetsBacktest;
 use super::evaluation::backtest::Backtest;
@@ -53,50 +57,6 @@ const SHARE_BYTES: usize = 160;
 const RESAMPLED_VALUES: usize = 4096;
 /// Least bytes of any job.
 const LEAST: usize = 8 << 20;
-
-/// Bytes by the field of the request that causes them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Footprint {
-    parts: Vec<Demand>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-struct Demand {
-    field: &'static str,
-    value: usize,
-    bytes: usize,
-}
-
-impl Footprint {
-    /// Builds the footprint of one field, whose value `value` causes so many bytes.
-    pub fn of(field: &'static str, value: usize, bytes: usize) -> Self {
-        Footprint { parts: vec![Demand { field, value, bytes }] }
-    }
-
-    fn and(mut self, field: &'static str, value: usize, bytes: usize) -> Self {
-        self.parts.push(Demand { field, value, bytes });
-        self
-    }
-
-    /// Returns the bytes in all.
-    pub fn bytes(&self) -> usize {
-        self.parts.iter().fold(0, |sum, part| sum.saturating_add(part.bytes))
-    }
-
-    fn most(&self) -> Option<&Demand> {
-        self.parts.iter().max_by_key(|part| part.bytes)
-    }
-
-    /// Returns the field that causes most bytes.
-    pub fn field(&self) -> &'static str {
-        self.most().map_or("", |part| part.field)
-    }
-
-    /// Returns the value of that field.
-    pub fn value(&self) -> usize {
-        self.most().map_or(0, |part| part.value)
-    }
-}
 
 /// The sizes that determine the memory of a training.
 struct Sizes {
@@ -173,10 +133,14 @@ impl Sizes {
 pub fn training(specification: &Specification, threads: usize) -> Footprint {
     let sizes = Sizes::of(specification);
     let fund = specification.fund.as_ref().map_or(0, |fund| joint_bytes(fund.history.len()));
-    let solving = sizes.solving(threads).saturating_add(LEAST).saturating_add(fund);
+    footprint(&sizes, sizes.solving(threads).saturating_add(LEAST).saturating_add(fund), threads)
+}
+
+/// Returns the footprint of a training of these sizes, of which `solving` bytes grow with the history.
+fn footprint(sizes: &Sizes, solving: usize, threads: usize) -> Footprint {
     Footprint::of("design.count", sizes.count, sizes.fit())
         .and("problem.horizon", sizes.horizon, sizes.policy())
-        .and("problem.radius.paths", sizes.paths, training_keeps(&sizes).saturating_add(sizes.statistics(threads)))
+        .and("problem.radius.paths", sizes.paths, training_keeps(sizes).saturating_add(sizes.statistics(threads)))
         .and("problem.history", sizes.history, solving)
 }
 
@@ -192,7 +156,10 @@ fn training_keeps(sizes: &Sizes) -> usize {
 /// Returns the footprints of the data that must stay in memory to advise by a policy trained from a completed
 /// specification.
 pub fn advising(specification: &Specification) -> [Footprint; 3] {
-    let sizes = Sizes::of(specification);
+    advising_of(&Sizes::of(specification))
+}
+
+fn advising_of(sizes: &Sizes) -> [Footprint; 3] {
     [
         Footprint::of("design.count", sizes.count, sizes.factor()),
         Footprint::of("problem.radius.paths", sizes.paths, sizes.bridges),

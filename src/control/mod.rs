@@ -39,8 +39,9 @@
 //!
 //! - `request`, `error`: a request comes in, and one of its fields may be rejected;
 //! - `training`, `progress`, `solved_step`: it is solved step by step, with the progress and the result of each step;
-//!   `controlled_training` does so for any controlled problem, and no higher floor needs it;
+//!   `controlled_training` does so for any controlled problem, and `declared_training` for one declared in formulas;
 //! - `policy`, `problem`: the document answers in a state;
+//! - `posed`, `policy_document`: a problem of either kind, and its policy;
 //! - `evaluation`: strategies are compared;
 //! - `estimate`, `kept`, `pool`: the cost of work, and the memory and threads that its caller lends.
 //!
@@ -57,12 +58,14 @@ pub mod bellman;
 pub mod cache;
 pub mod caution;
 pub mod controlled_training;
-pub mod declared_advice;
+pub mod declared_training;
 pub mod error;
 pub mod estimate;
 pub mod evaluation;
 pub mod policy;
+pub mod policy_document;
 pub mod pool;
+pub mod posed;
 pub mod problem;
 pub mod progress;
 pub mod request;

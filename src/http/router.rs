@@ -24,8 +24,8 @@ use crate::http::gate::bodies::{self, Bodies};
 use crate::http::gate::hosts::Hosts;
 use crate::http::gate::telemetry;
 use crate::http::routes::{
-    advise, audit, backtests, evaluations, events, frontiers, holder, jobs, labels, operations, overview, policies,
-    reports, returns, sessions, what_if, wire,
+    advise, audit, backtests, decide, evaluations, events, frontiers, holder, jobs, labels, operations, overview,
+    policies, reports, returns, sessions, what_if, wire,
 };
 use crate::http::site::{dashboard, guide};
 use crate::service::Service;
@@ -77,6 +77,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
         .routes(routes!(advise::advise))
+        .routes(routes!(decide::decide))
         .routes(routes!(returns::read))
         .routes(routes!(holder::get))
 }

@@ -4,10 +4,11 @@ use super::sessions::SessionStart;
 use crate::control::request::assets::{MOST_ASSETS, NAME_LENGTH};
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::radius_rules::{FIXED_RADIUS, RADIUS_SCALE};
-use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURNS, RATE, SHARES, SIMPLE_RETURNS, WEALTH};
+use crate::control::request::rules::{HISTORY_LENGTH, HORIZON, LOG_RETURNS, RATE, SHARES, SIMPLE_RETURNS, WEALTH};
 use crate::returns::MOST_BYTES;
 use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
+use crate::service::advice::decide::Decide;
 use crate::service::advice::returns::ReadReturns;
 use crate::service::advice::what_if::{POINTS, SweepRange, WhatIf};
 use crate::service::entries::report::{
@@ -105,6 +106,14 @@ impl Bounded for Advise {
 
 impl Bounded for AdviseAssets {
     const BOUNDS: &'static [FieldBounds] = &[("wealth", WEALTHS), ("holdings", ValueBounds::ByAsset(&SHARES))];
+}
+
+impl Bounded for Decide {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("policy", GIVEN),
+        ("period", ValueBounds::count(&HORIZON)),
+        ("noises", ValueBounds::List(0, *HORIZON.end() - 1, &ValueBounds::Any)),
+    ];
 }
 
 impl Bounded for ReadReturns {

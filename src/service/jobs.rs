@@ -4,6 +4,7 @@
 //! sessions.
 
 pub(super) mod due;
+mod evaluating;
 pub(super) mod idempotency;
 pub mod progress;
 pub mod renewer;
@@ -19,11 +20,12 @@ use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::policy::content_hash;
+use crate::control::posed::{Completed, Posed};
 use crate::control::request::backtest_assets::BacktestQuestion;
-use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
+use crate::service::callers::fair_queue::FairQueue;
 use crate::service::callers::identity;
 use crate::service::callers::keys::Caller;
 use crate::service::jobs::progress::{ProgressBoard, RunningProgress};
@@ -71,13 +73,15 @@ pub struct Jobs {
     clock: Clock,
     board: Arc<ProgressBoard>,
     memory: Memory,
+    /// The queue for reading the problems of trainings.
+    reading: FairQueue,
     /// Threads that a job here runs on.
     threads: usize,
 }
 
 impl Jobs {
-    pub(super) fn new(store: Store, clock: Clock, memory: Memory, threads: usize) -> Self {
-        Jobs { store, clock, board: Arc::new(ProgressBoard::new()), memory, threads }
+    pub(super) fn new(store: Store, clock: Clock, memory: Memory, reading: FairQueue, threads: usize) -> Self {
+        Jobs { store, clock, board: Arc::new(ProgressBoard::new()), memory, reading, threads }
     }
 
     pub(super) fn board(&self) -> Arc<ProgressBoard> {
@@ -92,15 +96,19 @@ impl Jobs {
     pub async fn train(
         &self,
         caller: &Caller,
-        specification: Specification,
+        posed: Posed,
         labels: Relabel,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
         labels.check()?;
-        let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
-        let by = (&caller.tenant, caller.actor());
-        let (job, completed) = self.queue_training(by, specification, labels, &sent, key).await?;
-        Ok(Accepted { job, warnings: completed.problem.warnings() })
+        let sent = serde_json::to_vec(&posed).map_err(ServiceError::internal)?;
+        let jobs = self.clone();
+        // Formulas are tried at many points.
+        let (completed, warnings) = self.reading.run(&caller.tenant, move || jobs.admitted(posed)).await??;
+        let steps_total = completed.step_count();
+        let request = QueuedRequest { kind: JobKind::Train, sent: &sent, completed: &completed, steps_total, labels };
+        let job = self.queue((&caller.tenant, caller.actor()), request, key).await?;
+        Ok(Accepted { job, warnings })
     }
 
     /// Finds or queues the training that a session requests. All sessions of a tenant that need one policy share its
@@ -115,8 +123,8 @@ impl Jobs {
         labels: Relabel,
         request: TrainingRequest,
     ) -> Result<SessionTraining, ServiceError> {
-        let completed = self.admitted(specification)?;
-        let (key, steps_total) = (request.key(), completed.problem.horizon);
+        let (completed, _) = self.admitted(Posed::Investor(specification.into()))?;
+        let (key, steps_total) = (request.key(), completed.step_count());
         let sent = key.as_bytes();
         let training = QueuedRequest { kind: JobKind::Train, sent, completed: &completed, steps_total, labels };
         let new = self.new_job(tenant, training, None)?;
@@ -140,46 +148,12 @@ impl Jobs {
         Ok(())
     }
 
-    async fn queue_training(
-        &self,
-        of: (&Tenant, Actor),
-        specification: Specification,
-        labels: Relabel,
-        sent: &[u8],
-        key: Option<String>,
-    ) -> Result<(TrackedJob, Specification), ServiceError> {
-        let completed = self.admitted(specification)?;
-        let steps = completed.problem.horizon;
-        let request = QueuedRequest { kind: JobKind::Train, sent, completed: &completed, steps_total: steps, labels };
-        Ok((self.queue(of, request, key).await?, completed))
-    }
-
-    /// Completes a specification, if there is memory to train its policy and to advise by it.
-    fn admitted(&self, specification: Specification) -> Result<Specification, ServiceError> {
-        let completed = specification.completed()?;
-        self.memory.admits(&estimate::training(&completed, self.threads))?;
-        self.memory.keeps(&estimate::advising(&completed))?;
-        Ok(completed)
-    }
-
-    /// Queues an evaluation of policies that the caller has checked. The same key and request again return the same
-    /// job.
-    ///
-    /// # Errors
-    /// As [`Self::train`].
-    pub(super) async fn evaluate(
-        &self,
-        caller: &Caller,
-        request: EvaluationRequest,
-        key: Option<String>,
-    ) -> Result<Accepted, ServiceError> {
-        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
-        let completed = request.completed()?;
-        self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
-        let (of, steps) = ((&caller.tenant, caller.actor()), completed.step_count());
-        let request = QueuedRequest::of(JobKind::Evaluate, &sent, &completed, steps);
-        let job = self.queue(of, request, key).await?;
-        Ok(Accepted { job, warnings: completed.problem.warnings() })
+    /// Completes a problem, if there is memory to train its policy and to advise by it. Returns the warnings with it.
+    fn admitted(&self, posed: Posed) -> Result<(Posed, Vec<Warning>), ServiceError> {
+        let Completed { posed, training, advising, warnings } = posed.completed(self.threads)?;
+        self.memory.admits(&training)?;
+        self.memory.keeps(&advising)?;
+        Ok((posed, warnings))
     }
 
     /// Queues a walk-forward. The same key and request again return the same job.

@@ -33,7 +33,8 @@ use process::timekeeper::Timekeeper;
 use sessions::Sessions;
 
 use crate::control::error::FieldError;
-use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::evaluation::declared_comparison::Comparison;
+use crate::control::request::declared_comparison::{DeclaredComparison, EvaluationQuestion};
 use crate::store::{JobCounts, Store, StoreError};
 
 /// The use cases over one store.
@@ -90,9 +91,10 @@ impl Service {
         tokio::spawn(process::upkeep::keep_tidy(store.clone(), time.clone(), config.retain_jobs, shutdown.clone()));
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
-        let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
         let size = QueueSize { first: config.decode_limit, long: config.long_limit };
         let decoding = FairQueue::new("decode", size, config.turn_wait);
+        let threads = config.training_threads;
+        let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), decoding.clone(), threads);
         let policies = Arc::new(Policies::new(store.clone(), memory.clone(), decoding.clone()));
         let (due, due_names) = tokio::sync::mpsc::channel(jobs::renewer::TOLD);
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), &memory, due);
@@ -130,20 +132,37 @@ impl Service {
     pub async fn evaluate(
         &self,
         caller: &Caller,
-        request: EvaluationRequest,
+        question: EvaluationQuestion,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
+        let request = match question {
+            EvaluationQuestion::Investor(request) => *request,
+            EvaluationQuestion::Declared(request) => return self.compare(caller, *request, key).await,
+        };
         let completed = request.clone().completed()?;
         for (framework, policy) in &completed.policies {
-            let advisor = self.policies.advisor(&caller.tenant, policy).await.map_err(|error| match error {
-                ServiceError::Unknown { id, .. } => {
-                    FieldError::new(format!("policies.{}", framework.name()), id, "must name a policy").into()
-                }
-                other => other,
-            })?;
+            let advisor = self.policies.advisor(&caller.tenant, policy).await;
+            let advisor = advisor.map_err(|error| of_policy(framework.name(), error))?;
             completed.accepts(*framework, advisor.specification())?;
         }
         self.jobs.evaluate(caller, request, key).await
+    }
+
+    /// Queues a comparison of policies and rules of a declared problem.
+    async fn compare(
+        &self,
+        caller: &Caller,
+        request: DeclaredComparison,
+        key: Option<String>,
+    ) -> Result<Accepted, ServiceError> {
+        let mut advisors = Vec::with_capacity(request.policies.len());
+        for (name, policy) in &request.policies {
+            let advisor = self.policies.decider(&caller.tenant, policy).await;
+            advisors.push(advisor.map_err(|error| of_policy(name, error))?);
+        }
+        let read = move || Comparison::new(request, advisors);
+        let comparison = self.decoding.run(&caller.tenant, read).await??;
+        self.jobs.compare(caller, &comparison, key).await
     }
 
     /// Resolves if the store fails past recovery. After a failed fsync or an I/O error memory and disk may disagree. So
@@ -211,6 +230,16 @@ impl Service {
             trainer.join().await;
         }
         self.store.close().await;
+    }
+}
+
+/// Names the policy of an evaluation in an error about it.
+fn of_policy(name: &str, error: ServiceError) -> ServiceError {
+    let field = format!("policies.{name}");
+    match error {
+        ServiceError::Unknown { id, .. } => FieldError::new(field, id, "must name a policy").into(),
+        ServiceError::Field(FieldError { value, rule, .. }) => FieldError { field, value, rule }.into(),
+        other => other,
     }
 }
 

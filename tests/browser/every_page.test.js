@@ -22,12 +22,13 @@ after(async () => {
 const visit = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const nothing = `session_${"0".repeat(32)}`;
 /** Views that need nothing to be there. */
-const BARE = ["#/", "#/jobs", "#/train", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/key", "#/nowhere", `#/sessions/${nothing}`];
+const BARE = ["#/", "#/jobs", "#/train", "#/declare", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/key", "#/nowhere", `#/sessions/${nothing}`];
 
 test("every view where there is nothing yet", () => usable(page, visit, BARE));
 
 const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
 const BONDS = HISTORY.map((_, k) => 0.003 + 0.01 * Math.cos(2.3 * k));
+const STOCK = JSON.parse(await readFile(new URL("../../examples/problems/stock.json", import.meta.url), "utf8"));
 const both = (k) => [HISTORY[k], BONDS[k]];
 
 /** A job once it has ended. */
@@ -42,13 +43,14 @@ test("every view where there is something, of one asset and of several", async (
   const problem = { horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY };
   const wide = { ...problem, assets: ["Stocks", "Bonds"], history: HISTORY.map((_, k) => both(k)), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
   const [one, several] = [await trained(ballast.url, { problem, design, name: "A name of so many words that they take more than a line" }), await trained(ballast.url, { problem: wide, design })];
+  const declared = await trained(ballast.url, { ...STOCK, problem: { ...STOCK.problem, horizon: 2 }, design });
   const [lived, other] = [(await call(ballast.url, "/sessions", { policy: one, name: "Ada" })).session, (await call(ballast.url, "/sessions", { policy: several })).session];
   await call(ballast.url, "/observe", { session: lived, period: 1, simple_return: 0.02, date: "2026-01-31" });
   await call(ballast.url, "/observe", { session: other, period: 1, log_returns: { Stocks: 0.02, Bonds: -0.01 } });
   const walk = { rate: 0.002, periods_per_year: 4, log_returns: HISTORY };
   const dates = HISTORY.map((_, k) => `${2004 + Math.floor(k / 4)}-${String(3 * (k % 4) + 3).padStart(2, "0")}`);
   const jobs = {
-    evaluations: [await ended("/evaluate", { problem, design, frameworks: ["adaptive"], paths: 100 })],
+    evaluations: [await ended("/evaluate", { problem, design, frameworks: ["adaptive"], paths: 100 }), await ended("/evaluate", { policies: { policy: declared }, rules: { rule: { order: "max(25 - stock, 0)" } }, paths: 100 })],
     backtests: [await ended("/backtest", { ...walk, window: 8, every: 4, count: 10, alpha: [0.5] }), await ended("/backtest", { ...walk, dates, assets: ["Stocks", "Bonds"], log_returns: wide.history, windows: [8], alpha: 0.5 })],
     frontiers: [await ended("/frontier", { problem: { history: HISTORY, rate_per_step: 0.002 } })],
   };
@@ -58,7 +60,8 @@ test("every view where there is something, of one asset and of several", async (
   await fetch(`${ballast.url}/jobs/${stopped}/cancel`, { method: "POST" });
   const places = [
     ...["#/", "#/jobs", "#/policies", "#/sessions/new", "#/evaluations", "#/evaluations/new", `#/train?like=${one}`, `#/train?newer=${several}`, `#/report?sessions=${lived},${other}`, `#/renew?sessions=${lived}`],
-    ...[one, several].map((policy) => `#/policies/${policy}`),
+    ...[one, several, declared].map((policy) => `#/policies/${policy}`),
+    `#/declare?from=${declared}`,
     ...[lived, other].map((session) => `#/sessions/${session}`),
     ...Object.entries({ ...jobs, evaluations: [...jobs.evaluations, stopped] }).flatMap(([at, all]) => all.map((job) => `#/${at}/${job}`)),
     `#/compare?policies=${one},${several}`,
@@ -75,6 +78,9 @@ test("every view where there is something, of one asset and of several", async (
     await page.locator("main:not([aria-busy]) h1").waitFor();
     if (hash === "#/jobs") return page.locator("progress").waitFor();
     await page.waitForLoadState("networkidle");
+    if (hash !== `#/policies/${declared}`) return;
+    await page.getByRole("button", { name: "Decide" }).click();
+    await page.locator("#decision .big").waitFor();
   }, places);
   await fetch(`${ballast.url}/jobs/${running}/cancel`, { method: "POST" });
 });

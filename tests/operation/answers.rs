@@ -21,6 +21,8 @@ struct Store {
     jobs: [String; 2],
     /// A policy with a long history.
     policy: String,
+    /// The policy of a declared problem with a long history.
+    declared: String,
     /// A session of many periods.
     session: String,
 }
@@ -71,12 +73,17 @@ impl Store {
             let change = json!({ "name": format!("{round}") });
             assert_eq!(app.send(Method::PATCH, &named, Some(&change)).await.0, StatusCode::OK);
         }
-        Store { app, jobs, policy: trained, session }
+        let mut stock: Value = serde_json::from_str(include_str!("../../examples/problems/stock.json")).unwrap();
+        stock["problem"]["history"] = json!(returns(2000).iter().map(|value| 20.0 + 300.0 * value).collect::<Vec<_>>());
+        stock["problem"]["horizon"] = json!(1);
+        app.train(&stock).await;
+        let declared = std::mem::replace(&mut app.policy, trained.clone());
+        Store { app, jobs, policy: trained, declared, session }
     }
 
     /// Returns the largest valid request of an operation, and whether its answer is above 64 KB.
     fn largest(&self, operation: &str) -> (String, Option<Value>, bool) {
-        let Store { jobs: [training, evaluation], policy, session, .. } = self;
+        let Store { jobs: [training, evaluation], policy, declared, session, .. } = self;
         let (of_policy, of_session, of_job) =
             (format!("/policies/{policy}"), format!("/sessions/{session}"), format!("/jobs/{training}"));
         let problem =
@@ -95,6 +102,7 @@ impl Store {
                 json!({ "log_returns": returns(60), "rate": 0.002, "periods_per_year": 12, "window": 24, "count": 20 }),
             ),
             "get /dashboard/{file}" => get("/dashboard/inter.woff2"),
+            "post /decide" => ("/decide".into(), Some(json!({ "policy": declared })), true),
             "get /docs" => get("/docs"),
             "get /docs/{file}" => get("/docs/start.js"),
             "post /evaluate" => body(

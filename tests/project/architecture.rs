@@ -18,19 +18,22 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 32] = [
+const DOCUMENTS: [&str; 37] = [
     "control/assets/advice.rs",
     "control/evaluation/assets/report.rs",
     "control/evaluation/backtest_report.rs",
+    "control/evaluation/declared_comparison.rs",
     "control/evaluation/frontier/report.rs",
     "control/evaluation/names.rs",
     "control/evaluation/report.rs",
     "control/policy/advice.rs",
     "control/policy/caution.rs",
+    "control/policy/declared.rs",
     "control/policy/levels.rs",
     "control/policy/sensitivity/mod.rs",
     "control/policy/surface.rs",
     "control/policy/worst_case.rs",
+    "control/posed.rs",
     "control/progress.rs",
     "control/request/annualised.rs",
     "control/request/assets.rs",
@@ -39,6 +42,8 @@ const DOCUMENTS: [&str; 32] = [
     "control/request/caution.rs",
     "control/request/centre.rs",
     "control/request/contributions.rs",
+    "control/request/declared.rs",
+    "control/request/declared_comparison.rs",
     "control/request/evaluation.rs",
     "control/request/framework.rs",
     "control/request/frontier.rs",

@@ -59,7 +59,7 @@ fn every_operation_lists_what_its_shape_can_answer() {
             }
         }
     }
-    assert_eq!(with_body, 14);
+    assert_eq!(with_body, 15);
 }
 
 #[test]

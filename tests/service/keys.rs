@@ -181,6 +181,7 @@ fn naming(job: &str, evaluation: &str, policy: &str, session: &str) -> Vec<(Meth
         "/what-if",
         json!({ "session": session, "sweep": { "radius_scale": { "from": 0.0, "to": 1.0, "points": 2 } } }),
     ));
+    calls.push(body("/decide", json!({ "policy": policy })));
     let problem = json!({ "horizon": 1, "rate_per_step": 0.002, "history": [0.01, -0.02, 0.03] });
     calls.push(body("/evaluate", json!({ "problem": problem, "policies": { "adaptive": policy } })));
     for path in [format!("/jobs/{job}"), format!("/sessions/{session}"), format!("/policies/{policy}")] {

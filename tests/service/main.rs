@@ -13,6 +13,7 @@ mod backup;
 mod bad_input;
 mod clocks;
 mod damage;
+mod decide;
 mod doubts;
 mod encryption;
 mod files;

@@ -25,7 +25,7 @@ fn compared(problem: Value, count: usize, holding: f64) -> (f64, f64) {
     let investor = Investor::new(&specification.problem);
     let start = Position { wealth: 100.0, holding };
     let policy = ControlledPolicy::train(&investor, &start, &specification, &Watch::unwatched()).unwrap();
-    let found = policy.solve(0, &start, &EmpiricalDistribution::new(&HISTORY));
+    let found = policy.step(&investor, 0).solve(&start, &EmpiricalDistribution::new(&HISTORY));
     assert!(own.allocation > 0.02 && own.allocation < 0.98, "{own:?}");
     (BASIS_POINTS * (found.certainty_equivalent / own.certainty_equivalent).ln(), found.actions[0] - own.allocation)
 }

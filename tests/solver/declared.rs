@@ -2,8 +2,10 @@
 
 use std::fs;
 
-use ballast::control::declared_advice::DeclaredAdvice;
+use ballast::control::cache::Cache;
+use ballast::control::declared_training::DeclaredTraining;
 use ballast::control::error::TrainError;
+use ballast::control::policy::declared::Decided;
 use ballast::control::pool::TrainingPool;
 use ballast::control::progress::Watch;
 use ballast::control::request::declared::DeclaredSpecification;
@@ -17,13 +19,13 @@ pub fn example(name: &str) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-pub fn solved(request: &Value) -> Result<DeclaredAdvice, TrainError> {
+pub fn solved(request: &Value) -> Result<Decided, TrainError> {
     let declared: DeclaredSpecification = serde_json::from_value(request.clone()).unwrap();
-    DeclaredAdvice::solve(&declared, &Watch::unwatched())
+    Decided::first(&declared, &Watch::unwatched())
 }
 
 /// The only action, or the first by name.
-pub fn action(advice: &DeclaredAdvice) -> f64 {
+pub fn action(advice: &Decided) -> f64 {
     advice.actions.values().copied().next().unwrap()
 }
 
@@ -321,4 +323,38 @@ fn what_breaks_a_rule_is_refused_with_its_field_and_column() {
             other => panic!("{place}: {other:?}"),
         }
     }
+}
+
+#[test]
+fn a_formula_that_jumps_is_warned_of() {
+    let warned = |request: &Value| -> Vec<(String, String)> {
+        let declared: DeclaredSpecification = serde_json::from_value(request.clone()).unwrap();
+        let read = DeclaredTraining::with(&declared, Cache::default()).unwrap();
+        read.warnings().into_iter().map(|warning| (warning.field.into_owned(), warning.message)).collect()
+    };
+    for name in ["stock", "store", "goal", "hedge", "spending", "liquidation", "regulator", "investor"] {
+        assert_eq!(warned(&example(name)), [], "{name} is continuous");
+    }
+    // A fixed cost jumps with the order alone, over which every value is tried.
+    for (field, formula, jumps) in [
+        ("reward", "if(order > 0, 3, 0) + stock", false),
+        ("reward", "if(demand > 20, 3, 0) + stock", true),
+        ("reward", "if(stock > 10, 5, stock)", true),
+        ("reward", "if(stock > 10, 10, stock)", false),
+        ("reward", "(stock >= 10)*(stock - 10) + exp(-stock) + abs(demand - 3) + sqrt(stock)", false),
+        ("reward", "stock^0.5 + (stock - 10)^3/100 + ln(1 + demand)", false),
+        ("reward", "if(t > 5, 100, 0)", false),
+        ("end", "if(stock > 10, 50, 0)", true),
+        ("end", "max(stock, 10)", false),
+    ] {
+        let mut request = example("stock");
+        request["problem"][field] = json!(formula);
+        let found = warned(&request);
+        assert_eq!(found.len(), usize::from(jumps), "{formula}: {found:?}");
+        assert!(found.iter().all(|(named, _)| *named == format!("problem.{field}")), "{found:?}");
+    }
+    let mut request = example("stock");
+    request["problem"]["reward"] = json!("if(stock > 10, 5, 1) - order");
+    let (_, message) = &warned(&request)[0];
+    assert!(message.contains("problem.reward jumps from") && message.contains("stock = 10"), "{message}");
 }

@@ -1,7 +1,7 @@
 //! Hostile declarations: each is refused with its field and rule, or solved to finite numbers.
 
-use ballast::control::declared_advice::DeclaredAdvice;
 use ballast::control::error::TrainError;
+use ballast::control::policy::declared::Decided;
 use serde_json::{Value, json};
 
 use crate::declared::{example, solved};
@@ -127,7 +127,7 @@ fn structures() -> Vec<(&'static str, Value)> {
 /// Asserts that a declaration is refused by a rule of its own, or solved.
 fn holds(request: &Value, named: &str) {
     match solved(request) {
-        Ok(DeclaredAdvice { actions, value, worst_law, .. }) => {
+        Ok(Decided { actions, value, worst_law, .. }) => {
             assert!(value.is_finite() && actions.values().all(|action| action.is_finite()), "{named}: {value}");
             assert!((worst_law.iter().map(|moved| moved.share).sum::<f64>() - 1.0).abs() < 1e-6, "{named}");
         }

@@ -14,6 +14,8 @@ mod control;
 mod controlled;
 mod costs;
 mod declared;
+mod declared_comparison;
+mod declared_policy;
 mod design;
 mod evaluate;
 mod exchangeability;

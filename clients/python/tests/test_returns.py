@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ import pyarrow as pa
 import pytest
 from conftest import RETURNS, Service, train
 
-from ballast import AsyncBallast, Ballast, UnclearReturns
+from ballast import AsyncBallast, Ballast, UnclearReturns, wire
 from ballast.policy import Opening
 from ballast.returns import Kind, dates_of, log_returns, per_period
 
@@ -249,9 +249,10 @@ def test_what_a_quant_has_is_read_by_the_service(ballast: Ballast, tmp_path: Pat
     # The column of the bank gives its rates.
     for source in (table, path, path.read_text()):
         assert ballast.advise(source, **ONCE)["allocation"] == pytest.approx(plain["allocation"], abs=1e-6)
-    specification = ballast.train(path, horizon=2, design={"count": 20}, **ONCE).policy().detail()["specification"]
-    assert specification["problem"]["rate_per_step"] == BANK[-1]
-    assert specification["problem"].get("periods_per_year") == 12
+    detail = ballast.train(path, horizon=2, design={"count": 20}, **ONCE).policy().detail()
+    problem = cast(wire.ProblemSpecification, detail["specification"]["problem"])
+    assert problem["rate_per_step"] == BANK[-1]
+    assert problem.get("periods_per_year") == 12
     report = ballast.backtest(table, window=12, count=10, alpha=[0.5]).report()
     assert report["dates"] == [str(month) for month in MONTHS[12:]]
     same = ballast.backtest(table["fund"], kind="simple", rate=table["rf"], window=12, count=10, alpha=[0.5]).report()

@@ -66,6 +66,31 @@ def test_advice_without_a_policy(ballast: Ballast) -> None:
     assert refusal.value.field == "problem.horizon"
 
 
+def test_a_declared_problem(ballast: Ballast) -> None:
+    declared = json.loads((REPOSITORY / "examples/problems/stock.json").read_text())
+    declared["problem"]["horizon"], declared["design"] = 2, {"count": 20}
+    policy = ballast.submit(declared, name="The shop").policy()
+    first = policy.decide()
+    assert first == policy.decide(period=1, state={"stock": 4.0})
+    assert first["period"] == 1 and 0.0 <= first["actions"]["order"] <= 56.0
+    assert sum(move["share"] for move in first["worst_law"]) == pytest.approx(1.0)
+    assert policy.decide(period=2, state={"stock": 0}, noises=[20])["value"] < first["value"]
+    problem = cast(wire.DeclaredProblem, policy.detail()["specification"]["problem"])
+    assert problem["states"]["stock"]["start"] == 4.0
+    with pytest.raises(package.InvalidField) as refusal:
+        policy.decide(period=2, state={"stock": 0})
+    assert refusal.value.field == "noises"
+    with pytest.raises(package.InvalidField):
+        policy.session()
+    compared = ballast.compare({"robust": policy}, rules={"base": {"order": "max(25 - stock, 0)"}}, paths=200)
+    frame = compared.frame()
+    assert list(frame.index) == ["robust", "base"] and list(frame["is_rule"]) == [False, True]
+    base = frame.loc["base"]
+    assert base["difference_low"] < base["difference"] < base["difference_high"]
+    assert frame.loc["robust", "robust_value"] == pytest.approx(first["value"])
+    assert ballast.comparison(compared.id).report()["problem"]["horizon"] == 2
+
+
 def test_advice_on_several_assets(ballast: Ballast) -> None:
     rows = [[value, value * value - 0.0005] for value in RETURNS]
     advised = ballast.advise_assets(
@@ -272,6 +297,8 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     policy.detail()
     assert policy.surface(across="deviation")["step"] == 0
     ballast.import_policy(policy.export())
+    with pytest.raises(package.InvalidField, match="declared"):
+        policy.decide()
     policy.delete()
     assert training.id in [job["job"] for job in ballast.jobs()]
     assert ballast.training(training.id).cancel().job["state"] == "succeeded"

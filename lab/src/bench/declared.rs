@@ -3,9 +3,9 @@
 
 use std::error::Error;
 
-use ballast::control::declared_advice::DeclaredAdvice;
 use ballast::control::error::TrainError;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::policy::declared::Decided;
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
@@ -85,8 +85,8 @@ fn beside_the_investor(bench: &DeclaredBench, pool: &TrainingPool) -> Result<(),
     Ok(())
 }
 
-fn solved(declared: &DeclaredSpecification) -> Result<DeclaredAdvice, TrainError> {
-    DeclaredAdvice::solve(declared, &Watch::unwatched())
+fn solved(declared: &DeclaredSpecification) -> Result<Decided, TrainError> {
+    Decided::first(declared, &Watch::unwatched())
 }
 
 /// Returns the median of some runs in seconds, and what the last one found.

@@ -22,7 +22,7 @@ use crate::control::problem::actions::{ActionInterval, FINE_ACTIONS};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::dynamics::{Dynamics, Trade};
 use crate::control::surrogate::features::{FeatureSelection, Features};
-use crate::control::uncertainty::laws::Laws;
+use crate::control::uncertainty::laws::{LawSummary, Laws};
 use crate::control::uncertainty::{Reach, UncertaintySet};
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::search::chebyshev::even;
@@ -68,6 +68,21 @@ impl<P: Controlled> ControlledStep<'_, P> {
     /// Returns the features of a state and its law: the description, then the features of the law.
     pub fn features(&self, state: &P::State, law: &EmpiricalDistribution) -> Features {
         self.selection.of_law(&self.laws.summary(law)).after(self.problem.describe(self.step, state))
+    }
+
+    /// Returns the features of the next states, noise by noise (ascending), with the laws that have learned them.
+    pub fn features_after(
+        &self,
+        state: &P::State,
+        law: &EmpiricalDistribution,
+        actions: &[f64],
+        noises: &[f64],
+    ) -> Vec<Features> {
+        let after = |(summary, noise): (LawSummary, &f64)| {
+            let next = self.problem.next(self.step, state, actions, *noise);
+            self.selection.of_law(&summary).after(self.problem.describe(self.step + 1, &next))
+        };
+        self.laws.summaries_with(law, noises).into_iter().zip(noises).map(after).collect()
     }
 
     /// Solves the step. Cost with one action: a prediction at each of some hundreds of returns, and some thirty actions

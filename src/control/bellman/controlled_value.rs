@@ -2,7 +2,10 @@
 
 use std::rc::Rc;
 
+use crate::control::request::specification::Specification;
+use crate::control::solved_step::StepSolution;
 use crate::control::surrogate::features::Features;
+use crate::control::surrogate::stored::Solution;
 use crate::control::surrogate::value_surrogate::ValueSurrogate;
 use crate::numerics::search::chebyshev::{even, local_cubic};
 use crate::numerics::statistics::summary::range;
@@ -28,6 +31,16 @@ pub enum ControlledValue {
 }
 
 impl ControlledValue {
+    /// Returns the value of a trained step.
+    pub fn of(specification: &Specification, trained: &StepSolution) -> Self {
+        match &trained.solution {
+            Solution::Single(single) => ControlledValue::Constant(single.floor_gains[0]),
+            Solution::Surrogates(stored) => {
+                ControlledValue::Surrogate(Box::new(ValueSurrogate::new(specification, trained.step, stored)))
+            }
+        }
+    }
+
     /// Returns the gain of a state.
     pub fn gain(&self, features: &Features) -> f64 {
         match self {

@@ -6,6 +6,7 @@ pub mod assets;
 pub mod backtest;
 pub mod backtest_report;
 pub mod deciding_paths;
+pub mod declared_comparison;
 pub mod frontier;
 pub mod names;
 pub mod paths;

@@ -20,7 +20,7 @@ use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates
 /// policy.
 pub fn periods_per_year(json: &[u8]) -> Option<f64> {
     #[derive(Deserialize)]
-    struct PolicyDocument {
+    struct Specifying {
         specification: Specified,
     }
     #[derive(Deserialize)]
@@ -31,9 +31,7 @@ pub fn periods_per_year(json: &[u8]) -> Option<f64> {
     struct PeriodsPerYear {
         periods_per_year: Option<f64>,
     }
-    serde_json::from_slice::<PolicyDocument>(json)
-        .ok()
-        .and_then(|document| document.specification.problem.periods_per_year)
+    serde_json::from_slice::<Specifying>(json).ok().and_then(|document| document.specification.problem.periods_per_year)
 }
 
 /// The completed specification and the solution of every step, in ascending order of step.
@@ -193,7 +191,7 @@ fn credible_gain(specification: &Specification, step: usize) -> f64 {
 /// Bound on every other stored number.
 const LARGEST_NUMBER: f64 = 1e30;
 
-fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) -> Result<(), FieldError> {
+pub(super) fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) -> Result<(), FieldError> {
     let scaling = &stored.scaling;
     let inputs = scaling.active.len();
     let ascending = scaling.active.windows(2).all(|pair| pair[0] < pair[1]);

@@ -3,6 +3,7 @@
 pub mod advice;
 pub mod advisor;
 pub mod caution;
+pub mod declared;
 mod document;
 pub mod levels;
 pub mod one_period;

@@ -41,7 +41,7 @@ impl PreparedStep {
 
 impl Factor {
     /// Returns the key: the hash of all inputs of the factor.
-    fn of(stored: &StepSurrogates) -> Self {
+    pub fn of(stored: &StepSurrogates) -> Self {
         let scales = &stored.value.hyperparameters;
         let numbers = stored.inputs.iter().flatten().chain(&scales.lengthscales);
         let mut hash = Sha256::new_with_prefix((stored.count() as u64).to_le_bytes());

@@ -4,16 +4,19 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
-use serde::Deserialize;
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
+use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::rules::{COUNT, HISTORY_LENGTH, HORIZON};
 use crate::control::request::specification::{SurrogateSpecification, default_seed};
 
 /// A declared problem, with the settings of its training.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredSpecification {
     /// The problem.
@@ -30,17 +33,17 @@ pub struct DeclaredSpecification {
 }
 
 /// The states that the surrogates of a declared problem are trained on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredDesign {
     /// Number of design points per step, 10 to 10,000. Default 1000.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
 }
 
 /// `V_t(x, F) = max_a min_{F' in C_t(F)} E_{F'}[ reward + discount V_{t+1}(next, F + Z) ]`, and `V_T = end`. With a
 /// utility the value is the certainty equivalent of the amount at the end.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredProblem {
     /// States by name, 1 to 6.
@@ -58,16 +61,16 @@ pub struct DeclaredProblem {
     #[serde(deserialize_with = "distinct")]
     pub next: BTreeMap<String, String>,
     /// Formula of what a period earns. Default: nothing.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reward: Option<String>,
     /// Formula of the worth of the state at the end; absent if there is a utility, which has its own.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<String>,
     /// Factor per period on what comes after it, above 0 and at most 1. Default 1.
     #[serde(default = "no_discount")]
     pub discount: f64,
     /// Utility of an amount at the end. Default: the sum of the rewards and the end itself.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub utility: Option<DeclaredUtility>,
     /// Number of decisions, T, 1 to 520.
     pub horizon: usize,
@@ -80,12 +83,12 @@ pub struct DeclaredProblem {
     #[serde(default)]
     pub learning: Learning,
     /// Rule for the radius of the ball, in the unit of the noise. Default: `bridge`.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<RadiusRule>,
 }
 
 /// A state: where it starts, and the range that it never leaves.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredState {
     /// Value at the start.
@@ -97,22 +100,22 @@ pub struct DeclaredState {
 }
 
 /// An action: any number between two bounds, or one of some values.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredAction {
     /// Formula of the lowest action, of the states, the parameters, `t` and `T`.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub low: Option<String>,
     /// Formula of the highest action, of the same.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub high: Option<String>,
     /// The actions that there are, instead of bounds.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub values: Option<Vec<f64>>,
 }
 
 /// The noise, observed each period, and its support.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
     /// Its name in the formulas.
@@ -124,7 +127,7 @@ pub struct Noise {
 }
 
 /// A utility of the amount that a formula of the states gives at the end.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum DeclaredUtility {
     /// `(1 - exp(-risk_aversion x)) / risk_aversion`.
@@ -148,6 +151,27 @@ pub enum DeclaredUtility {
     },
 }
 
+impl DeclaredProblem {
+    /// Returns true if the other has the same states, actions, dynamics, worths and record. Its framework, radius and
+    /// learning may differ.
+    pub fn is_alike(&self, other: &DeclaredProblem) -> bool {
+        let DeclaredProblem { framework, radius, learning, .. } = self.clone();
+        *self == DeclaredProblem { framework, radius, learning, ..other.clone() }
+    }
+}
+
+impl Bounded for DeclaredProblem {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("discount", ValueBounds::Above(0.0, 1.0)),
+        ("horizon", ValueBounds::count(&HORIZON)),
+        ("history", ValueBounds::list(&HISTORY_LENGTH, &ValueBounds::Any)),
+    ];
+}
+
+impl Bounded for DeclaredDesign {
+    const BOUNDS: &'static [FieldBounds] = &[("count", ValueBounds::count(&COUNT))];
+}
+
 impl DeclaredUtility {
     /// Returns the formula of the amount.
     pub fn of(&self) -> &str {
@@ -164,7 +188,7 @@ fn no_discount() -> f64 {
 }
 
 /// Reads an object by name, and refuses a name that stands twice: the last would be taken in silence.
-fn distinct<'de, D: Deserializer<'de>, V: Deserialize<'de>>(source: D) -> Result<BTreeMap<String, V>, D::Error> {
+pub fn distinct<'de, D: Deserializer<'de>, V: Deserialize<'de>>(source: D) -> Result<BTreeMap<String, V>, D::Error> {
     source.deserialize_map(DistinctNames(PhantomData))
 }
 

@@ -3,6 +3,8 @@
 //! A warning rejects nothing, because each of these requests can be intended: banks have paid 50 % a year, and coins
 //! have moved as much in a day.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -26,7 +28,8 @@ pub struct Warning {
     /// Kind of the warning.
     pub code: WarningCode,
     /// Dotted path of the field in the request.
-    pub field: &'static str,
+    #[schema(value_type = String)]
+    pub field: Cow<'static, str>,
     /// The value, what it means, and what the field should hold if something else was meant, in sentences.
     pub message: String,
 }
@@ -44,6 +47,8 @@ pub enum WarningCode {
     RecordInPercent,
     /// Trading costs more than 2 %.
     TradingCostHigh,
+    /// A formula of a declared problem jumps as a state or the noise moves.
+    Jumps,
 }
 
 impl Warning {
@@ -52,7 +57,7 @@ impl Warning {
         let names =
             [("problem.rate_per_step", "rate"), ("problem.trading_cost", "trading_cost"), ("problem.history", returns)];
         Warning {
-            field: names.iter().find(|(from, _)| *from == self.field).map_or(self.field, |(_, to)| to),
+            field: names.iter().find(|(from, _)| *from == self.field).map_or(self.field, |(_, to)| (*to).into()),
             message: names.iter().fold(self.message, |message, (from, to)| message.replace(from, to)),
             code: self.code,
         }
@@ -115,7 +120,7 @@ impl ProblemSpecification {
 }
 
 fn warning(code: WarningCode, field: &'static str, text: String) -> Warning {
-    Warning { code, field, message: format!("{field} {text}.") }
+    Warning { code, field: field.into(), message: format!("{field} {text}.") }
 }
 
 /// Formats a share in percent, to a tenth of a percent.
@@ -172,10 +177,10 @@ mod tests {
                 centre: mixed(history),
                 ..ProblemSpecification::of(vec![0.08, -0.01, 0.05], 0.002)
             };
-            problem.warnings().iter().map(|warning| (warning.code, warning.field)).collect::<Vec<_>>()
+            problem.warnings().into_iter().map(|warning| (warning.code, warning.field.into_owned())).collect::<Vec<_>>()
         };
         assert_eq!(warned(vec![0.041, -0.014, 0.032]), []);
-        assert_eq!(warned(vec![4.1, -1.4, 3.2]), [(WarningCode::RecordInPercent, "problem.centre.history")]);
+        assert_eq!(warned(vec![4.1, -1.4, 3.2]), [(WarningCode::RecordInPercent, "problem.centre.history".to_owned())]);
     }
 
     /// 1.03^12 is 1.4258 by hand.

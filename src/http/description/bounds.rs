@@ -16,6 +16,8 @@ use crate::control::request::backtest_assets::AssetsBacktestRequest;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
+use crate::control::request::declared::{DeclaredDesign, DeclaredProblem};
+use crate::control::request::declared_comparison::DeclaredComparison;
 use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::fund::FundSpecification;
@@ -28,6 +30,7 @@ use crate::control::request::specification::{
 use crate::control::request::support::Support;
 use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
+use crate::service::advice::decide::Decide;
 use crate::service::advice::returns::ReadReturns;
 use crate::service::advice::what_if::{SweepRange, WhatIf};
 use crate::service::entries::report::{Correct, Observe, Report};
@@ -80,6 +83,10 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<FrontierRequest>(),
         of::<Advise>(),
         of::<AdviseAssets>(),
+        of::<DeclaredProblem>(),
+        of::<DeclaredDesign>(),
+        of::<DeclaredComparison>(),
+        of::<Decide>(),
         of::<WhatIf>(),
         of::<SweepRange>(),
         of::<Report>(),
@@ -95,6 +102,7 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         ("OpenSession".into(), Relabel::BOUNDS),
         ("Train".into(), Relabel::BOUNDS),
         ("TrainAssets".into(), Relabel::BOUNDS),
+        ("TrainDeclared".into(), Relabel::BOUNDS),
     ]
 }
 

@@ -59,7 +59,7 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         | ("PATCH", "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", "/key") => Access::AnyKey,
-        ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise" | "/returns") => Access::Role(KeyRole::Read),
+        ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise" | "/decide" | "/returns") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),
     }
 }

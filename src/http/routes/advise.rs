@@ -65,7 +65,7 @@ pub async fn advise(
     bodies::written(&service, answer).await
 }
 
-/// The parts of a request that show if it gives a horizon and if it names assets.
+/// The parts of a request that show if it gives a horizon, names assets, or declares states.
 #[derive(Deserialize)]
 struct AdviseShape {
     problem: ProblemShape,
@@ -75,6 +75,7 @@ struct AdviseShape {
 pub(super) struct ProblemShape {
     horizon: Option<IgnoredAny>,
     pub(in crate::http) assets: Option<IgnoredAny>,
+    pub(in crate::http) states: Option<IgnoredAny>,
 }
 
 /// Reads the shape of `problem`; `None` if there is no readable problem.

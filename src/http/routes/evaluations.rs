@@ -5,19 +5,22 @@ use std::sync::Arc;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
-use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::request::declared_comparison::EvaluationQuestion;
 use crate::http::gate::access::{CallerOf, HeavyCalls, ReadCalls};
-use crate::http::gate::bodies;
-use crate::http::gate::extract::{Id, JsonBody};
+use crate::http::gate::extract::{Id, JsonBytes};
+use crate::http::gate::{bodies, decode};
 use crate::http::problem::ProblemDocument;
 use crate::http::routes::jobs::{Queueing, accepted, idempotency_key};
 use crate::http::routes::wire;
 use crate::service::Service;
 
-/// Queues a comparison of frameworks on common simulated returns.
+/// Queues a comparison of strategies on common simulated returns, or of policies and rules of a declared problem on common
+/// noises.
 #[utoipa::path(post, path = "/evaluate", tag = "jobs",
-    request_body(content = EvaluationRequest, example = json!({
+    request_body(content = EvaluationQuestion, example = json!({
         "problem": {
             "rate_per_step": 0.0027, "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008],
             "law": { "kind": "gaussian_mixture", "components": [
@@ -36,9 +39,23 @@ pub async fn evaluate(
     State(service): State<Arc<Service>>,
     CallerOf(caller, _): CallerOf<HeavyCalls>,
     headers: HeaderMap,
-    JsonBody(request): JsonBody<EvaluationRequest>,
+    body: JsonBytes,
 ) -> Result<Response, ProblemDocument> {
-    Ok(accepted(service.evaluate(&caller, request, idempotency_key(&headers)?).await?))
+    let question = body.decoded(question).await?;
+    Ok(accepted(service.evaluate(&caller, question, idempotency_key(&headers)?).await?))
+}
+
+/// Decodes the request by its shape, so that an error names the right field.
+fn question(bytes: &[u8]) -> Result<EvaluationQuestion, ProblemDocument> {
+    #[derive(Deserialize)]
+    struct Shape {
+        problem: Option<IgnoredAny>,
+        policies: Option<IgnoredAny>,
+    }
+    match decode::object(bytes) {
+        Ok(Shape { problem: None, policies: Some(_) }) => decode::object(bytes).map(EvaluationQuestion::Declared),
+        _ => decode::object(bytes).map(EvaluationQuestion::Investor),
+    }
 }
 
 /// Returns the report of a succeeded evaluation, walk-forward backtest or frontier.

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoResponses, ToSchema};
 
 use crate::control::error::FieldError;
+use crate::control::posed::Posed;
 use crate::control::request::assets::AssetsProblem;
+use crate::control::request::declared::{DeclaredDesign, DeclaredProblem, DeclaredSpecification};
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, default_seed,
@@ -76,25 +78,29 @@ pub async fn train(
     body: JsonBytes,
 ) -> Result<Response, ProblemDocument> {
     let key = idempotency_key(&headers)?;
-    let (specification, labels) = match body.decoded(question).await? {
-        TrainQuestion::Assets(request) => request.specified().map_err(ServiceError::from)?,
-        TrainQuestion::Asset(request) => request.specified(),
+    let (posed, labels) = match body.decoded(question).await? {
+        TrainQuestion::Assets(request) => request.posed().map_err(ServiceError::from)?,
+        TrainQuestion::Asset(request) => request.posed(),
+        TrainQuestion::Declared(request) => request.posed(),
     };
-    Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
+    Ok(accepted(service.jobs.train(&caller, posed, labels, key).await?))
 }
 
-/// A training of a policy for one asset, or for several, which `problem.assets` names.
+/// A training of a policy for one asset, for several, which `problem.assets` names, or for a problem that is declared in
+/// formulas, with `problem.states`.
 #[derive(Debug, ToSchema)]
 #[serde(untagged)]
 pub enum TrainQuestion {
     Asset(Box<Train>),
     Assets(Box<TrainAssets>),
+    Declared(Box<TrainDeclared>),
 }
 
 /// Decodes the request by its shape, so that an error names the right field.
 fn question(bytes: &[u8]) -> Result<TrainQuestion, ProblemDocument> {
     match peek_shape(bytes) {
         Some(ProblemShape { assets: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Assets),
+        Some(ProblemShape { states: Some(_), .. }) => decode::object(bytes).map(TrainQuestion::Declared),
         _ => decode::object(bytes).map(TrainQuestion::Asset),
     }
 }
@@ -122,17 +128,49 @@ pub struct TrainAssets {
     tags: Option<Vec<String>>,
 }
 
+/// A training of a policy for a problem declared in formulas.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrainDeclared {
+    /// The declaration.
+    problem: DeclaredProblem,
+    /// States at which the surrogates are trained.
+    #[serde(default)]
+    design: DeclaredDesign,
+    /// Construction of the surrogates.
+    #[serde(default)]
+    surrogate: SurrogateSpecification,
+    /// Seed of the training: equal requests and seeds give equal policies, bit for bit.
+    #[serde(default = "default_seed")]
+    seed: u64,
+    /// Name of the policy, at most 100 letters.
+    name: Option<String>,
+    /// Notes, at most 2,000 letters.
+    notes: Option<String>,
+    /// Tags: at most 20, all different, of 1 to 50 letters each.
+    tags: Option<Vec<String>>,
+}
+
 impl Train {
-    fn specified(self) -> (Specification, Relabel) {
+    fn posed(self) -> (Posed, Relabel) {
         let Train { problem, fund, design, surrogate, seed, name, notes, tags } = self;
-        (Specification { problem, fund, design, surrogate, seed }, Relabel { name, notes, tags })
+        let specification = Specification { problem, fund, design, surrogate, seed };
+        (Posed::Investor(specification.into()), Relabel { name, notes, tags })
     }
 }
 
 impl TrainAssets {
-    fn specified(self) -> Result<(Specification, Relabel), FieldError> {
+    fn posed(self) -> Result<(Posed, Relabel), FieldError> {
         let TrainAssets { problem, design, surrogate, seed, name, notes, tags } = self;
-        Ok((problem.training(design, surrogate, seed)?, Relabel { name, notes, tags }))
+        Ok((Posed::Investor(problem.training(design, surrogate, seed)?.into()), Relabel { name, notes, tags }))
+    }
+}
+
+impl TrainDeclared {
+    fn posed(self) -> (Posed, Relabel) {
+        let TrainDeclared { problem, design, surrogate, seed, name, notes, tags } = self;
+        let declared = DeclaredSpecification { problem, design, surrogate, seed };
+        (Posed::Declared(declared.into()), Relabel { name, notes, tags })
     }
 }
 

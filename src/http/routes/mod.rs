@@ -4,6 +4,7 @@ pub(super) mod action;
 pub(super) mod advise;
 pub(super) mod audit;
 pub(super) mod backtests;
+pub(super) mod decide;
 pub(super) mod evaluations;
 pub(super) mod events;
 pub(super) mod frontiers;

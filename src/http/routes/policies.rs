@@ -8,8 +8,8 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use crate::control::policy::Policy;
 use crate::control::policy::surface::{Surface, SurfaceAxis};
+use crate::control::policy_document::PolicyDocument;
 use crate::http::gate::access::{CallerOf, HeavyCalls, LiveCalls, ReadCalls};
 use crate::http::gate::extract::{Id, JsonBytes, Parameters};
 use crate::http::gate::{bodies, decode};
@@ -50,17 +50,17 @@ pub async fn get(
     Id(id): Id,
 ) -> Result<Response, ProblemDocument> {
     let created_ms = service.policies.created_ms(&caller.tenant, &id).await?;
-    let advisor = service.policies.advisor(&caller.tenant, &id).await?;
-    let specification = advisor.specification().clone();
+    let prepared = service.policies.prepared(&caller.tenant, &id).await?;
+    let specification = prepared.posed();
     let detail = wire::PolicyDetail {
         labels: service.names.of(&caller.tenant, &id).await?,
         policy: id,
         created_ms,
-        framework: specification.problem.framework,
-        horizon: specification.problem.horizon,
-        annualised: specification.problem.annualised(),
-        warnings: specification.problem.warnings(),
-        diagnostics: advisor.policy().diagnostics().cloned().collect(),
+        framework: specification.framework(),
+        horizon: specification.horizon(),
+        annualised: specification.annualised(),
+        warnings: prepared.warnings(),
+        diagnostics: prepared.diagnostics(),
         specification,
     };
     bodies::written(&service, Large::from(detail)).await
@@ -125,9 +125,17 @@ pub async fn import(
     CallerOf(caller, _): CallerOf<HeavyCalls>,
     body: JsonBytes,
 ) -> Result<Response, ProblemDocument> {
-    let policy = service.policies.import(&caller, body.decoded(decode::object::<Policy>).await?).await?;
+    let policy = service.policies.import(&caller, body.decoded(document).await?).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
+}
+
+/// Decodes a policy by its format, so that an error names the right field.
+fn document(bytes: &[u8]) -> Result<PolicyDocument, ProblemDocument> {
+    match PolicyDocument::is_declared(bytes) {
+        true => decode::object(bytes).map(PolicyDocument::Declared),
+        false => decode::object(bytes).map(PolicyDocument::Investor),
+    }
 }
 
 /// Deletes a policy that no session uses.

@@ -8,12 +8,13 @@ use utoipa::ToSchema;
 
 use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::backtest_report::BacktestReport;
+use crate::control::evaluation::declared_comparison::ComparisonReport;
 use crate::control::evaluation::frontier::report::FrontierReport;
 use crate::control::evaluation::report::EvaluationReport;
+use crate::control::posed::Posed;
 use crate::control::progress::Phase;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::framework::Framework;
-use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
 use crate::service::entries::drift::Drift;
@@ -108,6 +109,7 @@ impl From<Accepted> for AcceptedJob {
 #[expect(dead_code, reason = "reports are sent as they are stored; this type only describes them")]
 pub enum JobReport {
     Evaluation(Box<EvaluationReport>),
+    Comparison(Box<ComparisonReport>),
     Backtest(Box<BacktestReport>),
     BacktestOfAssets(Box<AssetsBacktestReport>),
     Frontier(Box<FrontierReport>),
@@ -155,7 +157,7 @@ pub struct PolicyDetail {
     pub created_ms: i64,
     pub framework: Framework,
     pub horizon: usize,
-    pub specification: Specification,
+    pub specification: Posed,
     /// Annual figures; present if `problem.periods_per_year` was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,

@@ -4,6 +4,7 @@
 pub mod action;
 pub mod advise;
 pub mod advise_assets;
+pub mod decide;
 pub mod explain;
 pub mod returns;
 pub mod surface;

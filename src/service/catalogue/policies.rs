@@ -6,10 +6,12 @@ use tokio::sync::Semaphore;
 
 use crate::control::cache::{Cache, Key};
 use crate::control::error::FieldError;
-use crate::control::estimate::{self, Footprint};
+use crate::control::estimate::Footprint;
 use crate::control::policy::advisor::Advisor;
+use crate::control::policy::content_hash;
+use crate::control::policy::declared::DeclaredAdvisor;
 use crate::control::policy::one_period::OnePeriod;
-use crate::control::policy::{Policy, content_hash};
+use crate::control::policy_document::{PolicyDocument, PreparedPolicy};
 use crate::control::request::specification::Specification;
 use crate::service::callers::fair_queue::FairQueue;
 use crate::service::callers::keys::Caller;
@@ -67,18 +69,49 @@ impl Policies {
     ///
     /// # Errors
     /// There is no such policy, or it cannot be prepared.
-    pub async fn advisor(&self, tenant: &Tenant, policy: &str) -> Result<Arc<Advisor>, ServiceError> {
-        self.kept.get_or_prepare(&key(tenant, policy), Advisor::bytes, self.prepared(tenant, policy)).await
+    pub async fn prepared(&self, tenant: &Tenant, policy: &str) -> Result<Arc<PreparedPolicy>, ServiceError> {
+        self.kept.get_or_prepare(&key(tenant, policy), PreparedPolicy::bytes, self.read(tenant, policy)).await
     }
 
-    async fn prepared(&self, tenant: &Tenant, policy: &str) -> Result<Advisor, ServiceError> {
+    /// Returns the policy of an investor, prepared as above.
+    ///
+    /// # Errors
+    /// As above, or the policy is of a declared problem.
+    pub async fn advisor(&self, tenant: &Tenant, policy: &str) -> Result<Arc<Advisor>, ServiceError> {
+        match &*self.prepared(tenant, policy).await? {
+            PreparedPolicy::Investor(advisor) => Ok(advisor.clone()),
+            PreparedPolicy::Declared(_) => {
+                let rule =
+                    "must be of an investor's problem; this one is of a declared problem, for which POST /decide is";
+                Err(FieldError::new("policy", policy, rule).into())
+            }
+        }
+    }
+
+    /// Returns the policy of a declared problem, prepared as above.
+    ///
+    /// # Errors
+    /// As above, or the policy is of an investor.
+    pub async fn decider(&self, tenant: &Tenant, policy: &str) -> Result<Arc<DeclaredAdvisor>, ServiceError> {
+        match &*self.prepared(tenant, policy).await? {
+            PreparedPolicy::Declared(advisor) => Ok(advisor.clone()),
+            PreparedPolicy::Investor(_) => {
+                let rule = "must be of a declared problem; this one is of an investor, for whom a session is";
+                Err(FieldError::new("policy", policy, rule).into())
+            }
+        }
+    }
+
+    async fn read(&self, tenant: &Tenant, policy: &str) -> Result<PreparedPolicy, ServiceError> {
         let _turn = self.preparing.acquire().await.map_err(ServiceError::internal)?;
         let row = self.get(tenant, policy).await?;
         let kept = self.kept.clone();
-        let prepared =
-            tokio::task::spawn_blocking(move || Policy::from_json(&row.json).map(|policy| Advisor::with(policy, kept)));
+        let prepared = tokio::task::spawn_blocking(move || {
+            let document = PolicyDocument::from_json(&row.json).map_err(ServiceError::internal)?;
+            document.prepared(kept).map_err(ServiceError::internal)
+        });
         // The stored document was checked before, so a fault in it is not the caller's.
-        prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)
+        prepared.await.map_err(ServiceError::internal)?
     }
 
     /// Checks that sessions of so many periods with a policy can start from so many returns.
@@ -122,12 +155,12 @@ impl Policies {
     ///
     /// # Errors
     /// The document is not a usable policy, or needs more memory than can be kept ready.
-    pub async fn import(&self, caller: &Caller, document: Policy) -> Result<String, ServiceError> {
-        let memory = self.memory.clone();
+    pub async fn import(&self, caller: &Caller, document: PolicyDocument) -> Result<String, ServiceError> {
+        let (memory, kept) = (self.memory.clone(), self.kept.clone());
         let check = move || {
-            let policy = document.checked()?;
-            memory.keeps(&estimate::advising_by(&policy))?;
-            policy.to_json().map_err(ServiceError::internal)
+            let json = document.to_json().map_err(ServiceError::internal)?;
+            memory.keeps(&document.prepared(kept)?.footprints())?;
+            Ok::<_, ServiceError>(json)
         };
         let json = self.decoding.run(&caller.tenant, check).await??;
         let policy = content_hash(&json);

@@ -17,10 +17,12 @@ from .driving import Answering, awaiting_into, blocking, blocking_into
 from .jobs import (
     AssetsWalkForward,
     AsyncAssetsWalkForward,
+    AsyncComparison,
     AsyncEvaluation,
     AsyncFrontier,
     AsyncTraining,
     AsyncWalkForward,
+    Comparison,
     Evaluation,
     Frontier,
     Training,
@@ -247,15 +249,16 @@ class _Ballast:
 
     async def _submit(
         self,
-        specification: wire.Specification,
+        specification: wire.Specification | wire.DeclaredSpecification,
         *,
         name: str | None = None,
         notes: str | None = None,
         tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
     ) -> wire.Job:
-        """Queues the training of a whole specification, such as the one in ``Policy.detail``. ``name``, ``notes`` and
-        ``tags`` label its policy as in ``train``."""
+        """Queues the training of a whole specification, such as the one in ``Policy.detail``, or of a problem declared
+        in formulas (``docs/declared.md``), whose policy answers ``Policy.decide``. ``name``, ``notes`` and ``tags``
+        label the policy as in ``train``."""
         request = {**specification, **relabelled(name, notes, tags)}
         return await self._queued("/train", request, idempotency_key)
 
@@ -265,6 +268,26 @@ class _Ballast:
 
     async def _evaluate(self, request: wire.EvaluationRequest, *, idempotency_key: str | None = None) -> wire.Job:
         """Queues a comparison of strategies on common simulated returns, and does not wait for it."""
+        return await self._queued("/evaluate", request, idempotency_key)
+
+    async def _compare(
+        self,
+        policies: Mapping[str, str | Policy | AsyncPolicy],
+        *,
+        rules: Mapping[str, Mapping[str, str]] | None = None,
+        paths: int | None = None,
+        seed: int | None = None,
+        level: float | None = None,
+        idempotency_key: str | None = None,
+    ) -> wire.Job:
+        """Queues a comparison of policies of one declared problem, and of rules, on noises drawn from its record.
+
+        ``policies`` are policies or their names, each under a name of your own. ``rules`` have a formula for each
+        action, as in ``{"base stock": {"order": "max(25 - stock, 0)"}}``. Does not wait for the comparison.
+        """
+        named = {name: policy if isinstance(policy, str) else policy.id for name, policy in policies.items()}
+        ruled = None if rules is None else {name: dict(rule) for name, rule in rules.items()}
+        request = _given({"policies": named, "rules": ruled, "paths": paths, "seed": seed, "level": level})
         return await self._queued("/evaluate", request, idempotency_key)
 
     async def _backtest(
@@ -535,6 +558,8 @@ class Ballast(_Ballast):
     training = blocking_into(_Ballast._job, Training)
     evaluate = blocking_into(_Ballast._evaluate, Evaluation)
     evaluation = blocking_into(_Ballast._job, Evaluation)
+    compare = blocking_into(_Ballast._compare, Comparison)
+    comparison = blocking_into(_Ballast._job, Comparison)
     backtest = blocking_into(_Ballast._backtest, WalkForward)
     walk_forward = blocking_into(_Ballast._job, WalkForward)
     backtest_assets = blocking_into(_Ballast._backtest_assets, AssetsWalkForward)
@@ -595,6 +620,8 @@ class AsyncBallast(_Ballast):
     training = awaiting_into(_Ballast._job, AsyncTraining)
     evaluate = awaiting_into(_Ballast._evaluate, AsyncEvaluation)
     evaluation = awaiting_into(_Ballast._job, AsyncEvaluation)
+    compare = awaiting_into(_Ballast._compare, AsyncComparison)
+    comparison = awaiting_into(_Ballast._job, AsyncComparison)
     backtest = awaiting_into(_Ballast._backtest, AsyncWalkForward)
     walk_forward = awaiting_into(_Ballast._job, AsyncWalkForward)
     backtest_assets = awaiting_into(_Ballast._backtest_assets, AsyncAssetsWalkForward)

@@ -313,6 +313,25 @@ def frontier(report: wire.FrontierReport) -> pd.DataFrame:
     return require_pandas().DataFrame(rows).set_index(["law", "scale"])
 
 
+def comparison(report: wire.ComparisonReport) -> pd.DataFrame:
+    """Returns policies and rules of a declared problem, indexed by ``strategy``.
+
+    ``value`` is the mean worth of a path, ``difference`` the value less that of the first policy, and
+    ``worst_twentieth`` the mean of the worst twentieth of the paths. Each has its interval in the columns with ``_low``
+    and ``_high``.
+    ``robust_value`` is the worth of a policy under the worst law; it is NaN for rules. Raises ``ImportError`` without
+    pandas.
+    """
+    rows = []
+    for strategy in report["strategies"]:
+        row: dict[str, Any] = {"strategy": strategy["strategy"], "is_rule": strategy["is_rule"]}
+        for name in ("value", "difference", "worst_twentieth"):
+            row |= _estimate(name, cast(dict[str, Any], strategy).get(name))
+        robust = strategy.get("robust_value")
+        rows.append(row | {"robust_value": math.nan if robust is None else robust})
+    return require_pandas().DataFrame(rows).set_index("strategy")
+
+
 def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
     """Returns a figure and the ends of its interval, which is a list in reports of walk-forwards."""
     ends = (name, f"{name}_low", f"{name}_high")

@@ -151,6 +151,24 @@ class _Evaluation(_Job):
         return plots.evaluation(await self._report(watch), ax)
 
 
+class _Comparison(_Job):
+    """A job that compares policies and rules of a declared problem; ``Ballast.comparison(id)`` looks it up."""
+
+    async def _report(self, watch: Watch | None = None) -> wire.ComparisonReport:
+        """Waits for the end of the comparison, and calls ``watch`` at each change.
+
+        Raises :class:`JobEnded` if the job fails or is cancelled.
+        """
+        return cast(wire.ComparisonReport, await self._ended(watch))
+
+    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
+        """Returns policies and rules, one per row (:func:`ballast.frames.comparison`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas.
+        """
+        return frames.comparison(await self._report(watch))
+
+
 class _Walk(_Job):
     """Calls that walk-forwards of one asset and of several share."""
 
@@ -261,6 +279,13 @@ class Evaluation(Job, _Evaluation):
     plot = blocking(_Evaluation._plot)
 
 
+class Comparison(Job, _Comparison):
+    __doc__ = _Comparison.__doc__
+
+    report = Answering(wire.ComparisonReport).blocking(_Comparison._report)
+    frame = blocking(_Comparison._frame)
+
+
 class _WaitedWalk(Job, _Walk):
     frame = blocking(_Walk._frame)
     periods = blocking(_Walk._periods)
@@ -310,6 +335,13 @@ class AsyncEvaluation(AsyncJob, _Evaluation):
     report = _Evaluation._report
     frame = _Evaluation._frame
     plot = _Evaluation._plot
+
+
+class AsyncComparison(AsyncJob, _Comparison):
+    """A :class:`Comparison` whose calls are awaited."""
+
+    report = _Comparison._report
+    frame = _Comparison._frame
 
 
 class _AwaitedWalk(AsyncJob, _Walk):

@@ -47,8 +47,8 @@ class _Policy(Labelled):
     async def _detail(self) -> wire.PolicyDetail:
         """Returns the completed specification and the diagnostics of every step."""
         detail = cast(wire.PolicyDetail, await self._transport.json("GET", self._path))
-        problem = detail["specification"]["problem"]
-        problem["history"] = LogReturns(problem["history"])
+        if "states" not in (problem := detail["specification"]["problem"]):
+            problem["history"] = LogReturns(problem["history"])
         return detail
 
     async def _export(self) -> bytes:
@@ -67,6 +67,18 @@ class _Policy(Labelled):
         """
         path, params = f"{self._path}/surface", {"step": step, "across": across}
         return cast(wire.Surface, await self._transport.json("GET", path, params=params))
+
+    async def _decide(
+        self, period: int = 1, state: Mapping[str, float] | None = None, noises: Sequence[float] = ()
+    ) -> wire.DecideAnswer:
+        """Returns the actions of a declared problem before ``period``, what they are worth, and their worst law.
+
+        ``state`` has the states by name; in the first period it may be left out, and the problem starts where it was
+        declared to. ``noises`` are those of all periods before this one. Nothing is stored.
+        """
+        given = None if state is None else dict(state)
+        question = {"policy": self.id, "period": period, "state": given, "noises": list(noises)}
+        return cast(wire.DecideAnswer, await self._transport.json("POST", "/decide", body=question))
 
     async def _session(self, **opening: Unpack[Opening]) -> wire.Session:
         """Opens a session for an investor.
@@ -108,7 +120,7 @@ class _Policy(Labelled):
         held = sheet_of(history, "history")
         fund = None
         if isinstance(held, str) or any(len(row) > 1 for row in held.rows):
-            fund = (await self._detail())["specification"].get("fund")
+            fund = cast(wire.Specification, (await self._detail())["specification"]).get("fund")
         if fund is None:
             found = await read(self._transport, held, kind, choices, "history")
             if len(found.series) != 1:
@@ -142,6 +154,7 @@ class Policy(_Policy):
     detail = Answering(wire.PolicyDetail).blocking(_Policy._detail)
     export = blocking(_Policy._export)
     surface = Answering(wire.Surface).blocking(_Policy._surface)
+    decide = Answering(wire.DecideAnswer).blocking(_Policy._decide)
     session = blocking_into(_Policy._session, Session)
     label = Answering(wire.Labels).blocking(_Policy._label)
     delete = blocking(_Policy._delete)
@@ -153,6 +166,7 @@ class AsyncPolicy(_Policy):
     detail = _Policy._detail
     export = _Policy._export
     surface = _Policy._surface
+    decide = _Policy._decide
     session = awaiting_into(_Policy._session, AsyncSession)
     label = _Policy._label
     delete = _Policy._delete

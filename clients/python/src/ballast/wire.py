@@ -317,6 +317,15 @@ Change: TypeAlias = Literal["replace", "insert", "remove"]
 """A change to observed periods."""
 
 
+class ComparedPeriod(TypedDict):
+    """Means of a period over all paths."""
+
+    states: dict[str, float]
+    """States before the noise, by name."""
+    actions: dict[str, float]
+    """Actions by name."""
+
+
 class CompositionRule1(TypedDict):
     """These shares, one for each asset in order; they sum to 1."""
 
@@ -393,6 +402,101 @@ class Costs(TypedDict):
     """Seconds of the simulation."""
     resolve_seconds: NotRequired[float | None]
     """Mean seconds of one re-solved step; null if there was none."""
+
+
+class Decide(TypedDict):
+    """A state of a declared problem, and what was seen on the way to it."""
+
+    policy: str
+    """The policy."""
+    period: NotRequired[int]
+    """The period to decide, from 1. Default: 1."""
+    state: NotRequired[dict[str, float]]
+    """The states before the period, each by its name. Default in the first period: the declared start."""
+    noises: NotRequired[list[float]]
+    """The noises of all periods before this one, oldest first. Default: none."""
+
+
+class DeclaredAction(TypedDict):
+    """An action: any number between two bounds, or one of some values."""
+
+    low: NotRequired[str | None]
+    """Formula of the lowest action, of the states, the parameters, `t` and `T`."""
+    high: NotRequired[str | None]
+    """Formula of the highest action, of the same."""
+    values: NotRequired[list[float] | None]
+    """The actions that there are, instead of bounds."""
+
+
+class DeclaredComparison(TypedDict):
+    """A comparison of trained policies of one declared problem, and of rules, on common noises drawn from the record."""
+
+    policies: dict[str, str]
+    """
+    Policies by names of your own, 1 to 8. Their declarations may differ in `framework`, `radius` and `learning`. The
+    first by name is the one that others are compared with.
+    """
+    rules: NotRequired[dict[str, dict[str, str]]]
+    """
+    Rules by names of your own, at most 20: for each action a formula of the states, the parameters, `t` and `T`. An action
+    is moved into its bounds, or to the nearest of its values.
+    """
+    paths: NotRequired[int]
+    """Number of simulated paths, 100 to 100,000. Default 1000."""
+    seed: NotRequired[int]
+    """Seed of all random draws. Default 1."""
+    level: NotRequired[float]
+    """Confidence of the intervals, 0.5 to 0.999. Default 0.95."""
+
+
+class DeclaredDesign(TypedDict):
+    """The states that the surrogates of a declared problem are trained on."""
+
+    count: NotRequired[int | None]
+    """Number of design points per step, 10 to 10,000. Default 1000."""
+
+
+class DeclaredState(TypedDict):
+    """A state: where it starts, and the range that it never leaves."""
+
+    start: float
+    """Value at the start."""
+    low: float
+    """Lowest value."""
+    high: float
+    """Highest value."""
+
+
+class DeclaredUtility1(TypedDict):
+    """`(1 - exp(-risk_aversion x)) / risk_aversion`."""
+
+    risk_aversion: float
+    """Absolute risk aversion, per unit of the amount."""
+    of: str
+    """Formula of the amount."""
+    kind: Literal["exponential"]
+
+
+class DeclaredUtility2(TypedDict):
+    """`(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)` of a positive amount."""
+
+    risk_aversion: float
+    """Relative risk aversion, above 1 and at most 100."""
+    of: str
+    """Formula of the amount."""
+    kind: Literal["power"]
+
+
+class DeclaredUtility3(TypedDict):
+    """`ln x` of a positive amount."""
+
+    of: str
+    """Formula of the amount."""
+    kind: Literal["log"]
+
+
+DeclaredUtility: TypeAlias = DeclaredUtility1 | DeclaredUtility2 | DeclaredUtility3
+"""A utility of the amount that a formula of the states gives at the end."""
 
 
 DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "total_loss", "differs_from_peers"]
@@ -689,6 +793,27 @@ class NextAdvice(TypedDict):
     """The return as `price / previous price - 1`."""
     allocation: float
     """The share of wealth that would be advised."""
+
+
+class Noise(TypedDict):
+    """The noise, observed each period, and its support."""
+
+    name: str
+    """Its name in the formulas."""
+    low: float
+    """Lowest value."""
+    high: float
+    """Highest value."""
+
+
+NoiseMove = TypedDict(
+    "NoiseMove",
+    {
+        "from": float,
+        "to": float,
+        "share": float,
+    },
+)
 
 
 NoteReason: TypeAlias = Literal["total_loss", "learned_in_part", "price_missing", "price_late"]
@@ -1314,7 +1439,7 @@ UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 
 """Utility of terminal wealth, always maximised."""
 
 
-WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high"]
+WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "jumps"]
 """Kind of a warning."""
 
 
@@ -1712,6 +1837,24 @@ class ColumnFound(TypedDict):
     """The contents of the column."""
 
 
+class ComparedStrategy(TypedDict):
+    """A policy or a rule on all paths."""
+
+    strategy: str
+    """Name in the request."""
+    is_rule: bool
+    """True for a rule."""
+    value: Estimate
+    """Mean worth of a path; with a utility, the certainty equivalent of the amount at the end."""
+    difference: NotRequired[Estimate | None]
+    worst_twentieth: Estimate
+    """Mean worth of the worst twentieth of the paths."""
+    robust_value: NotRequired[float | None]
+    """Worth against the worst law, as the first decision of a policy says it. Null for rules."""
+    periods: list[ComparedPeriod]
+    """Means over all paths, period by period."""
+
+
 class CoverageAtSize(TypedDict):
     """How often the ball held the true law at one sample size."""
 
@@ -1719,6 +1862,67 @@ class CoverageAtSize(TypedDict):
     """Number of returns known."""
     covered: Estimate
     """Share of paths whose ball held the true law."""
+
+
+class Decided(TypedDict):
+    """The best actions of a period, their worth, and the law that is worst for them."""
+
+    period: int
+    """The period decided, from 1."""
+    actions: dict[str, float]
+    """The best actions, by name."""
+    several_peaks: list[str]
+    """
+    Actions along which the worth has several peaks, the others as advised. Many even ones were tried
+    before a search around the best.
+    """
+    value: float
+    """Worth of this period and those after it against the worst law, as of this period. With a utility its certainty equivalent."""
+    radius: float
+    """Radius of the ball, in the unit of the noise."""
+    worst_law: list[NoiseMove]
+    """The worst law of the period: where the mass of the noises seen goes, ascending. Shares add up to 1."""
+    duality_gap: float
+    """Value less its lower bound by duality, both of this step."""
+    untrained_share: float
+    """
+    Share of the worst law's outcomes after which the next state is unlike those that the next step was trained at.
+    What they are worth is then a guess.
+    """
+
+
+class DeclaredProblem(TypedDict):
+    """
+    `V_t(x, F) = max_a min_{F' in C_t(F)} E_{F'}[ reward + discount V_{t+1}(next, F + Z) ]`, and `V_T = end`. With a
+    utility the value is the certainty equivalent of the amount at the end.
+    """
+
+    states: dict[str, DeclaredState]
+    """States by name, 1 to 6."""
+    actions: dict[str, DeclaredAction]
+    """Actions by name, 1 to 3."""
+    noise: Noise
+    """The noise."""
+    parameters: NotRequired[dict[str, float]]
+    """Numbers by name, for the formulas."""
+    next: dict[str, str]
+    """Formula of each state after a period."""
+    reward: NotRequired[str | None]
+    """Formula of what a period earns. Default: nothing."""
+    end: NotRequired[str | None]
+    """Formula of the worth of the state at the end; absent if there is a utility, which has its own."""
+    discount: NotRequired[float]
+    """Factor per period on what comes after it, above 0 and at most 1. Default 1."""
+    utility: NotRequired[DeclaredUtility | None]
+    horizon: int
+    """Number of decisions, T, 1 to 520."""
+    history: list[float]
+    """Noises observed before the start, oldest first."""
+    framework: NotRequired[Framework]
+    """The framework: `adaptive`, `static` or `plug_in`. Default: `adaptive`."""
+    learning: NotRequired[Learning]
+    """Weights of older noises in the learned law. Default: `equal`."""
+    radius: NotRequired[RadiusRule | None]
 
 
 class DesignSpecification(TypedDict):
@@ -2217,8 +2421,30 @@ class TrainAssets(TypedDict):
     """Tags: at most 20, all different, of 1 to 50 letters each."""
 
 
-TrainQuestion: TypeAlias = Train | TrainAssets
-"""A training of a policy for one asset, or for several, which `problem.assets` names."""
+class TrainDeclared(TypedDict):
+    """A training of a policy for a problem declared in formulas."""
+
+    problem: DeclaredProblem
+    """The declaration."""
+    design: NotRequired[DeclaredDesign]
+    """States at which the surrogates are trained."""
+    surrogate: NotRequired[SurrogateSpecification]
+    """Construction of the surrogates."""
+    seed: NotRequired[int]
+    """Seed of the training: equal requests and seeds give equal policies, bit for bit."""
+    name: NotRequired[str | None]
+    """Name of the policy, at most 100 letters."""
+    notes: NotRequired[str | None]
+    """Notes, at most 2,000 letters."""
+    tags: NotRequired[list[Tag] | None]
+    """Tags: at most 20, all different, of 1 to 50 letters each."""
+
+
+TrainQuestion: TypeAlias = Train | TrainAssets | TrainDeclared
+"""
+A training of a policy for one asset, for several, which `problem.assets` names, or for a problem that is declared in
+formulas, with `problem.states`.
+"""
 
 
 class Warning(TypedDict):
@@ -2549,6 +2775,19 @@ class BacktestRequest(TypedDict):
     """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
 
 
+class ComparisonReport(TypedDict):
+    """Policies and rules compared, each in the order of its names, policies first."""
+
+    format: str
+    """`ballast-comparison-1`."""
+    request: DeclaredComparison
+    """The request."""
+    problem: DeclaredProblem
+    """The declaration of the first policy."""
+    strategies: list[ComparedStrategy]
+    """One for each policy and each rule."""
+
+
 class Composition(TypedDict):
     """Several assets before the coming period, by their names."""
 
@@ -2602,6 +2841,25 @@ class Coverage(TypedDict):
     """Coverage by ascending sample size; one entry if the ball is frozen."""
     ever_left: Estimate
     """Share of paths on which some period's ball did not hold the true law."""
+
+
+class DecideAnswer(Decided):
+    """The actions of a period."""
+
+    policy: str
+
+
+class DeclaredSpecification(TypedDict):
+    """A declared problem, with the settings of its training."""
+
+    problem: DeclaredProblem
+    """The problem."""
+    design: NotRequired[DeclaredDesign]
+    """States that the surrogates are trained on."""
+    surrogate: NotRequired[SurrogateSpecification]
+    """Settings of the surrogates."""
+    seed: NotRequired[int]
+    """Seed of all random draws."""
 
 
 class EvaluationRequest(TypedDict):
@@ -2955,6 +3213,10 @@ BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
 """A walk-forward of one asset, or of several assets if the request has the field `assets`."""
 
 
+EvaluationQuestion: TypeAlias = EvaluationRequest | DeclaredComparison
+"""A comparison of an investor's strategies, or of policies and rules of a declared problem, which has no `problem` of its own."""
+
+
 class EvaluationReport(TypedDict):
     """Strategies compared on common returns. `docs/evaluation.md` explains the intervals."""
 
@@ -3012,7 +3274,7 @@ class FrontierReport(TypedDict):
     """Sentences on what the figures show, and what they cannot show."""
 
 
-JobReport: TypeAlias = EvaluationReport | BacktestReport | AssetsBacktestReport | FrontierReport
+JobReport: TypeAlias = EvaluationReport | ComparisonReport | BacktestReport | AssetsBacktestReport | FrontierReport
 """The report of a job: of an evaluation, of a walk-forward backtest or of a frontier."""
 
 
@@ -3050,18 +3312,8 @@ class Observed(Uncertainty):
     """The test of whether returns still come from the same law."""
 
 
-class PolicyDetail(Labels):
-    """A policy, and how well each of its steps was solved."""
-
-    policy: str
-    created_ms: int
-    framework: Framework
-    horizon: int
-    specification: Specification
-    annualised: NotRequired[Annualised | None]
-    warnings: list[Warning]
-    """Valid entries of the specification that may be mistakes."""
-    diagnostics: list[StepDiagnostics]
+Posed: TypeAlias = Specification | DeclaredSpecification
+"""A problem that a policy is trained for, with all settings of the training."""
 
 
 class Reading1(Record):
@@ -3142,6 +3394,20 @@ class Observation(Observed):
     corrections: NotRequired[list[int]]
     """Numbers of the corrections that inserted it or reported it again."""
     now: NotRequired[Now | None]
+
+
+class PolicyDetail(Labels):
+    """A policy, and how well each of its steps was solved."""
+
+    policy: str
+    created_ms: int
+    framework: Framework
+    horizon: int
+    specification: Posed
+    annualised: NotRequired[Annualised | None]
+    warnings: list[Warning]
+    """Valid entries of the specification that may be mistakes."""
+    diagnostics: list[StepDiagnostics]
 
 
 ReportsAnswered: TypeAlias = Observed | list[ElementAnswered]

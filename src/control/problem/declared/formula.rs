@@ -276,7 +276,9 @@ impl<'t> Parser<'t> {
             Token::Word(word) => {
                 let place = self.names.iter().position(|name| *name == word);
                 let place = place.ok_or_else(|| {
-                    self.error(format!("`{word}` is no name of this problem: {}", self.names.join(", ")))
+                    // Names that may not be used in this formula are empty.
+                    let named: Vec<&str> = self.names.iter().copied().filter(|name| !name.is_empty()).collect();
+                    self.error(format!("`{word}` is no name of this formula: {}", named.join(", ")))
                 })?;
                 self.place += 1;
                 self.code.push(Instruction::Name(place));

@@ -8,17 +8,22 @@
 //! depends.
 
 mod formula;
+mod jumps;
 mod reading;
+mod rules;
 mod sampling;
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 use self::formula::Formula;
+pub use self::rules::FormulaRule;
 use super::actions::{ActionInterval, ActionSet};
 use super::controlled::Controlled;
 use super::utility::RelativeUtility;
 use crate::control::error::FieldError;
+use crate::control::request::bounds::within;
 use crate::control::request::specification::UtilitySpecification;
 
 /// Rounding of a state at the edge of its range, as a share of the range.
@@ -27,7 +32,7 @@ const EDGE: f64 = 1e-9;
 const LEAST_AMOUNT: f64 = 1e-300;
 
 /// A declared problem whose formulas are parsed and whose rules hold.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Declared {
     /// States, actions, the noise, `t`, `T` and the parameters, in the order of the values of a formula.
     names: Vec<String>,
@@ -52,7 +57,7 @@ pub struct Declared {
 }
 
 /// The choice of one action.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum Action {
     /// The formulas of its bounds.
     Bounds([Formula; 2]),
@@ -80,6 +85,46 @@ impl Declared {
         EarnedState { values: self.start.clone(), earned: 0.0 }
     }
 
+    /// Returns the problem without the fault that states have reached.
+    pub fn afresh(&self) -> Declared {
+        Declared { left: OnceLock::new(), ..self.clone() }
+    }
+
+    /// Reads a state by the names of its numbers, before which nothing was earned.
+    ///
+    /// # Errors
+    /// A name without a number, another name, a number out of its range.
+    pub fn state(&self, field: &str, state: &BTreeMap<String, f64>) -> Result<EarnedState, FieldError> {
+        let names = self.states_named();
+        if let Some((other, value)) = state.iter().find(|(name, _)| !names.contains(name)) {
+            let rule = format!("must name one of the states: {}", names.join(", "));
+            return Err(FieldError::new(format!("{field}.{other}"), value, rule));
+        }
+        let value = |(name, [low, high]): (&String, &[f64; 2])| {
+            let field = format!("{field}.{name}");
+            let value =
+                state.get(name).ok_or_else(|| FieldError::new(&field, "null", "must be given for each state"))?;
+            within(&field, *value, *low, *high).map(|()| *value)
+        };
+        let values = names.iter().zip(&self.ranges).map(value).collect::<Result<_, _>>()?;
+        Ok(EarnedState { values, earned: 0.0 })
+    }
+
+    /// Names the numbers of a state in words.
+    pub fn named(&self, step: usize, state: &EarnedState) -> String {
+        self.point(step, &state.values, None)
+    }
+
+    /// Returns what an amount of a step is worth at the start; never 0, by which one would divide.
+    pub fn discounted(&self, step: usize) -> f64 {
+        self.discount.powi(step as i32).max(f64::MIN_POSITIVE)
+    }
+
+    /// Returns the names of the states.
+    pub fn states_named(&self) -> &[String] {
+        &self.names[..self.ranges.len()]
+    }
+
     /// Returns the names of the actions.
     pub fn actions_named(&self) -> &[String] {
         &self.names[self.ranges.len()..][..self.actions.len()]
@@ -91,7 +136,19 @@ impl Declared {
         low + (scaled + 0.5) * (high - low)
     }
 
+    /// Returns the width of the support of the noise, in its own unit.
+    pub fn noise_width(&self) -> f64 {
+        self.noise[1] - self.noise[0]
+    }
+
     /// Returns the noise of the solver from one in its own unit.
+    ///
+    /// # Errors
+    /// It lies beyond its support.
+    pub fn checked_noise(&self, field: &str, noise: f64) -> Result<f64, FieldError> {
+        within(field, noise, self.noise[0], self.noise[1]).map(|()| self.scaled(noise))
+    }
+
     fn scaled(&self, noise: f64) -> f64 {
         let [low, high] = self.noise;
         (noise - low) / (high - low) - 0.5

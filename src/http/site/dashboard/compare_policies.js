@@ -6,8 +6,9 @@ import { lineChart } from "./chart.js";
 import { h, section } from "./dom.js";
 import { inWords as flowsInWords } from "./flows.js";
 import { count, counted, percent, percentTick, points, significant, wealth } from "./format.js";
+import { policyLink } from "./naming.js";
 import { unitOf } from "./periods.js";
-import { caution, centreInWords, FRAMEWORKS, moments, utility } from "./specification.js";
+import { caution, centreInWords, FRAMEWORKS, isDeclared, moments, utility } from "./specification.js";
 import { surfaceCurve } from "./surface_view.js";
 
 /** Number of points at which the two are evaluated. */
@@ -16,6 +17,7 @@ const ALONG = 61;
 export async function policiesBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
   const asked = both.map(({ specification }) => specification);
+  if (asked.some(isDeclared)) return h("p", { class: "lead" }, "Only policies of investors can be compared. Of these, ", asked.every(isDeclared) ? "both are" : "one is", " of a declared problem: see ", ids.map((id, index) => [index ? " and " : "", policyLink(id)]), ".");
   const table = beside("Two policies side by side", "policies", "Policy", ids, both.map(({ name }) => name), rows(asked));
   return [h("p", { class: "lead" }, differences(asked, "They")), table, curves(ids, both, leaving)];
 }

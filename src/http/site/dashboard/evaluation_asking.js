@@ -6,7 +6,7 @@ import { fieldset, input, refusal, select, sending } from "./form.js";
 import { typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { policyChoices } from "./session_opening.js";
-import { FRAMEWORKS } from "./specification.js";
+import { FRAMEWORKS, investorsOnly } from "./specification.js";
 
 export async function view(query, leaving) {
   const policies = await all("/policies", "policies", leaving);
@@ -63,6 +63,7 @@ function asking(policies, asked) {
   );
   sending(form, send, async () => {
     const { specification } = await get(`/policies/${policy.control.value}`);
+    investorsOnly(specification);
     const request = composed(specification, policy.control.value, {
       frameworks: [...frameworks.querySelectorAll(":checked")].map(({ value }) => value),
       paths: typed(paths.control.value),

@@ -2,6 +2,7 @@
 
 import { download, get } from "./api.js";
 import * as backtest from "./backtest.js";
+import * as comparison from "./comparison.js";
 import { h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
 import { pressed } from "./form.js";
@@ -28,6 +29,9 @@ const reported = (kind, [above, href], drawn) => async (id, leaving) => {
   return { title, trail, under, actions: h("div", { class: "actions" }, [sheet, whole].filter(Boolean)), body: drawn.body(report, policyLink) };
 };
 
+/** Draws an evaluation: of an investor's strategies, or a comparison of policies of a declared problem with rules. */
+const compared = (report, link) => (report.format === "ballast-comparison-1" ? comparison : evaluation).body(report, link);
+
 export const ofBacktest = reported("backtest", EVALUATIONS, backtest);
-export const ofEvaluation = reported("evaluate", EVALUATIONS, evaluation);
+export const ofEvaluation = reported("evaluate", EVALUATIONS, { body: compared });
 export const ofFrontier = reported("frontier", ["Jobs", "#/jobs"], frontier);

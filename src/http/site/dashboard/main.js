@@ -4,6 +4,7 @@ import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import * as backtestAsking from "./backtest_asking.js";
 import * as compare from "./compare.js";
+import * as declare from "./declare.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
 import { holderWords, lacking, lackWords } from "./holder.js";
@@ -23,6 +24,7 @@ import * as train from "./train.js";
 const ROUTES = [
   [/^#\/jobs$/, jobs.view, "jobs"],
   [/^#\/train(?:\?(.*))?$/, train.view, "jobs", "train"],
+  [/^#\/declare(?:\?(.*))?$/, declare.view, "jobs", "train"],
   [/^#\/policies$/, policies.view, "policies"],
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
   [/^#\/(?:sessions)?(?:\?.*)?$/, sessions.view, "sessions"],

@@ -50,6 +50,13 @@ export function typed(text, { shares = false } = {}) {
   return hasPercent(text) ? hundredth(values[0]) : values[0];
 }
 
+/** Reads a number with a decimal point and no commas, as formulas and JSON have it. Returns null if the text is blank, and the text if it is not
+ * one. */
+export function pointed(text) {
+  if (text.trim() === "") return null;
+  return isNumber(text, "point") && !/[,%]/.test(text) ? numberOf(text, "point") : text.trim();
+}
+
 /** Returns a number typed in percent as a fraction, or null if it is not a number. */
 export function fraction(text) {
   const value = typed(text.replace(/\s*%$/, ""));

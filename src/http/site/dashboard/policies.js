@@ -7,7 +7,7 @@ import { count, moment, percent } from "./format.js";
 import { called, headed, tagList } from "./naming.js";
 import { foot, Pages } from "./pages.js";
 import { ticking } from "./ticking.js";
-import { caution, FRAMEWORKS, utility } from "./specification.js";
+import { caution, FRAMEWORKS, isDeclared, utility } from "./specification.js";
 
 /** Rows shown at a time: fewer than in other lists, because each needs a call of its own. */
 const PAGE = 50;
@@ -26,6 +26,7 @@ export async function view(_, leaving) {
     "div",
     { class: "actions" },
     importer(),
+    h("a", { class: "button quiet", href: "#/declare", "data-needs": "train" }, "Declare a problem"),
     h("a", { class: "button", href: "#/train" }, "Train a policy"),
   );
   if (rows.length === 0) return { title: "Policies", actions, body: empty() };
@@ -71,7 +72,7 @@ function listed(rows, ticks) {
           ),
       },
       { name: "Kind", cell: of(({ framework }) => FRAMEWORKS[framework]) },
-      { name: "Investor", cell: said((problem) => utility(problem.utility)) },
+      { name: "Investor", cell: said((problem) => (isDeclared({ problem }) ? `None: decides ${Object.keys(problem.actions).join(", ")}` : utility(problem.utility))) },
       { name: "Caution", cell: said((problem) => caution(problem)) },
       { name: "Periods ahead", numeric: true, cell: of(({ horizon }) => count(horizon)) },
       { name: "Bank rate", numeric: true, cell: of(({ rate_per_step }) => percent(rate_per_step, 2)) },

@@ -2,17 +2,19 @@
 
 import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
+import { declaredBody } from "./declared_policy.js";
 import { disclosure, h, section, table } from "./dom.js";
 import { pressed } from "./form.js";
 import { basisPoints, count, figures, moment, percent, percentTick, short } from "./format.js";
 import { labelled, titled } from "./naming.js";
 import { unitOf } from "./periods.js";
-import { FRAMEWORKS, inPaperWords, inWords, warningList } from "./specification.js";
+import { FRAMEWORKS, inPaperWords, inWords, isDeclared, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
 
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics, annualised, warnings } = policy;
+  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, await offers("/evaluate")));
   const { element, told } = answer(specification, diagnostics);
   const body = [
     h(
@@ -30,11 +32,15 @@ export async function view(id, leaving) {
   const evaluate = (await offers("/evaluate"))
     ? h("a", { class: "button quiet", href: `#/evaluations/new?policy=${id}` }, "Evaluate")
     : null;
+  return framed(id, policy, [h("a", { class: "button", href: `#/sessions/new?policy=${id}` }, "Open a session"), evaluate], body);
+}
+
+/** Returns the page of a policy, with what every policy has beside its own `actions` and `body`. */
+function framed(id, policy, own, body) {
   const actions = h(
     "div",
     { class: "actions" },
-    h("a", { class: "button", href: `#/sessions/new?policy=${id}` }, "Open a session"),
-    evaluate,
+    own,
     h(
       "a",
       {

@@ -23,10 +23,13 @@ function ofAssets(assets) {
 const onRecord = ({ history }) => `, on ${counted(history.length, "return")}`;
 
 const ABOUT = {
-  async evaluate({ request: { problem, policies } }, signal) {
+  async evaluate({ request: { problem, policies }, problem: declared }, signal) {
     const [policy] = Object.values(policies);
     const { name } = policy ? await get(`/policies/${policy}`, signal).catch(() => ({})) : {};
-    return name ? ` of ${name}` : `${ofAssets(problem.assets)}${onRecord(problem)}, ${counted(problem.horizon, unitOf(problem.periods_per_year))} ahead`;
+    if (name) return ` of ${name}`;
+    // A comparison has a declaration in the place of an investor's problem.
+    if (declared) return `${ofAssets(Object.keys(declared.actions))}, ${counted(declared.horizon, "period")} ahead`;
+    return `${ofAssets(problem.assets)}${onRecord(problem)}, ${counted(problem.horizon, unitOf(problem.periods_per_year))} ahead`;
   },
   backtest({ assets, dates, periods, periods_per_year }) {
     const length = periods[0].wealth.length;

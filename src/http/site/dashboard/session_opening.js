@@ -8,6 +8,7 @@ import { labelFields } from "./naming.js";
 import { fraction, typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { returnsField } from "./returns_field.js";
+import { investorsOnly } from "./specification.js";
 
 export async function view(query, leaving) {
   const policies = await all("/policies", "policies", leaving);
@@ -71,6 +72,7 @@ function opening(policies, asked, leaving) {
     if (asked === "") return;
     const { specification } = await get(`/policies/${asked}`, leaving);
     if (asked !== policy.control.value) return;
+    investorsOnly(specification);
     assets = specification.fund?.assets ?? null;
     allow(specification);
     holding.element.hidden = assets !== null;

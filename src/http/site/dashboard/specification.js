@@ -1,10 +1,10 @@
 // A training request in words.
 
-import { post } from "./api.js";
+import { post, Problem } from "./api.js";
 import { h } from "./dom.js";
 import * as flows from "./flows.js";
 import { pressed } from "./form.js";
-import { count, counted, percent, significant, wealth } from "./format.js";
+import { count, counted, minus, percent, significant, wealth } from "./format.js";
 import { unitOf } from "./periods.js";
 
 /** The kinds of policy in a manager's words; `PAPER` has the paper's. */
@@ -102,6 +102,14 @@ export function moments(values) {
   return { mean, deviation: Math.sqrt(variance) };
 }
 
+/** Tells whether a policy is of a problem that was declared in formulas. */
+export const isDeclared = ({ problem }) => problem.states !== undefined;
+
+/** Refuses a policy that has no investor. */
+export function investorsOnly(specification) {
+  if (isDeclared(specification)) throw new Problem({ title: "Not for this policy", field: "policy", detail: "This policy is of a declared problem, without an investor. Its own page says what to do." });
+}
+
 /** Tells whether the uncertainty set is a ball of laws. */
 export const hasBall = ({ framework }) => framework === "adaptive" || framework === "static";
 
@@ -118,18 +126,19 @@ function banks({ rate_per_step, periods_per_year }) {
   return `The bank pays ${percent(rate_per_step, 2)} a ${unitOf(periods_per_year)}${a_year},`;
 }
 
-/** The texts of warnings by their codes, in the words and the units of the form; `field` is the field in doubt. */
+/** The texts of warnings by their codes, in the words and the units of the form; `field` is the field in doubt, `message` the service's text. */
 export const WARNED = {
   rate_high: (problem) => `${banks(problem)} more than banks usually do. Is that what it pays in one ${unitOf(problem.periods_per_year)}, or in a year?`,
   rate_above_record: (problem) => `${banks(problem)} more than the average return of the record. Is that what it pays in one ${unitOf(problem.periods_per_year)}?`,
   record_in_percent: (_, field) =>
     `The ${field.includes("centre") ? "assumed " : ""}returns vary more than those of any market. Are they percentages that were read as fractions?`,
   trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of what is traded. Is that right?`,
+  jumps: (_, field, message) => minus(message),
 };
 
 /** Lists the warnings about a problem. */
 export function warningList(warnings, problem) {
-  return warnings.map(({ code, field }) => h("p", { class: "note wrong" }, WARNED[code](problem, field)));
+  return warnings.map(({ code, field, message }) => h("p", { class: "note wrong" }, WARNED[code](problem, field, message)));
 }
 
 /** Asks in the form whether the warnings about a queued job are right, if there are any; `yes()` continues. The other answer cancels the job

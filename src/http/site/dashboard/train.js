@@ -6,7 +6,7 @@ import { draft } from "./draft.js";
 import { fieldset, refusal, sending } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
-import { hasBall, meant } from "./specification.js";
+import { hasBall, investorsOnly, meant } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
 /** The form's initial request; null fields are to be filled in or may be left out. */
@@ -66,7 +66,9 @@ export async function view(query, leaving) {
   const origin = asked.get("from") ?? asked.get("newer");
   const drafts = draft(`#/train?${query ?? ""}`);
   const kept = drafts.read();
-  let request = origin ? requestOf((await get(`/policies/${origin}`, leaving)).specification) : initial();
+  const { specification } = origin ? await get(`/policies/${origin}`, leaving) : {};
+  if (specification) investorsOnly(specification);
+  let request = origin ? requestOf(specification) : initial();
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
   // Whether the periods a year in the form come from the dates of a record.
@@ -198,7 +200,8 @@ export async function view(query, leaving) {
   const trail = h("p", { class: "trail" }, origin ? ["Like ", policyLink(origin)] : h("a", { href: "#/jobs" }, "Jobs"));
   const newer = asked.has("newer");
   const again = () => dispatchEvent(new HashChangeEvent("hashchange"));
-  return { title: newer ? "Train on newer returns" : "Train a policy", trail, body: [origin ? told(newer) : "", kept ? drafts.note(again) : "", form] };
+  const actions = h("a", { class: "button quiet", href: "#/declare" }, "Declare a problem");
+  return { title: newer ? "Train on newer returns" : "Train a policy", trail, actions, body: [origin ? told(newer) : "", kept ? drafts.note(again) : "", form] };
 }
 
 /** Says what to do with a form that is filled from a policy. */
@@ -210,7 +213,7 @@ function told(newer) {
 }
 
 /** Returns JSON with one field a line and the numbers of the history side by side. */
-function compact(request) {
+export function compact(request) {
   return JSON.stringify(request, null, 2).replace(
     /\[\s*([-\d.e+,\s]*?)\s*\]/g,
     (_, inside) => `[${inside.replace(/\s+/g, " ")}]`,

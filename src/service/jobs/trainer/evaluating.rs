@@ -1,23 +1,31 @@
 //! Evaluation jobs: first the trainings, one after another, with a checkpoint at each step; then the simulation, as one
 //! step.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::{JobEnd, Worker, failed, reported, requested, unwritten};
 use crate::control::cache::Cache;
 use crate::control::estimate;
+use crate::control::evaluation::declared_comparison::Comparison;
 use crate::control::evaluation::paths::{Evaluation, Follower};
 use crate::control::evaluation::report::{Costs, EvaluationReport};
 use crate::control::policy::Policy;
 use crate::control::policy::advisor::Advisor;
+use crate::control::policy::declared::DeclaredPolicy;
 use crate::control::progress::Watch;
+use crate::control::request::declared_comparison::{DeclaredComparison, EvaluationQuestion};
 use crate::control::request::framework::Framework;
 use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
     pub(super) fn evaluate(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, JobEnd> {
-        let evaluation = Evaluation::new(requested(claimed)?).map_err(|error| failed(error.to_string()))?;
+        let request = match requested(claimed)? {
+            EvaluationQuestion::Investor(request) => *request,
+            EvaluationQuestion::Declared(request) => return self.compare(claimed, *request, stop),
+        };
+        let evaluation = Evaluation::new(request).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::evaluation(&evaluation.request, self.threads))?;
         let kept = Cache::new(estimate::kept_by_evaluation(&evaluation.request));
         let evaluation = evaluation.keeping(kept.clone());
@@ -29,6 +37,27 @@ impl Worker {
         }
         let training_seconds = started.elapsed().as_secs_f64();
         self.pool.install(|| self.report(claimed, &evaluation, &followers, training_seconds, stop))
+    }
+
+    /// Compares policies and rules of a declared problem.
+    fn compare(
+        &self,
+        claimed: &ClaimedJob,
+        request: DeclaredComparison,
+        stop: &AtomicBool,
+    ) -> Result<JobOutcome, JobEnd> {
+        let mut advisors = Vec::with_capacity(request.policies.len());
+        for id in request.policies.values() {
+            let row = self.runtime.block_on(self.store.policy(&claimed.row.tenant, id))?;
+            let row = row.ok_or_else(|| failed(format!("the policy {id} was deleted")))?;
+            let policy: DeclaredPolicy =
+                serde_json::from_slice(&row.json).map_err(|error| failed(error.to_string()))?;
+            advisors.push(Arc::new(policy.prepared(Cache::default()).map_err(|error| failed(error.to_string()))?));
+        }
+        let comparison = Comparison::new(request, advisors).map_err(|error| failed(error.to_string()))?;
+        let _reserved = self.reserve(&comparison.footprint())?;
+        let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };
+        reported(&self.pool.install(|| comparison.run(&watch))?)
     }
 
     /// Returns a framework with its policy: stored, or trained here as the steps of the job after `steps_done`.

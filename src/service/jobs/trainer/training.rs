@@ -4,11 +4,17 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::{JobEnd, Worker, failed};
+use super::{JobEnd, Worker, failed, requested};
 use crate::control::cache::Cache;
+use crate::control::declared_training::DeclaredTraining;
+use crate::control::error::TrainError;
 use crate::control::estimate;
+use crate::control::policy::declared::DeclaredPolicy;
 use crate::control::policy::{Policy, content_hash};
+use crate::control::policy_document::PolicyDocument;
+use crate::control::posed::Posed;
 use crate::control::progress::Watch;
+use crate::control::request::declared::DeclaredSpecification;
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::StepSolution;
 use crate::control::training::Training;
@@ -17,14 +23,34 @@ use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
     pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, JobEnd> {
-        let specification: Specification = serde_json::from_str(&claimed.request_json)
-            .map_err(|error| failed(format!("the stored specification cannot be read: {error}")))?;
-        let _reserved = self.reserve(&estimate::training(&specification, self.threads))?;
-        let kept = Cache::new(estimate::kept_by_training(&specification));
-        let policy = self.trained(claimed, &specification, 0, kept, stop)?;
+        let document = match requested(claimed)? {
+            Posed::Investor(specification) => {
+                let _reserved = self.reserve(&estimate::training(&specification, self.threads))?;
+                let kept = Cache::new(estimate::kept_by_training(&specification));
+                PolicyDocument::Investor(self.trained(claimed, &specification, 0, kept, stop)?.into())
+            }
+            Posed::Declared(declared) => {
+                PolicyDocument::Declared(self.trained_declared(claimed, &declared, stop)?.into())
+            }
+        };
         let policy_json =
-            policy.to_json().map_err(|error| failed(format!("the policy cannot be written as JSON: {error}")))?;
+            document.to_json().map_err(|error| failed(format!("the policy cannot be written as JSON: {error}")))?;
         Ok(JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json })
+    }
+
+    fn trained_declared(
+        &self,
+        claimed: &ClaimedJob,
+        declared: &DeclaredSpecification,
+        stop: &AtomicBool,
+    ) -> Result<DeclaredPolicy, JobEnd> {
+        let read = DeclaredTraining::with(declared, Cache::default()).map_err(TrainError::from)?;
+        let _reserved = self.reserve(&estimate::declared::training(&read, self.threads).0)?;
+        let kept = Cache::new(estimate::kept_by_training(read.specification()));
+        let training = DeclaredTraining::with(declared, kept).map_err(TrainError::from)?;
+        let solve = |step: usize, after: Option<&StepSolution>, watch: &Watch| training.solve_step(step, after, watch);
+        let steps = self.solved(claimed, 1..training.horizon(), 0, &solve, stop)?;
+        Ok(DeclaredPolicy::new(declared.clone(), steps))
     }
 
     /// Returns the policy of a specification, resumed from the checkpoints. Step s is checkpoint `first + s` of the
@@ -37,17 +63,33 @@ impl Worker {
         kept: Cache,
         stop: &AtomicBool,
     ) -> Result<Policy, JobEnd> {
-        let job = claimed.row.job.as_str();
         let training = self.pool.install(|| Training::with(specification, kept))?;
+        let solve = |step: usize, after: Option<&StepSolution>, watch: &Watch| training.solve_step(step, after, watch);
+        let steps = self.solved(claimed, 0..training.horizon(), first, &solve, stop)?;
+        Ok(training.into_policy(steps))
+    }
+
+    /// Returns the solutions of `steps`, ascending, resumed from the checkpoints. Step s is checkpoint `first + s` of the
+    /// job.
+    fn solved(
+        &self,
+        claimed: &ClaimedJob,
+        steps: Range<usize>,
+        first: usize,
+        solve: &SolveStep<'_>,
+        stop: &AtomicBool,
+    ) -> Result<Vec<StepSolution>, JobEnd> {
+        let job = claimed.row.job.as_str();
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
-        let mut steps = resumed(first..first + training.horizon(), &checkpoints);
+        let Range { start, end } = steps;
+        let mut steps = resumed(first + start..first + end, &checkpoints);
         if first == 0 || !steps.is_empty() {
             self.board.resume(job, first + steps.len());
         }
-        for step in (0..training.horizon() - steps.len()).rev() {
+        for step in (start..end - steps.len()).rev() {
             let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
             let started = Instant::now();
-            let solution = self.pool.install(|| training.solve_step(step, steps.last(), &watch))?;
+            let solution = self.pool.install(|| solve(step, steps.last(), &watch))?;
             metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
             let bytes = solution
                 .to_checkpoint()
@@ -60,9 +102,12 @@ impl Worker {
             self.board.finish_step(job);
         }
         steps.reverse();
-        Ok(training.into_policy(steps))
+        Ok(steps)
     }
 }
+
+/// Solves a step, given the step after it.
+type SolveStep<'a> = dyn Fn(usize, Option<&StepSolution>, &Watch) -> Result<StepSolution, TrainError> + Sync + 'a;
 
 /// Returns the solutions that need not be computed again. These are the checkpoints in `range`, from its end downwards
 /// without a gap, in the format of this release.

@@ -1,0 +1,73 @@
+//! The actions of a declared problem's policy, at a state that the caller knows. Nothing is stored.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+use crate::control::policy::declared::Decided;
+use crate::service::advice::explain::ATOM_BYTES;
+use crate::service::error::ServiceError;
+use crate::service::process::memory::Large;
+use crate::service::sessions::Sessions;
+use crate::store::Tenant;
+
+/// A state of a declared problem, and what was seen on the way to it.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Decide {
+    /// The policy.
+    pub policy: String,
+    /// The period to decide, from 1. Default: 1.
+    #[serde(default = "first")]
+    #[schema(example = 2)]
+    pub period: usize,
+    /// The states before the period, each by its name. Default in the first period: the declared start.
+    #[serde(default)]
+    #[schema(example = json!({ "stock": 7.0 }))]
+    pub state: Option<BTreeMap<String, f64>>,
+    /// The noises of all periods before this one, oldest first. Default: none.
+    #[serde(default)]
+    #[schema(example = json!([18.0]))]
+    pub noises: Vec<f64>,
+}
+
+fn first() -> usize {
+    1
+}
+
+/// The actions of a period.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct DecideAnswer {
+    pub policy: String,
+    #[serde(flatten)]
+    pub decided: Decided,
+}
+
+impl Sessions {
+    /// Decides a period at a state. The robust step is solved against the value that was trained for the step after.
+    ///
+    /// # Errors
+    /// There is no such policy, a field breaks a rule, actions lead the state out of its range, or too much work waits
+    /// already.
+    pub async fn decide(&self, tenant: &Tenant, question: Decide) -> Result<Large<DecideAnswer>, ServiceError> {
+        let Decide { policy, period, state, noises } = question;
+        let advisor = self.policies.decider(tenant, &policy).await?;
+        let returns = advisor.specification().problem.history.len() + noises.len();
+        let solve = move || advisor.decide(period, state.as_ref(), &noises);
+        let room = self.memory.answers(returns * ATOM_BYTES).await?;
+        let decided = self.resolving.run_on_record(tenant, returns, solve).await?.map_err(of_state)?;
+        Ok(Large { value: DecideAnswer { policy, decided }, room })
+    }
+}
+
+/// Names the field of this request in a fault that a state leads to.
+fn of_state(fault: FieldError) -> FieldError {
+    match fault.field.strip_prefix("problem") {
+        None => fault,
+        Some(_) => {
+            FieldError::new("state", "a state of the policy's problem", format!("must lead to no fault, but {fault}"))
+        }
+    }
+}
