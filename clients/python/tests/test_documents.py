@@ -26,7 +26,7 @@ def run(code: str, service: Service, folder: Path = HERE) -> subprocess.Complete
 
 
 def test_the_readme_of_the_client_runs(service: Service) -> None:
-    first, quick_start, awaited, error = blocks((HERE / "README.md").read_text())
+    first, quick_start, declared, awaited, error = blocks((HERE / "README.md").read_text())
     read, advised = run(first, service, REPOSITORY).stdout.splitlines()
     assert read.startswith("1109 monthly simple returns as fractions, ") and re.match(r"0\.78\d+ \[\]$", advised)
     lines = run(quick_start, service).stdout.splitlines()
@@ -34,6 +34,9 @@ def test_the_readme_of_the_client_runs(service: Service) -> None:
     assert lines[0].endswith(" 100.0") and lines[3].count("'log_return'") == 3
     together = json.loads(run(quick_start + awaited, service).stdout.splitlines()[-1])
     assert len(together) == 2 and all(0.0 <= allocation <= 1.0 for allocation in together)
+    actions, value, *compared = run(declared, service).stdout.splitlines()
+    assert re.match(r"\{'order': \d+\.\d+\}$", actions) and 100 < float(value) < 250
+    assert [line.split()[0] for line in compared[-2:]] == ["robust", "base"]
     expected = error.split("#")[1].strip()
     assert run(quick_start + error, service).stdout.splitlines()[-1] == expected
 

@@ -1,7 +1,8 @@
-"""The tutorial runs from the first cell to the last and shows what its text describes."""
+"""The tutorials run from the first cell to the last and show what their text describes."""
 
 from __future__ import annotations
 
+import ast
 import math
 from typing import Any
 
@@ -17,10 +18,9 @@ from ballast import Ballast
 FOLDER = REPOSITORY / "clients/python/examples"
 
 
-@pytest.fixture(scope="module")
-def cells(service: Service) -> list[Any]:
-    """Runs the notebook in its folder and returns its code cells."""
-    stored = nbformat.read(FOLDER / "first_advice.ipynb", as_version=4)  # type: ignore[no-untyped-call]
+def ran(service: Service, name: str) -> list[Any]:
+    """Runs a notebook in its folder and returns its code cells."""
+    stored = nbformat.read(FOLDER / name, as_version=4)  # type: ignore[no-untyped-call]
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in stored.cells), "stored with outputs"
     sources = [cell.source for cell in stored.cells]
     assert sum(URL in source for source in sources) == 1
@@ -30,6 +30,16 @@ def cells(service: Service) -> list[Any]:
     client = NotebookClient(stored, timeout=900, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}})
     client.execute()
     return [cell for cell in stored.cells if cell.cell_type == "code"]
+
+
+@pytest.fixture(scope="module")
+def cells(service: Service) -> list[Any]:
+    return ran(service, "first_advice.ipynb")
+
+
+@pytest.fixture(scope="module")
+def own(service: Service) -> list[Any]:
+    return ran(service, "own_problem.ipynb")
 
 
 def shown(cell: Any, media: str) -> list[str]:
@@ -53,5 +63,17 @@ def test_its_advice_is_that_of_the_service(cells: list[Any], service: Service) -
     assert first[0] == "allocation" and float(first[1]) == pytest.approx(direct["allocation"], abs=1e-6)
 
 
-def test_it_says_nothing_that_it_should_not(cells: list[Any]) -> None:
-    assert not [output for cell in cells for output in cell.outputs if output.get("name") == "stderr"]
+def test_they_say_nothing_that_they_should_not(cells: list[Any], own: list[Any]) -> None:
+    assert not [output for cell in cells + own for output in cell.outputs if output.get("name") == "stderr"]
+
+
+def test_a_problem_of_ones_own_does_what_its_text_says(own: list[Any]) -> None:
+    assert [len(shown(cell, "image/png")) for cell in own] == [0, 0, 0, 1, 0, 0, 1]
+    first = ast.literal_eval(shown(own[2], "text/plain")[0])
+    assert 15 < first["order"] < 30 and first["guessed"] < 0.2
+    months, table = (shown(own[place], "text/plain")[0].splitlines() for place in (4, 5))
+    assert len(months) == 8 and "worth left" in months[0]
+    apart = {" ".join(line.split()[:-4]): [float(number) for number in line.split()[-2:]] for line in table[2:]}
+    assert list(apart) == ["cautious", "trusting", "fill to 18", "fill to 25"]
+    assert apart["trusting"][0] < 0 < apart["trusting"][1]
+    assert apart["fill to 18"][1] < 0 and apart["fill to 25"][1] < 0

@@ -92,20 +92,22 @@ impl<P: Controlled> ControlledStep<'_, P> {
         best_of_all(&at.choices, &at)
     }
 
-    /// Returns the certainty equivalents of the even actions that a search begins with, from the lowest to the highest
-    /// one of the interval in a place, the others as they are given. They are good enough to show where the peaks are.
-    /// `None` if the set in this place is no interval.
-    pub fn along(
+    /// Solves the step, and returns for each action the certainty equivalents of the even actions that a search begins
+    /// with, from the lowest to the highest one of its interval, the others as they are best. They are good enough to show
+    /// where the peaks are. `None` if the set of the action is no interval.
+    pub fn solve_with_worths(
         &self,
         state: &P::State,
         law: &EmpiricalDistribution,
-        actions: &[f64],
-        place: usize,
-    ) -> Option<Vec<f64>> {
+    ) -> (ControlledSolution, Vec<Option<Vec<f64>>>) {
         let at = self.at(state, law);
-        let line = at.choices.axis(actions, place)?;
-        let worths = at.rough_worths(&line, even(1.0, 2.0, FINE_ACTIONS + 1));
-        Some(worths)
+        let found = best_of_all(&at.choices, &at);
+        let along = |place: usize| {
+            let line = at.choices.axis(&found.actions, place)?;
+            Some(at.rough_worths(&line, even(1.0, 2.0, FINE_ACTIONS + 1)))
+        };
+        let worths = (0..found.actions.len()).map(along).collect();
+        (found, worths)
     }
 
     fn at<'a>(&'a self, state: &'a P::State, law: &'a EmpiricalDistribution) -> ControlledState<'a, P> {

@@ -60,6 +60,7 @@ from .jobs import (
     WalkForward,
 )
 from .policy import AsyncPolicy, Policy
+from .problem import Expression, Problem, symbols
 from .progress import ProgressBar, ProgressPrinter
 from .session import AsyncSession, Session
 
@@ -80,6 +81,7 @@ __all__ = [
     "Comparison",
     "DamagedPolicy",
     "Evaluation",
+    "Expression",
     "Forbidden",
     "Frontier",
     "IdempotencyConflict",
@@ -94,6 +96,7 @@ __all__ = [
     "NotFound",
     "Overloaded",
     "Policy",
+    "Problem",
     "ProblemError",
     "ProgressBar",
     "ProgressPrinter",
@@ -114,5 +117,6 @@ __all__ = [
     "WalkForward",
     "frames",
     "plots",
+    "symbols",
     "wire",
 ]

@@ -152,10 +152,10 @@ impl DeclaredAdvisor {
         law: &EmpiricalDistribution,
     ) -> Result<Decided, FieldError> {
         let bellman = self.controlled.step(problem, step);
-        let found = finite(bellman.solve(state, law), problem, step, state)?;
+        let (found, worths) = bellman.solve_with_worths(state, law);
+        let found = finite(found, problem, step, state)?;
         let names = problem.actions_named();
-        let along = |place: usize| bellman.along(state, law, &found.actions, place);
-        let has_several = |place: &usize| along(*place).is_some_and(|worths| has_several_peaks(&worths));
+        let has_several = |place: &usize| worths[*place].as_ref().is_some_and(|worths| has_several_peaks(worths));
         let earned_later = problem.discounted(step);
         Ok(Decided {
             period: step + 1,
