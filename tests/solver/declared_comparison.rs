@@ -160,6 +160,8 @@ fn wrong_comparisons_are_refused() {
         (vec![policy.clone()], json!({ "rules": { "r": { "order": "1", "buy": "2" } } }), "rules.r.buy"),
         (vec![policy.clone()], json!({ "rules": { "r": { "order": "demand" } } }), "rules.r.order"),
         (vec![policy.clone()], json!({ "rules": { "r": { "order": "ln(stock - 100)" } } }), "rules.r.order"),
+        (vec![policy.clone()], json!({ "rules": { "r": { "order": "1/(stock - 4)" } } }), "rules.r.order"),
+        (vec![policy.clone()], json!({ "rules": { "r": { "order": "-1e308*1e308" } } }), "rules.r.order"),
         (vec![policy.clone()], json!({ "rules": { "a": { "order": "1" } } }), "rules.a"),
         (vec![policy.clone()], json!({ "paths": 99 }), "paths"),
         (vec![policy.clone()], json!({ "paths": 100_000, "level": 0.4 }), "level"),

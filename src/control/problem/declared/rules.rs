@@ -45,14 +45,15 @@ impl Declared {
     /// Returns the actions of a rule at a state: each is moved into its bounds, or to the nearest of its values.
     ///
     /// # Errors
-    /// A formula without a value there.
+    /// A formula without a value there, or with an infinite one.
     pub fn ruled(&self, rule: &FormulaRule, step: usize, state: &EarnedState) -> Result<Vec<f64>, FieldError> {
         let sets = Controlled::actions(self, step, state);
         let places = rule.formulas.iter().zip(self.actions_named()).zip(sets);
         let action = |(((text, formula), name), set): ((&(String, Formula), &String), ActionSet)| {
             let wanted = self.at(step, &state.values, None, |value| value(formula));
-            if wanted.is_nan() {
-                let at = format!("has no value at {}", self.named(step, state));
+            if !wanted.is_finite() {
+                let found = if wanted.is_nan() { "has no value".to_owned() } else { format!("is {wanted}") };
+                let at = format!("{found} at {}", self.named(step, state));
                 return Err(FieldError::new(format!("{}.{name}", rule.field), text, at));
             }
             Ok(match set {
