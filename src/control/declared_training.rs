@@ -51,6 +51,17 @@ impl DeclaredTraining {
         Ok(self.controlled()?.feature_count())
     }
 
+    /// Returns the same with `kept` as the cache.
+    #[must_use]
+    pub fn keeping(self, kept: Cache) -> Self {
+        DeclaredTraining { kept, ..self }
+    }
+
+    /// Returns the problem.
+    pub fn problem(&self) -> &Declared {
+        &self.problem
+    }
+
     /// Returns the declaration with every default filled in.
     pub fn declared(&self) -> &DeclaredSpecification {
         &self.declared

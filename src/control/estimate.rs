@@ -11,7 +11,7 @@ use super::bellman::problem::Problem;
 use super::evaluation::assets::AssetsBacktest;
 use super::evaluation::backtest::Backtest;
 use super::policy::Policy;
-use super::policy::prepared_step::{bytes_ready, factor_bytes, prepared_bytes};
+use super::policy::prepared_step::{bytes_ready, largest_design, prepared_bytes};
 use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
 use super::request::completion::DEFAULT_COUNT;
 use super::request::evaluation::EvaluationRequest;
@@ -21,7 +21,6 @@ use super::request::specification::Specification;
 use super::surrogate::counts::CANDIDATES_PER_POINT;
 use super::surrogate::design::GUARDS;
 use super::surrogate::learning::{LAW_BYTES, together};
-use super::surrogate::stored::Solution;
 use super::uncertainty::joint::joint_bytes;
 use crate::numerics::bridge::grown;
 use crate::numerics::gp::GaussianProcess;
@@ -171,12 +170,7 @@ fn advising_of(sizes: &Sizes) -> [Footprint; 3] {
 pub fn advising_by(policy: &Policy) -> [Footprint; 3] {
     let problem = &policy.specification().problem;
     let sizes = Sizes::of(policy.specification());
-    let design = |solution: &Solution| match solution {
-        Solution::Single(_) => (1, 0),
-        Solution::Surrogates(stored) => (stored.count(), factor_bytes(stored)),
-    };
-    let designs = policy.steps().iter().map(|step| design(&step.solution));
-    let (points, factor) = designs.max_by_key(|(_, bytes)| *bytes).unwrap_or_default();
+    let (points, factor) = largest_design(policy.steps());
     [
         Footprint::of("steps", points, factor),
         Footprint::of("specification.problem.radius.paths", sizes.paths, sizes.bridges),

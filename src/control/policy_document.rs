@@ -62,6 +62,24 @@ impl PolicyDocument {
         }
     }
 
+    /// Checks the document as hostile input, and returns the memory that answers take, including the policy itself.
+    ///
+    /// # Errors
+    /// The first field that breaks a rule.
+    pub fn checked(self) -> Result<(Self, [Footprint; 3]), FieldError> {
+        match self {
+            PolicyDocument::Investor(policy) => {
+                let policy = policy.checked()?;
+                let bytes = estimate::advising_by(&policy);
+                Ok((PolicyDocument::Investor(policy.into()), bytes))
+            }
+            PolicyDocument::Declared(policy) => {
+                let bytes = estimate::declared::advising_by(&policy, &policy.checked(Cache::default())?);
+                Ok((PolicyDocument::Declared(policy), bytes))
+            }
+        }
+    }
+
     /// Checks the document as hostile input, and returns the policy ready to answer.
     ///
     /// # Errors
@@ -80,14 +98,6 @@ impl PreparedPolicy {
         match self {
             PreparedPolicy::Investor(advisor) => advisor.bytes(),
             PreparedPolicy::Declared(advisor) => advisor.bytes(),
-        }
-    }
-
-    /// Returns the memory that answers take, including the policy itself.
-    pub fn footprints(&self) -> [Footprint; 3] {
-        match self {
-            PreparedPolicy::Investor(advisor) => estimate::advising_by(advisor.policy()),
-            PreparedPolicy::Declared(advisor) => estimate::declared::advising_by(advisor),
         }
     }
 

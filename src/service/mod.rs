@@ -155,6 +155,8 @@ impl Service {
         request: DeclaredComparison,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
+        // Before any policy is read there are as few of them as may be.
+        request.check()?;
         let mut advisors = Vec::with_capacity(request.policies.len());
         for (name, policy) in &request.policies {
             let advisor = self.policies.decider(&caller.tenant, policy).await;

@@ -6,7 +6,7 @@ use ballast::control::request::declared::DeclaredSpecification;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::support::{App, specification};
+use crate::support::{App, read, specification};
 
 over_either_store![a_trained_declaration_decides_as_the_command_does, a_restart_resumes_to_the_same_policy];
 
@@ -114,6 +114,28 @@ async fn what_is_wrong_is_named() {
         assert_eq!(status, 422, "{question}: {problem}");
         assert_eq!(problem["field"], field, "{question}: {problem}");
     }
+    // Of a name that stands twice the last would be read in silence.
+    for (path, body, field) in [
+        ("/decide", format!(r#"{{"policy":"{}","state":{{"stock":4,"stock":40}}}}"#, app.policy), "state"),
+        (
+            "/evaluate",
+            format!(r#"{{"policies":{{"a":"{}"}},"rules":{{"r":{{"order":"1","order":"2"}}}}}}"#, app.policy),
+            "rules.r",
+        ),
+    ] {
+        let request = app.client.post(format!("{}{path}", app.url)).header("content-type", "application/json");
+        let (status, problem) = read(request.body(body).send().await.unwrap()).await;
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{problem}");
+        assert!(problem["rule"].as_str().unwrap().contains("stands twice"), "{problem}");
+    }
+    // Policies are counted before any is read.
+    let many: serde_json::Map<String, Value> =
+        (0..2000).map(|k| (format!("p{k}"), json!(format!("{k:064x}")))).collect();
+    let (status, problem) = app.post("/evaluate", &json!({ "policies": many })).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("policies")), "{problem}");
+    // So are noises.
+    let (status, problem) = decide(&app, json!({ "noises": vec![20.0; 50_000] })).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("noises")), "{problem}");
     // A formula that is wrong is answered at once, with its column.
     let mut wrong = stock(3);
     wrong["problem"]["reward"] = json!("price*min(stock + ordr, demand)");

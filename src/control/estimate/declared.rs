@@ -2,8 +2,8 @@
 
 use super::{Footprint, LEAST, Sizes, advising_of, footprint, product};
 use crate::control::declared_training::DeclaredTraining;
-use crate::control::policy::declared::DeclaredAdvisor;
-use crate::control::policy::prepared_step::factor_bytes;
+use crate::control::policy::declared::DeclaredPolicy;
+use crate::control::policy::prepared_step::{largest_design, steps_bytes};
 use crate::control::request::completion::DEFAULT_COUNT;
 use crate::control::request::declared_comparison::DeclaredComparison;
 
@@ -23,22 +23,25 @@ pub fn training(training: &DeclaredTraining, threads: usize) -> (Footprint, [Foo
     (footprint(&sizes, solving, threads), advising_of(&sizes))
 }
 
-/// Returns the footprint of a comparison on so many paths of a horizon.
-pub fn comparison(request: &DeclaredComparison, horizon: usize) -> Footprint {
+/// Returns the footprint of a comparison on so many paths of a horizon, whose policies take `policies` bytes.
+pub fn comparison(request: &DeclaredComparison, horizon: usize, policies: usize) -> Footprint {
     let strategies = request.policies.len() + request.rules.len();
     let path = product(&[strategies + horizon, PATH_BYTES]);
-    Footprint::of("paths", request.paths, product(&[request.paths, path]).saturating_add(LEAST))
+    Footprint::of("paths", request.paths, product(&[request.paths, path]).saturating_add(LEAST)).and(
+        "policies",
+        request.policies.len(),
+        policies,
+    )
 }
 
-/// Returns the memory that decisions by the policy of a declared problem take, including the policy itself.
-pub fn advising_by(advisor: &DeclaredAdvisor) -> [Footprint; 3] {
-    let sizes = Sizes::of(advisor.specification());
-    let designs = advisor.policy().steps().iter().filter_map(|step| step.solution.surrogates());
-    let designs = designs.map(|stored| (stored.count(), factor_bytes(stored)));
-    let (points, factor) = designs.max_by_key(|(_, bytes)| *bytes).unwrap_or_default();
+/// Returns the memory that decisions by the policy of a declared problem take, including the policy itself. `read` is its
+/// declaration.
+pub fn advising_by(policy: &DeclaredPolicy, read: &DeclaredTraining) -> [Footprint; 3] {
+    let sizes = Sizes::of(read.specification());
+    let (points, factor) = largest_design(policy.steps());
     [
         Footprint::of("steps", points, factor),
         Footprint::of("specification.problem.radius.paths", sizes.paths, sizes.bridges),
-        Footprint::of("specification.problem.horizon", sizes.horizon, advisor.bytes()),
+        Footprint::of("specification.problem.horizon", sizes.horizon, steps_bytes(policy.steps())),
     ]
 }

@@ -102,9 +102,10 @@ impl Comparison {
     /// # Errors
     /// A field that breaks its rule, a formula that cannot be read, policies of different problems.
     pub fn new(request: DeclaredComparison, policies: Vec<Arc<DeclaredAdvisor>>) -> Result<Self, FieldError> {
+        request.check()?;
         let first = policies.first().ok_or_else(|| FieldError::new("policies", "{}", "must have one at least"))?;
         let declared = first.policy().specification().problem.clone();
-        request.check(declared.horizon)?;
+        request.check_decisions(declared.horizon)?;
         let problem = Declared::new(&declared)?;
         for ((name, id), policy) in request.policies.iter().zip(&policies) {
             if !policy.policy().specification().problem.is_alike(&declared) {
@@ -128,7 +129,12 @@ impl Comparison {
 
     /// Returns the memory that the simulation takes.
     pub fn footprint(&self) -> Footprint {
-        estimate::declared::comparison(&self.request, self.declared.horizon)
+        let bytes = |(_, player): &(String, Player)| match player {
+            Player::Policy(advisor) => advisor.bytes(),
+            Player::Rule(_) => 0,
+        };
+        let policies = self.players.iter().map(bytes).sum();
+        estimate::declared::comparison(&self.request, self.declared.horizon, policies)
     }
 
     /// Simulates every strategy on the current rayon pool. Noises are drawn from the history of the first policy, each

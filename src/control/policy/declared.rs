@@ -105,11 +105,15 @@ impl DeclaredPolicy {
         &self.steps
     }
 
-    /// Checks that the steps fit the declaration, which is read.
+    /// Reads the declaration as any other, checks that the steps fit it, and returns what was read.
     ///
     /// # Errors
     /// The first field that breaks a rule.
-    fn check(&self, training: &DeclaredTraining) -> Result<(), FieldError> {
+    pub fn checked(&self, kept: Cache) -> Result<DeclaredTraining, FieldError> {
+        if self.format != FORMAT {
+            return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
+        }
+        let training = DeclaredTraining::with(&self.specification, kept)?;
         if *training.declared() != self.specification {
             return Err(FieldError::new("specification", "an incomplete object", "must have every field filled in"));
         }
@@ -132,6 +136,6 @@ impl DeclaredPolicy {
             rules::whole(&format!("{field}.value.weights"), stored.value.weights.len(), &(1..=1))?;
             rules::whole(&format!("{field}.policy.weights"), stored.policy.weights.len(), &(actions..=actions))?;
         }
-        Ok(())
+        Ok(training)
     }
 }

@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use super::document::Policy;
 use crate::control::cache::{Cache, Key};
 use crate::control::request::specification::Specification;
+use crate::control::solved_step::StepSolution;
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::surrogate::value_surrogate::{Surrogate, ValueSurrogate};
 use crate::numerics::gp::GaussianProcess;
@@ -72,7 +73,22 @@ pub fn factor_bytes(stored: &StepSurrogates) -> usize {
 
 /// Returns the bytes of a prepared policy, without bridges and factors.
 pub fn prepared_bytes(policy: &Policy) -> usize {
-    let designs = policy.steps().iter().map(|step| match &step.solution {
+    let rows = policy.specification().fund.as_ref().map_or(0, |fund| fund.history.len() * fund.assets.len());
+    steps_bytes(policy.steps()) + 2 * rows * size_of::<f64>()
+}
+
+/// Returns the number of design points of the largest step, and the bytes of its process.
+pub fn largest_design(steps: &[StepSolution]) -> (usize, usize) {
+    let design = |step: &StepSolution| match &step.solution {
+        Solution::Single(_) => (1, 0),
+        Solution::Surrogates(stored) => (stored.count(), factor_bytes(stored)),
+    };
+    steps.iter().map(design).max_by_key(|(_, bytes)| *bytes).unwrap_or_default()
+}
+
+/// Returns the bytes of prepared steps.
+pub fn steps_bytes(steps: &[StepSolution]) -> usize {
+    let designs = steps.iter().map(|step| match &step.solution {
         Solution::Single(single) => (1, 0, single.floor_gains.len()),
         Solution::Surrogates(stored) => {
             let functions = stored.value.weights.len() + stored.policy.weights.len();
@@ -82,8 +98,7 @@ pub fn prepared_bytes(policy: &Policy) -> usize {
     let (points, inputs, functions) = designs.fold((0, 0, 0), |(sum, inputs, most), (points, own, functions)| {
         (sum + points, inputs.max(own), most.max(functions))
     });
-    let rows = policy.specification().fund.as_ref().map_or(0, |fund| fund.history.len() * fund.assets.len());
-    bytes_ready(policy.steps().len(), points, inputs, functions) + 2 * rows * size_of::<f64>()
+    bytes_ready(steps.len(), points, inputs, functions)
 }
 
 /// Returns the bytes for `steps` steps with `points` design points in all. They count the inputs, as stored and for

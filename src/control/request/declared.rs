@@ -189,7 +189,30 @@ fn no_discount() -> f64 {
 
 /// Reads an object by name, and refuses a name that stands twice: the last would be taken in silence.
 pub fn distinct<'de, D: Deserializer<'de>, V: Deserialize<'de>>(source: D) -> Result<BTreeMap<String, V>, D::Error> {
-    source.deserialize_map(DistinctNames(PhantomData))
+    Distinct::deserialize(source).map(|Distinct(found)| found)
+}
+
+/// Reads such an object or null.
+pub fn distinct_if_given<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
+    source: D,
+) -> Result<Option<BTreeMap<String, V>>, D::Error> {
+    Ok(Option::<Distinct<V>>::deserialize(source)?.map(|Distinct(found)| found))
+}
+
+/// Reads such an object of such objects.
+pub fn distinct_twice<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
+    source: D,
+) -> Result<BTreeMap<String, BTreeMap<String, V>>, D::Error> {
+    let found: BTreeMap<String, Distinct<V>> = distinct(source)?;
+    Ok(found.into_iter().map(|(name, Distinct(of_name))| (name, of_name)).collect())
+}
+
+struct Distinct<V>(BTreeMap<String, V>);
+
+impl<'de, V: Deserialize<'de>> Deserialize<'de> for Distinct<V> {
+    fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
+        source.deserialize_map(DistinctNames(PhantomData)).map(Distinct)
+    }
 }
 
 struct DistinctNames<V>(PhantomData<V>);

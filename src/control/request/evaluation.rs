@@ -80,7 +80,7 @@ pub enum InitialHistories {
     },
 }
 
-mod defaults {
+pub(super) mod defaults {
     use super::Framework;
 
     pub fn frameworks() -> Vec<Framework> {

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
 use crate::control::policy::declared::Decided;
+use crate::control::request::declared::distinct_if_given;
 use crate::service::advice::explain::ATOM_BYTES;
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
@@ -24,7 +25,7 @@ pub struct Decide {
     #[schema(example = 2)]
     pub period: usize,
     /// The states before the period, each by its name. Default in the first period: the declared start.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "distinct_if_given")]
     #[schema(example = json!({ "stock": 7.0 }))]
     pub state: Option<BTreeMap<String, f64>>,
     /// The noises of all periods before this one, oldest first. Default: none.
@@ -54,7 +55,9 @@ impl Sessions {
     pub async fn decide(&self, tenant: &Tenant, question: Decide) -> Result<Large<DecideAnswer>, ServiceError> {
         let Decide { policy, period, state, noises } = question;
         let advisor = self.policies.decider(tenant, &policy).await?;
-        let returns = advisor.specification().problem.history.len() + noises.len();
+        let problem = &advisor.specification().problem;
+        // Noises beyond the horizon are refused.
+        let returns = problem.history.len() + problem.horizon;
         let solve = move || advisor.decide(period, state.as_ref(), &noises);
         let room = self.memory.answers(returns * ATOM_BYTES).await?;
         let decided = self.resolving.run_on_record(tenant, returns, solve).await?.map_err(of_state)?;

@@ -156,11 +156,11 @@ impl Policies {
     /// # Errors
     /// The document is not a usable policy, or needs more memory than can be kept ready.
     pub async fn import(&self, caller: &Caller, document: PolicyDocument) -> Result<String, ServiceError> {
-        let (memory, kept) = (self.memory.clone(), self.kept.clone());
+        let memory = self.memory.clone();
         let check = move || {
-            let json = document.to_json().map_err(ServiceError::internal)?;
-            memory.keeps(&document.prepared(kept)?.footprints())?;
-            Ok::<_, ServiceError>(json)
+            let (document, bytes) = document.checked()?;
+            memory.keeps(&bytes)?;
+            document.to_json().map_err(ServiceError::internal)
         };
         let json = self.decoding.run(&caller.tenant, check).await??;
         let policy = content_hash(&json);

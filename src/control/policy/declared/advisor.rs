@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::{Decided, DeclaredPolicy, FORMAT, NoiseMove};
+use super::{Decided, DeclaredPolicy, NoiseMove};
 use crate::control::bellman::controlled::{ControlledSolution, ControlledStep};
 use crate::control::bellman::solution::Adversary;
 use crate::control::cache::Cache;
 use crate::control::controlled_training::ControlledPolicy;
-use crate::control::declared_training::DeclaredTraining;
 use crate::control::error::FieldError;
-use crate::control::policy::prepared_step::{Factor, bytes_ready};
+use crate::control::policy::prepared_step::{Factor, steps_bytes};
 use crate::control::problem::declared::{Declared, EarnedState};
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
@@ -31,15 +30,11 @@ impl DeclaredPolicy {
     /// Returns the policy ready to decide.
     ///
     /// # Errors
-    /// The first field that breaks a rule: the declaration is read as any other, and its steps must fit it.
+    /// As [`Self::checked`].
     pub fn prepared(self, kept: Cache) -> Result<DeclaredAdvisor, FieldError> {
-        if self.format != FORMAT {
-            return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
-        }
-        let training = DeclaredTraining::with(&self.specification, kept.clone())?;
-        self.check(&training)?;
+        let training = self.checked(kept.clone())?;
         let (specification, warnings) = (training.specification().clone(), training.warnings());
-        let problem = Declared::new(&self.specification.problem)?;
+        let problem = training.problem().afresh();
         let stored = self.steps.iter().filter_map(|step| step.solution.surrogates());
         let factors = stored.map(Factor::of).collect();
         let controlled = ControlledPolicy::prepared(&problem, &specification, &self.steps, kept.clone())?;
@@ -77,12 +72,7 @@ impl DeclaredAdvisor {
 
     /// Returns the bytes that it takes, without bridges and factors.
     pub fn bytes(&self) -> usize {
-        let stored = self.policy.steps.iter().filter_map(|step| step.solution.surrogates());
-        let sizes = stored.map(|stored| (stored.count(), stored.inputs.len(), stored.policy.weights.len() + 1));
-        let (points, inputs, functions) = sizes.fold((0, 0, 0), |(sum, inputs, most), (points, own, functions)| {
-            (sum + points, inputs.max(own), most.max(functions))
-        });
-        bytes_ready(self.policy.steps.len(), points, inputs, functions)
+        steps_bytes(&self.policy.steps)
     }
 
     /// Solves the robust step of a period, from 1, at a state with the noises seen since the start. The state is by

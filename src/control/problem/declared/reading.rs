@@ -1,6 +1,7 @@
 //! A declaration is read once: every name, number and formula is checked before anything is computed.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::formula::{FUNCTIONS, Formula};
@@ -39,18 +40,7 @@ impl Declared {
         let names = names(problem)?;
         numbers(problem)?;
         let (states, moved) = (problem.states.len(), problem.states.len() + problem.actions.len() + 1);
-        // A formula may not use what is not known where it is evaluated.
-        let at = |last: usize| -> Vec<&str> {
-            names
-                .iter()
-                .enumerate()
-                .map(|(place, name)| if (states..last).contains(&place) { "" } else { name })
-                .collect()
-        };
-        let (of_state, of_all) = (at(moved), at(states));
-        let parse = |field: String, text: &str, names: &[&str]| {
-            Formula::parse(text, names).map_err(|fault| FieldError::new(field, text, fault.to_string()))
-        };
+        let (of_state, of_all) = (known(&names, states..moved), known(&names, states..states));
         let action = |(name, action): (&String, &DeclaredAction)| {
             action.read(name, |end, text| parse(format!("problem.actions.{name}.{end}"), text, &of_state))
         };
@@ -128,6 +118,17 @@ impl Declared {
         let surrogate = declared.surrogate.clone();
         Ok(Specification { design, surrogate, ..Specification::of(investor, declared.seed) })
     }
+}
+
+/// Returns the names that a formula may use, in the order of their values. Those of the places `unknown` are empty: a
+/// formula may not use what is not known where it is evaluated.
+pub(super) fn known(names: &[String], unknown: Range<usize>) -> Vec<&str> {
+    names.iter().enumerate().map(|(place, name)| if unknown.contains(&place) { "" } else { name }).collect()
+}
+
+/// Parses the formula of a field.
+pub(super) fn parse(field: String, text: &str, names: &[&str]) -> Result<Formula, FieldError> {
+    Formula::parse(text, names).map_err(|fault| FieldError::new(field, text, fault.to_string()))
 }
 
 impl DeclaredAction {

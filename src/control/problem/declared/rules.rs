@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::formula::Formula;
+use super::reading::{known, parse};
 use super::{Controlled, Declared, EarnedState};
 use crate::control::error::FieldError;
 use crate::control::problem::actions::{ActionInterval, ActionSet};
@@ -28,16 +29,12 @@ impl Declared {
             return Err(FieldError::new(format!("{field}.{other}"), text, rule));
         }
         let (states, moved) = (self.ranges.len(), self.ranges.len() + self.actions.len() + 1);
-        let known = |place: usize| !(states..moved).contains(&place);
-        let names: Vec<&str> =
-            self.names.iter().enumerate().map(|(at, name)| if known(at) { name } else { "" }).collect();
+        let names = known(&self.names, states..moved);
         let read = |name: &String| {
             let field = format!("{field}.{name}");
             let text =
                 formulas.get(name).ok_or_else(|| FieldError::new(&field, "", "must be given for each action"))?;
-            let formula =
-                Formula::parse(text, &names).map_err(|fault| FieldError::new(&field, text, fault.to_string()))?;
-            Ok((text.clone(), formula))
+            Ok((text.clone(), parse(field, text, &names)?))
         };
         Ok(FormulaRule { field: field.to_owned(), formulas: named.iter().map(read).collect::<Result<_, _>>()? })
     }

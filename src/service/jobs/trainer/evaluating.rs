@@ -48,16 +48,21 @@ impl Worker {
     ) -> Result<JobOutcome, JobEnd> {
         let mut advisors = Vec::with_capacity(request.policies.len());
         for id in request.policies.values() {
-            let row = self.runtime.block_on(self.store.policy(&claimed.row.tenant, id))?;
-            let row = row.ok_or_else(|| failed(format!("the policy {id} was deleted")))?;
             let policy: DeclaredPolicy =
-                serde_json::from_slice(&row.json).map_err(|error| failed(error.to_string()))?;
-            advisors.push(Arc::new(policy.prepared(Cache::default()).map_err(|error| failed(error.to_string()))?));
+                serde_json::from_slice(&self.document(claimed, id)?).map_err(|error| failed(error.to_string()))?;
+            let kept = self.memory.kept();
+            advisors.push(Arc::new(policy.prepared(kept).map_err(|error| failed(error.to_string()))?));
         }
         let comparison = Comparison::new(request, advisors).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&comparison.footprint())?;
         let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };
         reported(&self.pool.install(|| comparison.run(&watch))?)
+    }
+
+    /// Returns the document of a policy that a job names.
+    fn document(&self, claimed: &ClaimedJob, policy: &str) -> Result<Vec<u8>, JobEnd> {
+        let row = self.runtime.block_on(self.store.policy(&claimed.row.tenant, policy))?;
+        row.map(|row| row.json).ok_or_else(|| failed(format!("the policy {policy} was deleted")))
     }
 
     /// Returns a framework with its policy: stored, or trained here as the steps of the job after `steps_done`.
@@ -71,9 +76,8 @@ impl Worker {
     ) -> Result<Follower, JobEnd> {
         let request = &evaluation.request;
         let policy = if let Some(id) = request.policies.get(&framework) {
-            let row = self.runtime.block_on(self.store.policy(&claimed.row.tenant, id))?;
-            let row = row.ok_or_else(|| failed(format!("the policy {id} was deleted")))?;
-            Some(Policy::from_json(&row.json).map_err(|error| failed(error.to_string()))?)
+            let document = self.document(claimed, id)?;
+            Some(Policy::from_json(&document).map_err(|error| failed(error.to_string()))?)
         } else if request.one_policy_for_all(framework) {
             let specification = request.specification(framework, None);
             let policy = self.trained(claimed, &specification, *steps_done, kept.clone(), stop)?;

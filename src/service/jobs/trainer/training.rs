@@ -44,10 +44,10 @@ impl Worker {
         declared: &DeclaredSpecification,
         stop: &AtomicBool,
     ) -> Result<DeclaredPolicy, JobEnd> {
-        let read = DeclaredTraining::with(declared, Cache::default()).map_err(TrainError::from)?;
-        let _reserved = self.reserve(&estimate::declared::training(&read, self.threads).0)?;
-        let kept = Cache::new(estimate::kept_by_training(read.specification()));
-        let training = DeclaredTraining::with(declared, kept).map_err(TrainError::from)?;
+        let training = DeclaredTraining::with(declared, Cache::default()).map_err(TrainError::from)?;
+        let _reserved = self.reserve(&estimate::declared::training(&training, self.threads).0)?;
+        let kept = Cache::new(estimate::kept_by_training(training.specification()));
+        let training = training.keeping(kept);
         let solve = |step: usize, after: Option<&StepSolution>, watch: &Watch| training.solve_step(step, after, watch);
         let steps = self.solved(claimed, 1..training.horizon(), 0, &solve, stop)?;
         Ok(DeclaredPolicy::new(declared.clone(), steps))
