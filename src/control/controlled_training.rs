@@ -27,6 +27,7 @@ use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, DesignFitting, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::laws::Laws;
+use crate::control::uncertainty::radius::Measure;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::machine::streams::stream;
@@ -217,6 +218,11 @@ impl ControlledPolicy {
     /// Returns the radius of the ball around a law, in the unit of the noise.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         self.laws.radius(law)
+    }
+
+    /// Returns the radius, and the quantile behind it if its rule has one.
+    pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
+        self.laws.measure(law)
     }
 
     /// Returns the robust step of the problem that was trained, against the value of the step after. `step` must be

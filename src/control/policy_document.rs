@@ -25,6 +25,7 @@ pub enum PolicyDocument {
 }
 
 /// A policy ready to answer.
+#[derive(Clone)]
 pub enum PreparedPolicy {
     /// An investor's.
     Investor(Arc<Advisor>),

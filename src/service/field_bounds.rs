@@ -1,6 +1,6 @@
 //! The bounds of the fields of requests about sessions and of advice without one. Their checkers use the same constants.
 
-use super::sessions::SessionStart;
+use super::sessions::opening::SessionStart;
 use crate::control::request::assets::{MOST_ASSETS, NAME_LENGTH};
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::radius_rules::{FIXED_RADIUS, RADIUS_SCALE};

@@ -23,7 +23,6 @@ use crate::control::policy::content_hash;
 use crate::control::posed::{Completed, Posed};
 use crate::control::request::backtest_assets::BacktestQuestion;
 use crate::control::request::frontier::FrontierRequest;
-use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::service::callers::fair_queue::FairQueue;
 use crate::service::callers::identity;
@@ -119,11 +118,11 @@ impl Jobs {
     pub(super) async fn train_for_session(
         &self,
         tenant: &Tenant,
-        specification: Specification,
+        posed: Posed,
         labels: Relabel,
         request: TrainingRequest,
     ) -> Result<SessionTraining, ServiceError> {
-        let (completed, _) = self.admitted(Posed::Investor(specification.into()))?;
+        let (completed, _) = self.admitted(posed)?;
         let (key, steps_total) = (request.key(), completed.step_count());
         let sent = key.as_bytes();
         let training = QueuedRequest { kind: JobKind::Train, sent, completed: &completed, steps_total, labels };

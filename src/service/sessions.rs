@@ -11,52 +11,47 @@
 //! Its modules hold the state of one session in memory, its rows, its slots and its sequence of policies. What is
 //! recorded of a session is decided in [`crate::service::entries`].
 
-pub(super) mod asset_change;
+pub mod account_state;
+pub mod asset_change;
 pub mod assets;
 pub(super) mod content;
+pub mod current_advice;
 pub mod fund_advice;
 pub mod initial_history;
 pub mod live;
+pub mod opening;
 pub(super) mod peers;
 pub mod plan;
+pub mod problem_state;
 pub(super) mod rows;
-pub(super) mod session_state;
+pub mod session_state;
 pub(super) mod slots;
 pub(super) mod sync;
+pub(super) mod transition;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde::Serialize;
 use tokio::sync::mpsc::Sender;
 use tracing::Instrument;
 
 use super::error::ServiceError;
-use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
-use crate::control::policy::content_hash;
-use crate::control::problem::state::State;
-use crate::control::request::assets::check_rows;
-use crate::control::request::specification::Specification;
+use crate::control::policy_document::PreparedPolicy;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::callers::fair_queue::{FairQueue, QueueSize};
 use crate::service::callers::identity;
 use crate::service::callers::keys::Caller;
 use crate::service::callers::turns::CallTurns;
 use crate::service::catalogue::policies::Policies;
-use crate::service::jobs::idempotency;
 use crate::service::process::clock::Clock;
 use crate::service::process::config::Config;
 use crate::service::process::memory::Memory;
 use crate::service::process::spans;
-use crate::service::sessions::asset_change::AssetNames;
-use crate::service::sessions::assets::Assets;
-use crate::service::sessions::initial_history::InitialHistory;
-use crate::service::sessions::live::{AdviceContext, LiveSession, SESSION_BYTES};
-use crate::service::sessions::plan::{Renewing, SessionPlan};
-use crate::service::sessions::session_state::SessionState;
+use crate::service::sessions::current_advice::AdviceContext;
+use crate::service::sessions::live::{LiveSession, SESSION_BYTES};
+use crate::service::sessions::opening::{SessionStart, declared_begins};
 use crate::service::sessions::slots::{Generation, SlotGuard, Slots};
-use crate::store::{CreateSession, Relabel, RequestKey, SessionRow, Store, Tenant};
+use crate::store::{CreateSession, SessionFacts, SessionRow, Store, Tenant};
 
 /// Lists of sessions read concurrently. These are fewer than the store's connections for lists, so that the lists of
 /// jobs, policies and labels always find one.
@@ -64,74 +59,6 @@ const LISTS: usize = 2;
 
 /// The tenant of a session, and its name.
 pub(super) type Name = (Tenant, String);
-
-/// The start of a session. History and wealth default to the policy's, and holdings default to 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SessionStart {
-    pub policy: String,
-    pub history: Option<InitialHistory>,
-    pub wealth: Option<f64>,
-    pub holding: Option<f64>,
-    pub holdings: Option<BTreeMap<String, f64>>,
-    pub renew: Option<Renewing>,
-    pub rolling: bool,
-    pub labels: Relabel,
-}
-
-/// The initial state of a session.
-struct Beginning {
-    state: State,
-    /// Present if there are several assets.
-    assets: Option<Box<Assets>>,
-    /// Known log-returns, date after date.
-    history: Vec<f64>,
-}
-
-impl SessionStart {
-    /// Returns the request for this start under a key. Its hash differs from that of any job's request, which has other
-    /// fields.
-    fn under(&self, key: String) -> Result<RequestKey, ServiceError> {
-        idempotency::check(&key)?;
-        let sent = serde_json::to_vec(self).map_err(ServiceError::internal)?;
-        Ok(RequestKey { key, request_hash: content_hash(&sent) })
-    }
-
-    /// Returns the initial state for the policy of `advisor`.
-    fn begins(self, advisor: &Advisor) -> Result<Beginning, FieldError> {
-        let SessionStart { history, wealth, holding, holdings, .. } = self;
-        let Specification { problem, fund, .. } = advisor.specification();
-        let Some(fund) = fund else {
-            if let Some(InitialHistory::Several(rows)) = &history {
-                let rule = "must be a list of numbers: the policy has one asset";
-                return Err(FieldError::new("history", format!("{} rows", rows.len()), rule));
-            }
-            if holdings.is_some() {
-                return Err(FieldError::new("holdings", "an object", "must be absent: the policy has one asset"));
-            }
-            let history = history.map(InitialHistory::values);
-            let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
-            let history = history.unwrap_or_else(|| problem.history.clone());
-            return Ok(Beginning { state, assets: None, history });
-        };
-        if let Some(holding) = holding {
-            let rule = "must be absent: the policy has several assets. Give holdings, the share of each asset";
-            return Err(FieldError::new("holding", holding, rule));
-        }
-        let rows = match history {
-            None => fund.history.clone(),
-            Some(InitialHistory::Several(rows)) => rows,
-            Some(InitialHistory::One(values)) => {
-                let rule = format!("must be a list of rows, each with the log-returns of {}", fund.assets.join(", "));
-                return Err(FieldError::new("history", format!("{} values", values.len()), rule));
-            }
-        };
-        check_rows("history", &rows, &fund.assets, None)?;
-        let history = rows.concat();
-        let assets = Assets::at(&fund.assets, rows, holdings.as_ref())?;
-        let state = assets.fund.begin(advisor, wealth)?;
-        Ok(Beginning { state, assets: Some(assets.into()), history })
-    }
-}
 
 /// The sessions of the store.
 #[derive(Clone)]
@@ -181,29 +108,21 @@ impl Sessions {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
         start.labels.check()?;
-        let SessionStart { policy, renew, rolling, labels, .. } = start.clone();
-        let advisor = self.policies.advisor(tenant, &policy).await?;
-        let beginning = start.begins(&advisor)?;
-        // Withdrawals are checked against wealth, whatever is held.
-        advisor.check_withdrawals(&beginning.state)?;
-        let plan = SessionPlan::new(&advisor, beginning.state.law.sample_size(), renew, rolling)?;
-        if beginning.assets.is_some() && Assets::must_solve(&advisor, 0) {
-            turn.begin().await?;
-        }
-        let Beginning { state, assets, history } = self.composed(tenant, &advisor, beginning).await?;
-        let plan = SessionPlan { assets: assets.as_ref().map(|assets| assets.planned()), ..plan };
-        self.policies.starts_from(&advisor, state.law.sample_size(), plan.terms.horizon)?;
+        let (policy, labels) = (start.policy.clone(), start.labels.clone());
+        let (beginning, plan) = match self.policies.policy(tenant, &policy).await? {
+            PreparedPolicy::Investor(advisor) => self.account_begins((tenant, turn), &advisor, start).await?,
+            PreparedPolicy::Declared(advisor) => declared_begins(&advisor, start)?,
+        };
         let row = SessionRow {
             session: identity::new_id("session")?,
             tenant: tenant.clone(),
             policy,
-            initial_wealth: state.wealth,
-            initial_holding: state.holding,
-            initial_history: history,
+            account: beginning.account,
+            initial_history: beginning.history,
             horizon: plan.terms.horizon,
             plan_json: plan.json()?,
-            due: renew.map(|renew| renew.every),
-            assets: assets.as_ref().map_or(0, |assets| assets.names.len()),
+            due: plan.renew.map(|renew| renew.every),
+            assets: beginning.named,
             created_ms: self.clock.now_milliseconds(),
         };
         let new = self.store.about_to_open(&row);
@@ -211,7 +130,7 @@ impl Sessions {
         let opening = opening.create_session(row.clone(), labels, key.clone());
         let (row, seen, is_new) = match opening.instrument(spans::of_write("open a session")).await? {
             CreateSession::Created => (row, new, true),
-            // A repeated request has the same start, so its state is the one above.
+            // A repeated request has the same start, so its state is the same.
             CreateSession::Repeated(earlier) => {
                 let seen = earlier.as_opened();
                 (earlier, seen, false)
@@ -222,37 +141,12 @@ impl Sessions {
             CreateSession::NoPolicy => return Err(ServiceError::unknown("policy", &row.policy)),
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
-        let live = LiveSession {
-            current: Arc::new(plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None)),
-            standing: SessionState::at(&row.session, state, assets),
-            row: Arc::new(row),
-            names: AssetNames::from(plan.names()),
-            observed: 0,
-            corrections: 0,
-            renewals: 0,
-            renew,
-            seen,
-            radius: None,
-            advice: None,
-        };
+        let live = LiveSession::replayed(SessionFacts { row, entries: Vec::new(), seen })?;
         if is_new {
             self.hold(tenant, &live.row.session).await.put(live.clone());
             self.weigh(&live);
         }
         Ok(live)
-    }
-
-    /// Chooses the composition of several assets before the first period, and the state of their fund.
-    async fn composed(
-        &self,
-        tenant: &Tenant,
-        advisor: &Arc<Advisor>,
-        beginning: Beginning,
-    ) -> Result<Beginning, ServiceError> {
-        let Beginning { state, assets: Some(mut assets), history } = beginning else { return Ok(beginning) };
-        let advisor = advisor.clone();
-        let compose = move || Beginning { state: assets.compose(&advisor, 0, &state), assets: Some(assets), history };
-        self.resolving.run(tenant, compose).await
     }
 
     /// Returns the bytes of the sessions in memory.
@@ -293,8 +187,9 @@ impl Sessions {
         Ok(())
     }
 
-    /// Returns the prepared policy of a session.
+    /// Returns the prepared policy of an investor's session.
     pub(super) async fn advisor(&self, tenant: &Tenant, live: &LiveSession) -> Result<Arc<Advisor>, ServiceError> {
+        live.standing.account()?;
         self.policies.advisor(tenant, &live.current.policy).await
     }
 
@@ -304,11 +199,11 @@ impl Sessions {
         live: &LiveSession,
         turn: &'a HeavyPermit,
     ) -> Result<AdviceContext<'a>, ServiceError> {
-        Ok(self.means_of(self.advisor(tenant, live).await?, Some(turn)))
+        Ok(self.means_of(self.policies.policy(tenant, &live.current.policy).await?, Some(turn)))
     }
 
-    pub(super) fn means_of<'a>(&'a self, advisor: Arc<Advisor>, turn: Option<&'a HeavyPermit>) -> AdviceContext<'a> {
-        AdviceContext { advisor, advising: &self.advising, resolving: &self.resolving, turn }
+    pub(super) fn means_of<'a>(&'a self, policy: PreparedPolicy, turn: Option<&'a HeavyPermit>) -> AdviceContext<'a> {
+        AdviceContext { policy, advising: &self.advising, resolving: &self.resolving, turn }
     }
 
     /// Updates the memory counted for a session.

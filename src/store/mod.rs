@@ -57,6 +57,7 @@ pub use sessions::attention::{Attention, CareCounts, FirstDay, Today};
 pub use sessions::entries::{Append, EntryKind, EntryRow};
 pub use sessions::head::Head;
 pub use sessions::idempotency::RequestKey;
+pub use sessions::initial_account::InitialAccount;
 pub use sessions::overview::{
     Counted, SessionFilter, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
 };

@@ -6,6 +6,7 @@ pub(super) mod attention;
 pub(super) mod entries;
 pub(super) mod head;
 pub(super) mod idempotency;
+pub(super) mod initial_account;
 pub(super) mod overview;
 pub(super) mod renewals;
 pub(super) mod row_version;
@@ -22,6 +23,7 @@ use crate::store::jobs::training_names::withdraw_all;
 use crate::store::sessions::entries::EntryRow;
 use crate::store::sessions::head::Head;
 use crate::store::sessions::idempotency::{RequestKey, Used};
+use crate::store::sessions::initial_account::InitialAccount;
 use crate::store::sessions::row_version::RowVersion;
 use crate::store::sessions::words::{Labelled, Worded};
 use crate::store::tenants::audit::{Actor, AuditAction, AuditRow};
@@ -50,10 +52,9 @@ pub struct SessionRow {
     pub session: String,
     pub tenant: Tenant,
     pub policy: String,
-    pub initial_wealth: f64,
-    /// The share of the initial wealth in the risky asset.
-    pub initial_holding: f64,
-    /// The log-returns known at the start.
+    /// The account of an investor at the start; `None` if the session lives a declared problem.
+    pub account: Option<InitialAccount>,
+    /// The noises known at the start: of an investor the log-returns.
     pub initial_history: Vec<f64>,
     /// The number of periods that its first policy advises.
     pub horizon: usize,
@@ -62,7 +63,8 @@ pub struct SessionRow {
     /// The number of periods after which it is due for automatic renewal. It only finds sessions, and no seal covers
     /// it.
     pub due: Option<usize>,
-    /// The number of assets if there are several, 0 for one. It only counts bytes, and no seal covers it.
+    /// The number of assets, or of states and actions, if there are several, 0 for one asset. It only counts bytes, and
+    /// no seal covers it.
     pub assets: usize,
     pub created_ms: i64,
 }
@@ -228,8 +230,8 @@ async fn insert(connection: &mut StoreConnection<'_>, row: &SessionRow) -> Resul
     let insert = insert
         .bind(row.session.as_str())
         .bind(row.policy.as_str())
-        .bind(row.initial_wealth)
-        .bind(row.initial_holding)
+        .bind(row.account.map(|account| account.wealth))
+        .bind(row.account.map(|account| account.holding))
         .bind(encode_reals(&row.initial_history))
         .bind(to_sql(row.horizon))
         .bind(row.created_ms)
@@ -291,8 +293,7 @@ impl SessionRow {
             .text(&self.session)
             .text(self.tenant.as_str())
             .text(&self.policy)
-            .real(self.initial_wealth)
-            .real(self.initial_holding)
+            .bytes(&self.account.map_or_else(Vec::new, |account| encode_reals(&[account.wealth, account.holding])))
             .bytes(history_seal)
             .integer(to_sql(self.horizon))
             .text(&self.plan_json)
@@ -305,8 +306,7 @@ impl SessionRow {
             session: row.get("session")?,
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
             policy: row.get("first_policy")?,
-            initial_wealth: row.get("initial_wealth")?,
-            initial_holding: row.get("initial_holding")?,
+            account: InitialAccount::from_row(row)?,
             initial_history: Vec::new(),
             horizon: from_sql(row.get("first_horizon")?)?,
             plan_json: row.get("plan_json")?,
@@ -326,8 +326,7 @@ impl SessionRow {
         let read = SessionRow {
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
             policy: row.get("policy")?,
-            initial_wealth: row.get("initial_wealth")?,
-            initial_holding: row.get("initial_holding")?,
+            account: InitialAccount::from_row(row)?,
             initial_history: history.ok_or_else(|| Failure::Corrupt(what()))?,
             horizon: from_sql(row.get("horizon")?)?,
             plan_json: row.get("plan_json")?,

@@ -73,7 +73,7 @@ test("its page has the formulas, and no word of an investor", async () => {
   await visit(`#/policies/${policy}`);
   const shown = await main();
   for (const formula of [STOCK.problem.reward, STOCK.problem.end, STOCK.problem.next.stock, "capacity - stock", "4 at the start, always 0 to 60"]) assert.ok(shown.includes(formula), formula);
-  assert.doesNotMatch(shown, /undefined|NaN|null|\bbank\b|Open a session/);
+  assert.doesNotMatch(shown, /undefined|NaN|null|\bbank\b/);
   await page.getByRole("link", { name: "Clone with one thing changed" }).click();
   await page.getByRole("heading", { level: 1, name: "Declare a problem" }).waitFor();
   const { specification } = await call(ballast.url, `/policies/${policy}`);
@@ -195,7 +195,7 @@ test("a verdict says whether the range contains 0", async () => {
   assert.equal(said(2, 2, 2), `\u201cmine\u201d is worth 2 (2 to 2) more than \u201crobust\u201d. ${told}`);
 });
 
-test("it stands in the list, and is no policy for a session, an evaluation, a comparison or an investor's form", async () => {
+test("it stands in the list, and is no policy for an evaluation, a comparison or an investor's form", async () => {
   const investor = await trained(ballast.url, { problem: { horizon: 2, rate_per_step: 0.002, history: [0.01, -0.02, 0.03, 0.01] }, design: { count: 20 } });
   await visit("#/policies");
   const row = page.getByRole("row").filter({ hasText: "The shop" });
@@ -205,13 +205,12 @@ test("it stands in the list, and is no policy for a session, an evaluation, a co
   assert.match(await main(), /Only policies of investors can be compared\. Of these, one is of a declared problem/);
   await visit(`#/train?from=${policy}`);
   assert.match(await main(), /This policy is of a declared problem/);
+  // The form for a session asks each kind of policy what it needs.
   await visit(`#/sessions/new?policy=${policy}`);
-  await page.locator("[role=alert]:visible").waitFor();
-  assert.match(await refused(), /^This policy is of a declared problem/);
-  await press("Open");
-  await page.locator("[role=alert]:visible").waitFor();
-  assert.deepEqual((await call(ballast.url, "/sessions")).sessions, []);
+  await page.getByLabel("stock now").waitFor();
   await page.getByLabel("Policy", { exact: true }).selectOption(investor);
+  await page.getByLabel("Wealth", { exact: true }).waitFor();
+  assert.equal(await page.getByLabel("stock now").count(), 0);
   await press("Open");
   await page.getByRole("heading", { level: 1, name: /^Session / }).waitFor();
   await visit(`#/evaluations/new?policy=${policy}`);
@@ -223,4 +222,84 @@ test("it stands in the list, and is no policy for a session, an evaluation, a co
 test("a number with a decimal point is read, and one with a comma is not", async () => {
   const { pointed } = await dashboardModule("number_text.js");
   assert.deepEqual(["", " 4.605 ", "1.234", "\u22120.5", "1e-3", "3,5", "1,234", "5%", "x"].map(pointed), [null, 4.605, 1.234, -0.5, 0.001, "3,5", "1,234", "5%", "x"]);
+});
+
+test("a session lives it: opened at a state, reported, corrected, and ended", async () => {
+  await visit(`#/policies/${policy}`);
+  await page.getByRole("link", { name: "Open a session" }).click();
+  await page.getByRole("heading", { level: 1, name: "Open a session" }).waitFor();
+  await page.getByLabel("stock now").fill("61");
+  assert.equal(await page.getByLabel("Wealth", { exact: true }).isVisible(), false);
+  await press("Open");
+  await page.getByText("stock now is 61; it must be from 0 to 60").waitFor();
+  await page.getByLabel("stock now").fill("7");
+  await page.getByLabel("Name", { exact: true }).fill("The shop lives");
+  await press("Open");
+  await page.getByRole("heading", { level: 1, name: "The shop lives" }).waitFor();
+  const session = page.url().split("/").pop();
+  const asked = () => call(ballast.url, `/action?session=${session}`);
+  const order = async () => Number(plain(await page.locator("#advice .big strong").innerText()));
+  const first = await asked();
+  assert.ok(Math.abs((await order()) - first.actions.order) < 1e-3 * first.actions.order);
+  assert.doesNotMatch(await main(), /undefined|NaN|null|\bbank\b|wealth/i);
+  // Nothing is recorded that is blank or beyond its support.
+  await press("Report period 1");
+  assert.match(await refused(), /^demand is blank/);
+  await page.locator("#f-noise").fill("41");
+  await press("Report period 1");
+  await page.getByText("demand is 41; it must be from 0 to 40").waitFor();
+  await page.locator("#f-noise").fill("18.5");
+  await page.getByText("I did something else").first().click();
+  await page.locator("#f-0-executed-order").fill("12");
+  await press("Report period 1");
+  await page.locator("#main").getByText("Period 1 is recorded. stock: 0.5.").waitFor();
+  const [, second] = [await asked(), await call(ballast.url, `/sessions/${session}`)];
+  assert.deepEqual([second.period, second.states], [2, { stock: 0.5 }]);
+  // As advised, and by what was counted.
+  const advised = (await asked()).actions.order;
+  await page.locator("#f-noise").fill("20");
+  await page.getByText("I did something else").first().click();
+  await page.locator("#f-0-state-stock").fill("3");
+  await press("Report period 2");
+  await page.locator("#main").getByText("Period 2 is recorded. stock: 3.").waitFor();
+  const history = async () => call(ballast.url, `/sessions/${session}/history`);
+  assert.deepEqual((await history()).observations.map(({ now }) => [now.noise, now.executed.order, now.state.stock]), [[18.5, 12, 0.5], [20, advised, 3]]);
+  const cells = await page.locator("table:has(caption:text('Observed periods')) tbody tr").evaluateAll((rows) => rows.map(({ cells }) => [...cells].map(({ textContent }) => textContent)));
+  assert.deepEqual(cells.map((row) => [row[0], row[1], row.at(-1)]), [["2", "20", "3"], ["1", "18.5", "0.5"]]);
+  // A correction moves what comes after it, as far as nothing was counted there.
+  await page.getByText("Correct a period").click();
+  await page.locator("#f-correction-period").selectOption("1");
+  await page.locator("#f-correction-noise").fill("10");
+  await page.getByLabel("Why").fill("it was counted again");
+  await press("Correct it");
+  await page.locator("#main").getByText("The period is corrected. stock: 3.").waitFor();
+  assert.deepEqual((await history()).observations.map(({ now }) => [now.noise, now.state.stock]), [[10, 9], [20, 3]]);
+  assert.ok((await main()).includes("Period 1 was corrected on"));
+  const saved = page.waitForEvent("download");
+  await press("Save as CSV");
+  const lines = (await readFile(await (await saved).path(), "utf8")).trim().split("\r\n");
+  assert.equal(lines[0], 'Period,Last day,demand,"order, advised","order, done",Earned in it,stock after it');
+  assert.match(lines[1], /^1,,10,[\d.]+,12,[-\d.]+,9$/);
+  await page.locator("#f-missing").selectOption("missing");
+  await page.getByText("I did something else").first().click();
+  await page.locator("#f-0-state-stock").fill("4");
+  await press("Report period 3");
+  await page.getByText("Its horizon is reached.").waitFor();
+  await page.getByRole("link", { name: "Continue with another policy" }).click();
+  await page.getByLabel("Continue with").selectOption("anew");
+  await press("Continue");
+  await page.getByText("1 session continues with another policy.").last().waitFor();
+  await page.getByRole("link", { name: "The shop lives" }).click();
+  await page.getByRole("heading", { name: "Period 4", exact: true }).waitFor();
+  const renewed = (await history()).renewals[0];
+  assert.deepEqual([renewed.period, renewed.horizon], [4, 6]);
+  const { specification: anew } = await call(ballast.url, `/policies/${renewed.policy}`);
+  assert.deepEqual(anew.problem.history, [...STOCK.problem.history, 10, 20]);
+  assert.equal(anew.problem.states.stock.start, 4);
+  assert.ok((await main()).includes("From period 4 on with"));
+  await visit("#/");
+  const row = page.locator("tbody tr", { hasText: "The shop lives" });
+  assert.match(plain(await row.innerText()), /\u2013[\s\S]*active[\s\S]*3 of 6/);
+  await visit(`#/compare?sessions=${session},${session}`);
+  await page.getByText("This session is of a declared problem").waitFor();
 });

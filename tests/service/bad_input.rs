@@ -315,6 +315,43 @@ async fn a_wrong_kind_is_refused() {
     }
 }
 
+/// The last value of a name that stands twice would be taken in silence.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_name_that_stands_twice_is_refused_in_every_object_of_names() {
+    let app = App::start().await;
+    for (path, rest, fields) in [
+        (
+            "/observe",
+            r#""session":"s","period":1,"#,
+            &[
+                "log_returns",
+                "simple_returns",
+                "prices",
+                "previous_prices",
+                "executed_allocations",
+                "executed",
+                "state",
+            ][..],
+        ),
+        ("/what-if", r#""session":"s","#, &["holdings", "log_returns", "simple_returns", "prices", "previous_prices"]),
+        ("/sessions", r#""policy":"p","#, &["holdings", "state"]),
+        ("/decide", r#""policy":"p","#, &["state"]),
+    ] {
+        for field in fields {
+            let body = format!(r#"{{{rest}"{field}":{{"bonds":0.1,"stocks":0.2,"bonds":0.3}}}}"#);
+            let request = app.client.post(format!("{}{path}", app.url)).header("content-type", "application/json");
+            let (status, problem) = crate::support::read(request.body(body).send().await.unwrap()).await;
+            assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{path}: {problem}");
+            assert!(problem["rule"].as_str().unwrap().contains("`bonds` stands twice"), "{path}: {problem}");
+        }
+    }
+    let renewal = r#"{"renewal":1,"policy":"p","records":{"a":[0.1,0.2],"a":[0.1,0.3]}}"#;
+    let request =
+        app.client.post(format!("{}/sessions/s/renewals", app.url)).header("content-type", "application/json");
+    let (status, problem) = crate::support::read(request.body(renewal).send().await.unwrap()).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("records")), "{problem}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn bodies_that_are_not_json_are_refused() {
     let app = App::start().await;
@@ -693,10 +730,12 @@ fn the_walks_cover_every_field() {
     // So are those of several assets.
     let of_several = ["log_returns", "simple_returns", "prices", "previous_prices", "executed_allocations"];
     walked.extend(of_several.map(str::to_owned));
+    // Those of a declared problem are walked in `tests/service/declared_sessions.rs`.
+    walked.extend(["noise", "executed", "state"].map(str::to_owned));
     assert!(properties("Observe").is_subset(&walked), "{walked:?}");
     let mut walked: BTreeSet<String> =
         faulty_sessions().iter().map(|(_, field)| field.split(['[', '.']).next().unwrap().to_owned()).collect();
-    walked.extend(["policy", "holdings"].map(str::to_owned));
+    walked.extend(["policy", "holdings", "state"].map(str::to_owned));
     let evaluated = faulty_evaluations();
     let evaluated: BTreeSet<String> =
         evaluated.iter().map(|(_, _, field)| field.split(['.', '[']).next().unwrap().to_owned()).collect();

@@ -14,6 +14,7 @@ mod bad_input;
 mod clocks;
 mod damage;
 mod decide;
+mod declared_sessions;
 mod doubts;
 mod encryption;
 mod files;

@@ -2,6 +2,7 @@
 
 use std::process::{Command, Output};
 
+use crate::decide::stock;
 use crate::support::{App, execute, postgres, several_assets, specification};
 use reqwest::Method;
 use serde_json::json;
@@ -28,6 +29,10 @@ async fn a_folder_moves_into_a_database_and_goes_on() {
     let right = json!({ "correction": 1, "period": 1, "log_return": 0.05, "reason": "revised" });
     assert_eq!(app.post(&format!("/sessions/{}/corrections", app.session), &right).await.0, 200);
     let path = format!("/sessions/{}", app.session);
+    app.train(&stock(3)).await;
+    app.open_with(json!({ "name": "A problem in formulas", "tags": ["moved"] })).await;
+    assert_eq!(app.report(1, json!({ "noise": 18.5, "executed": { "order": 12.0 } })).await.0, 200);
+    let declared = format!("/sessions/{}", app.session);
     app.train(&several_assets(4)).await;
     app.open().await;
     let report = json!({ "log_returns": { "stocks": 0.01, "bonds": 0.002, "gold": -0.01 }, "confirm": true });
@@ -39,7 +44,9 @@ async fn a_folder_moves_into_a_database_and_goes_on() {
     let paths = [
         path.clone(),
         format!("{path}/history"),
-        "/sessions?search=moved".into(),
+        declared.clone(),
+        format!("{declared}/history"),
+        "/sessions?search=moved&sort=wealth".into(),
         "/jobs".into(),
         format!("/action?session={}", app.session),
         "/policies".into(),
@@ -51,7 +58,7 @@ async fn a_folder_moves_into_a_database_and_goes_on() {
     let moved = relocate(&app, &url);
     assert!(moved.status.success(), "{}", String::from_utf8_lossy(&moved.stderr));
     let output = String::from_utf8(moved.stdout).unwrap();
-    assert!(output.contains("entries: 5 rows moved") && output.contains("sound"), "{output}");
+    assert!(output.contains("entries: 6 rows moved") && output.contains("sound"), "{output}");
     assert!(complaint(&relocate(&app, &url)).contains("has rows"), "the database is not empty");
 
     let store = url.parse().unwrap();

@@ -5,9 +5,9 @@ use std::time::Duration;
 use crate::support::place::Place;
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
-    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotation, RowVersion, SessionQuery, SessionRow,
-    Store, StoreError, StoredKeys, Successor, Tenant,
+    Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, InitialAccount,
+    JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotation, RowVersion,
+    SessionQuery, SessionRow, Store, StoreError, StoredKeys, Successor, Tenant,
 };
 use futures_util::future::join_all;
 
@@ -85,8 +85,7 @@ async fn with_session(store: &Store, session: &str, history: &[f64]) -> RowVersi
         session: session.into(),
         tenant: Tenant::default(),
         policy,
-        initial_wealth: 100.0,
-        initial_holding: 0.0,
+        account: Some(InitialAccount { wealth: 100.0, holding: 0.0 }),
         initial_history: history.into(),
         horizon: 3,
         plan_json: "{}".into(),
@@ -382,8 +381,7 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
         session: "s".into(),
         tenant: Tenant::default(),
         policy: "none".into(),
-        initial_wealth: 1.0,
-        initial_holding: 0.0,
+        account: Some(InitialAccount { wealth: 1.0, holding: 0.0 }),
         initial_history: vec![],
         horizon: 1,
         plan_json: "{}".into(),
@@ -395,7 +393,7 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
     with_session(&store, "s", &[0.1, 0.2]).await;
     let again = SessionRow { policy: content_hash(POLICY), ..new };
     assert_eq!(store.create_session(again, Relabel::default(), None).await.unwrap(), CreateSession::Exists);
-    assert_eq!(store.session(&Tenant::default(), "s").await.unwrap().unwrap().initial_wealth, 100.0);
+    assert_eq!(store.session(&Tenant::default(), "s").await.unwrap().unwrap().account.unwrap().wealth, 100.0);
     assert_eq!(store.session(&Tenant::default(), "nobody").await.unwrap(), None);
     assert!(!store.delete_session(&Tenant::default(), "nobody").await.unwrap());
     assert_eq!(store.count_sessions().await.unwrap(), 1);
@@ -621,8 +619,7 @@ async fn two_replicas_meet(place: &Place) {
             session: session.clone(),
             tenant: Tenant::default(),
             policy: policy.clone(),
-            initial_wealth: 1.0,
-            initial_holding: 0.0,
+            account: Some(InitialAccount { wealth: 1.0, holding: 0.0 }),
             initial_history: vec![0.1],
             horizon: 1,
             plan_json: "{}".into(),
@@ -780,8 +777,7 @@ fn session_of(owner: &str, session: &str) -> SessionRow {
         session: session.into(),
         tenant: tenant(owner),
         policy: content_hash(POLICY),
-        initial_wealth: 100.0,
-        initial_holding: 0.0,
+        account: Some(InitialAccount { wealth: 100.0, holding: 0.0 }),
         initial_history: vec![0.01, -0.02],
         horizon: 3,
         plan_json: "{}".into(),

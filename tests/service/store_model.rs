@@ -8,8 +8,9 @@ use crate::support::place::Place;
 use crate::support::random;
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, EntryKind, EntryRow, JobKind, JobOutcome, JobRow,
-    JobState, NewJob, OverQuota, Quota, Quotas, Relabel, SessionQuery, SessionRow, Store, StoreError, Tenant, Usage,
+    Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, EntryKind, EntryRow, InitialAccount, JobKind,
+    JobOutcome, JobRow, JobState, NewJob, OverQuota, Quota, Quotas, Relabel, SessionQuery, SessionRow, Store,
+    StoreError, Tenant, Usage,
 };
 use proptest::prelude::*;
 
@@ -419,8 +420,7 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 session: session_name(session),
                 tenant: Tenant::default(),
                 policy: policy_name(policy),
-                initial_wealth: 100.0,
-                initial_holding: 0.0,
+                account: Some(InitialAccount { wealth: 100.0, holding: 0.0 }),
                 initial_history: vec![0.1, -0.0],
                 horizon: 3,
                 plan_json: "{}".into(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -80,8 +80,9 @@ def test_a_declared_problem(ballast: Ballast) -> None:
     with pytest.raises(package.InvalidField) as refusal:
         policy.decide(period=2, state={"stock": 0})
     assert refusal.value.field == "noises"
-    with pytest.raises(package.InvalidField):
-        policy.session()
+    with pytest.raises(package.InvalidField) as refusal:
+        policy.session(wealth=100.0)
+    assert refusal.value.field == "wealth"
     compared = ballast.compare({"robust": policy}, rules={"base": {"order": "max(25 - stock, 0)"}}, paths=200)
     frame = compared.frame()
     assert list(frame.index) == ["robust", "base"] and list(frame["is_rule"]) == [False, True]
@@ -89,6 +90,53 @@ def test_a_declared_problem(ballast: Ballast) -> None:
     assert base["difference_low"] < base["difference"] < base["difference_high"]
     assert frame.loc["robust", "robust_value"] == pytest.approx(first["value"])
     assert ballast.comparison(compared.id).report()["problem"]["horizon"] == 2
+
+
+def test_a_session_of_a_declared_problem(ballast: Ballast) -> None:
+    declared = json.loads((REPOSITORY / "examples/problems/stock.json").read_text())
+    declared["problem"]["horizon"], declared["design"] = 3, {"count": 20}
+    policy = ballast.submit(declared).policy()
+    session = policy.session(state={"stock": 7.0}, idempotency_key="the shop", name="The shop")
+    assert policy.session(state={"stock": 7.0}, idempotency_key="the shop", name="The shop").id == session.id
+    assert session.states == {"stock": 7.0} and session.earned == 0.0 and math.isnan(session.wealth)
+    advised = session.actions()
+    decided = policy.decide(state={"stock": 7.0})
+    assert advised["actions"] == decided["actions"] and advised["worst_law"] == decided["worst_law"]
+    assert session.frame().empty
+    session.observe(noise=18.5, executed={"order": 12}, date="2026-01-31")
+    moved = session.moved
+    assert moved is not None and moved["advised"] == advised["actions"] and moved["noise"] == 18.5
+    # 18.5 of 19 are sold for 9, 12 were bought for 5, and 0.5 is held at 0.5.
+    assert session.states == {"stock": 0.5} and session.earned == pytest.approx(9 * 18.5 - 5 * 12 - 0.25)
+    coming = session.actions()
+    assert coming["actions"] == policy.decide(period=2, state={"stock": 0.5}, noises=[18.5])["actions"]
+    session.observe(noise=25.0, state={"stock": 1.5})
+    assert session.states == {"stock": 1.5}
+    session.correct(1, "it was counted again", noise=10.0, executed={"order": 12})
+    assert session.corrections == 1 and session.states == {"stock": 1.5}
+    found = ballast.session(session.id)
+    assert (found.period, found.states, found.earned) == (3, session.states, session.earned)
+    frame = session.frame()
+    assert list(frame.index) == [1, 2] and list(frame["state.stock"]) == [9.0, 1.5]
+    assert list(frame["executed.order"]) == [12.0, coming["actions"]["order"]]
+    assert frame["advised.order"].tolist() == [advised["actions"]["order"], coming["actions"]["order"]]
+    assert str(frame["date"].iloc[0].date()) == "2026-01-31" and frame["earned"].iloc[-1] == pytest.approx(
+        session.earned
+    )
+    axes = session.plot()
+    assert [line.get_label() for line in axes.get_lines()] == ["stock"]
+    assert list(cast(Any, axes.get_lines()[0].get_ydata())) == [7.0, 9.0, 1.5]
+    with pytest.raises(package.InvalidField) as refusal:
+        session.observe(noise=41.0)
+    assert refusal.value.field == "noise" and session.period == 3
+    assert session.observe(noise=20.0).completed
+    with pytest.raises(package.SessionCompleted):
+        session.actions()
+    renewed = cast(wire.DeclaredRenewed, session.renew(policy.id))
+    assert (session.period, session.horizon, session.renewals, session.completed) == (4, 6, 1, False)
+    assert renewed["problem"]["horizon"] == 3
+    assert session.actions()["actions"] == policy.decide(state=session.states)["actions"]
+    session.delete()
 
 
 def test_advice_on_several_assets(ballast: Ballast) -> None:
@@ -268,7 +316,7 @@ def test_many_sessions_report_at_once(ballast: Ballast, session: Session) -> Non
     answers = ballast.observe(reports)
     assert [answer["status"] for answer in answers] == [200, 409, 404]
     assert ballast.observe(iter(reports)) == answers
-    first, second = answers[0].get("answer"), answers[1].get("problem")
+    first, second = cast(wire.Observed | None, answers[0].get("answer")), answers[1].get("problem")
     assert first is not None and session.refresh().wealth == first["wealth"] and session.period == 2
     assert second is not None and second["type"] == "/problems/report-gap"
     with pytest.raises(package.InvalidField) as refusal:

@@ -68,11 +68,15 @@ def test_they_say_nothing_that_they_should_not(cells: list[Any], own: list[Any])
 
 
 def test_a_problem_of_ones_own_does_what_its_text_says(own: list[Any]) -> None:
-    assert [len(shown(cell, "image/png")) for cell in own] == [0, 0, 0, 1, 0, 0, 1]
+    assert [len(shown(cell, "image/png")) for cell in own] == [0, 0, 0, 1, 0, 1, 0, 1]
     first = ast.literal_eval(shown(own[2], "text/plain")[0])
     assert 15 < first["order"] < 30 and first["guessed"] < 0.2
-    months, table = (shown(own[place], "text/plain")[0].splitlines() for place in (4, 5))
-    assert len(months) == 8 and "worth left" in months[0]
+    year, table = (shown(own[place], "text/plain")[0].splitlines() for place in (4, 6))
+    months = [[float(number) for number in line.split()] for line in year[2:]]
+    assert len(months) == 12 and "executed.order" in year[0]
+    # What is left is what was there and came, less what was asked for, but never less than nothing.
+    for before, (_, demand, order, _, left) in zip([[4.0], *months], months, strict=False):
+        assert left == pytest.approx(max(before[-1] + order - demand, 0.0), abs=0.21)
     apart = {" ".join(line.split()[:-4]): [float(number) for number in line.split()[-2:]] for line in table[2:]}
     assert list(apart) == ["cautious", "trusting", "fill to 18", "fill to 25"]
     assert apart["trusting"][0] < 0 < apart["trusting"][1]

@@ -10,7 +10,7 @@ use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::service::error::ServiceError;
 use ballast::service::sessions::plan::SessionPlan;
-use ballast::store::{CreateSession, Relabel, SessionRow, Store, Tenant};
+use ballast::store::{CreateSession, InitialAccount, Relabel, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
 
@@ -111,8 +111,7 @@ impl LoadFixture {
             // Spread like the service's own names, which are random.
             session: format!("session_{}", &content_hash(&index.to_le_bytes())[..32]),
             policy: self.policy.clone(),
-            initial_wealth: problem.initial_wealth,
-            initial_holding: 0.0,
+            account: Some(InitialAccount { wealth: problem.initial_wealth, holding: 0.0 }),
             initial_history: problem.history.clone(),
             horizon: self.horizon,
             plan_json: SessionPlan::once(problem).json()?,

@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::control::error::FieldError;
+
 /// Equal parts of the interval that are tried before a search on both sides of the best one. Robust values are concave
 /// in the action except for the error of the surrogate, whose dents are narrower than an eighth.
 const COARSE_ACTIONS: usize = 8;
@@ -40,7 +42,29 @@ pub struct Band {
     pub high: f64,
 }
 
+/// Rounding of an action that is one of the set, as a share of it.
+const ROUNDING: f64 = 1e-9;
+
 impl ActionSet {
+    /// Checks that an action is one of the set, but for rounding.
+    ///
+    /// # Errors
+    /// It is not.
+    pub fn checked(&self, field: &str, action: f64) -> Result<f64, FieldError> {
+        let near = |other: f64| ROUNDING * (1.0 + other.abs());
+        let (is_inside, rule) = match self {
+            ActionSet::Interval(ActionInterval { lowest, highest }) => (
+                (lowest - near(*lowest)..=highest + near(*highest)).contains(&action),
+                format!("must lie in [{lowest}, {highest}], the actions at this state"),
+            ),
+            ActionSet::Values(values) => (
+                values.iter().any(|value| (value - action).abs() <= near(*value)),
+                format!("must be one of {values:?}"),
+            ),
+        };
+        if is_inside { Ok(action) } else { Err(FieldError::new(field, action, rule)) }
+    }
+
     /// Returns the action at a share of the set, from 0 to 1. An interval whose ends are in the wrong order is its lowest.
     pub fn at(&self, share: f64) -> f64 {
         match self {

@@ -1,14 +1,12 @@
 //! A problem declared in formulas: its states, its action, the noise whose law is learned, and what is earned.
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::marker::PhantomData;
 
-use serde::de::{Deserializer, Error, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
+use crate::control::request::by_name::distinct;
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
@@ -152,6 +150,14 @@ pub enum DeclaredUtility {
 }
 
 impl DeclaredProblem {
+    /// Returns the texts of its formulas.
+    pub fn formulas(&self) -> impl Iterator<Item = &str> {
+        let bounds = self.actions.values().flat_map(|action| [&action.low, &action.high]).flatten();
+        let utility = self.utility.as_ref().map(DeclaredUtility::of);
+        let all = self.next.values().chain(bounds).chain(&self.reward).chain(&self.end);
+        all.map(String::as_str).chain(utility)
+    }
+
     /// Returns true if the other has the same states, actions, dynamics, worths and record. Its framework, radius and
     /// learning may differ.
     pub fn is_alike(&self, other: &DeclaredProblem) -> bool {
@@ -185,53 +191,4 @@ impl DeclaredUtility {
 
 fn no_discount() -> f64 {
     1.0
-}
-
-/// Reads an object by name, and refuses a name that stands twice: the last would be taken in silence.
-pub fn distinct<'de, D: Deserializer<'de>, V: Deserialize<'de>>(source: D) -> Result<BTreeMap<String, V>, D::Error> {
-    Distinct::deserialize(source).map(|Distinct(found)| found)
-}
-
-/// Reads such an object or null.
-pub fn distinct_if_given<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
-    source: D,
-) -> Result<Option<BTreeMap<String, V>>, D::Error> {
-    Ok(Option::<Distinct<V>>::deserialize(source)?.map(|Distinct(found)| found))
-}
-
-/// Reads such an object of such objects.
-pub fn distinct_twice<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
-    source: D,
-) -> Result<BTreeMap<String, BTreeMap<String, V>>, D::Error> {
-    let found: BTreeMap<String, Distinct<V>> = distinct(source)?;
-    Ok(found.into_iter().map(|(name, Distinct(of_name))| (name, of_name)).collect())
-}
-
-struct Distinct<V>(BTreeMap<String, V>);
-
-impl<'de, V: Deserialize<'de>> Deserialize<'de> for Distinct<V> {
-    fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
-        source.deserialize_map(DistinctNames(PhantomData)).map(Distinct)
-    }
-}
-
-struct DistinctNames<V>(PhantomData<V>);
-
-impl<'de, V: Deserialize<'de>> Visitor<'de> for DistinctNames<V> {
-    type Value = BTreeMap<String, V>;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("an object by name")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-        let mut found = BTreeMap::new();
-        while let Some((name, value)) = map.next_entry::<String, V>()? {
-            if found.contains_key(&name) {
-                return Err(A::Error::custom(format!("`{name}` stands twice")));
-            }
-            found.insert(name, value);
-        }
-        Ok(found)
-    }
 }

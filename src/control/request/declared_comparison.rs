@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds, whole, within};
-use crate::control::request::declared::{distinct, distinct_twice};
+use crate::control::request::by_name::{distinct, distinct_twice};
 use crate::control::request::evaluation::{EvaluationRequest, LEVEL, PATHS, defaults};
 use crate::control::request::specification::default_seed;
 

@@ -5,6 +5,7 @@ pub mod assets;
 pub mod backtest;
 pub mod backtest_assets;
 pub mod bounds;
+pub mod by_name;
 pub mod caution;
 pub mod caution_rules;
 pub mod centre;

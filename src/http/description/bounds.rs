@@ -35,7 +35,7 @@ use crate::service::advice::returns::ReadReturns;
 use crate::service::advice::what_if::{SweepRange, WhatIf};
 use crate::service::entries::report::{Correct, Observe, Report};
 use crate::service::field_bounds::LISTED_REPORTS;
-use crate::service::sessions::SessionStart;
+use crate::service::sessions::opening::SessionStart;
 use crate::service::sessions::plan::{Renew, Renewing};
 use crate::store::Relabel;
 

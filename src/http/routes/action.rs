@@ -1,13 +1,16 @@
-//! The answer of `/action`, for one asset and for several.
+//! The answer of `/action`: for one asset, for several and for a declared problem.
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
+use crate::control::policy::declared::Decided;
 use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
-use crate::service::advice::action::PeriodAdvice as ServiceAction;
+use crate::service::advice::action::{AccountAdvice, AdviceKind, PeriodAdvice as ServiceAction};
 use crate::service::sessions::fund_advice::FundAdvice;
 
 /// The robust allocation for the coming period.
@@ -16,6 +19,17 @@ use crate::service::sessions::fund_advice::FundAdvice;
 pub enum ActionAnswer {
     Asset(Box<AssetAction>),
     Assets(Box<AssetsAction>),
+    Declared(Box<DeclaredAdvice>),
+}
+
+/// The robust actions of a declared problem's coming period.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct DeclaredAdvice {
+    pub session: String,
+    /// The states before the period, by name.
+    pub state: BTreeMap<String, f64>,
+    #[serde(flatten)]
+    pub decided: Decided,
 }
 
 /// The robust allocation of one asset for the coming period.
@@ -51,7 +65,14 @@ pub struct AssetsAction {
 
 impl ActionAnswer {
     pub fn new(session: String, action: ServiceAction) -> Self {
-        let ServiceAction { period, advice, assets, worst_case, sensitivity, waiting } = action;
+        let ServiceAction { period, kind, waiting } = action;
+        let AccountAdvice { advice, assets, worst_case, sensitivity } = match kind {
+            AdviceKind::Account(account) => *account,
+            AdviceKind::Declared(decided, state) => {
+                let decided = Decided { period, ..*decided };
+                return ActionAnswer::Declared(Box::new(DeclaredAdvice { session, state, decided }));
+            }
+        };
         let mut caution = cautions(&advice, sensitivity.as_ref());
         caution.extend(waiting.map(|horizon| Caution::waiting(period, horizon)));
         match assets {

@@ -76,10 +76,11 @@ pub struct SessionEntry {
     /// The last period that the policy advises.
     pub horizon: usize,
     pub state: SessionStatus,
-    pub initial_wealth: f64,
-    pub wealth: f64,
+    /// Null, as all figures of wealth, if the session lives a declared problem.
+    pub initial_wealth: Option<f64>,
+    pub wealth: Option<f64>,
     /// Share of wealth in the risky asset, before trading.
-    pub holding: f64,
+    pub holding: Option<f64>,
     /// Change of wealth in the last period; null before the first.
     pub wealth_change: Option<f64>,
     /// Last day that was reported.
@@ -107,9 +108,9 @@ impl From<Listed> for SessionEntry {
         SessionEntry {
             period: row.observations + 1,
             state: session_state(row.observations, row.horizon, row.is_due),
-            wealth: stands.map_or(row.initial_wealth, |stands| stands.wealth),
-            holding: stands.map_or(row.initial_holding, |stands| stands.holding),
-            wealth_change: stands.map(|stands| stands.wealth_change),
+            wealth: stands.map_or(row.account.map(|account| account.wealth), |stands| stands.wealth),
+            holding: stands.map_or(row.account.map(|account| account.holding), |stands| stands.holding),
+            wealth_change: stands.and_then(|stands| stands.wealth_change),
             date: stands.and_then(|stands| stands.date),
             drift: stands.map_or(DriftLevel::None, |stands| stands.drift.level),
             last_report_ms: row.last.map(|(_, reported_ms)| reported_ms),
@@ -119,7 +120,7 @@ impl From<Listed> for SessionEntry {
             policy_name: row.policy_name,
             periods_per_year: row.periods_per_year,
             horizon: row.horizon,
-            initial_wealth: row.initial_wealth,
+            initial_wealth: row.account.map(|account| account.wealth),
             next,
             care: care.into_iter().map(CareReason::from).collect(),
             deviation: stands.and_then(|stands| stands.deviation),

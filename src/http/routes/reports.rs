@@ -16,7 +16,7 @@ use crate::http::gate::extract::JsonBytes;
 use crate::http::gate::{bodies, decode, telemetry};
 use crate::http::problem::ProblemDocument;
 use crate::service::Service;
-use crate::service::entries::answer::Observed;
+use crate::service::entries::answer::ObservationAnswer;
 use crate::service::entries::report::Observe;
 use crate::service::entries::reports::{self, REPORTS, Reported};
 use crate::service::process::memory::Large;
@@ -71,7 +71,7 @@ impl<'de> Visitor<'de> for OneOrMany {
 #[serde(untagged)]
 #[expect(dead_code, reason = "answers are sent as they are stored; this type only describes them")]
 pub enum ReportsAnswered {
-    One(Box<Observed>),
+    One(ObservationAnswer),
     Many(Vec<ElementAnswered>),
 }
 
@@ -85,7 +85,7 @@ pub struct ElementAnswered {
     pub status: u16,
     /// The answer, if the status is 200.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub answer: Option<Observed>,
+    pub answer: Option<ObservationAnswer>,
     /// The problem, if the status is not 200.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<ProblemDocument>,

@@ -1,4 +1,4 @@
-//! Live investors: open a session, report, get advice.
+//! Live sessions: open a session, report, get advice.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,13 +22,13 @@ use crate::service::Service;
 use crate::service::advice::action::AdviceOptions;
 use crate::service::advice::explain::Explain;
 use crate::service::callers::allowance::Class;
-use crate::service::entries::answer::Corrected;
-use crate::service::entries::history::History;
+use crate::service::entries::answer::CorrectionAnswer;
+use crate::service::entries::history::HistoryAnswer;
 use crate::service::entries::report::Correct;
 use crate::service::metrics::ACTION_SECONDS;
 use crate::service::process::memory::Large;
-use crate::service::sessions::SessionStart;
-use crate::service::sessions::plan::{Renew, Renewed};
+use crate::service::sessions::opening::SessionStart;
+use crate::service::sessions::plan::{Renew, RenewalAnswer};
 use crate::store::{Labels, Relabel};
 
 /// Opens a session.
@@ -49,10 +49,11 @@ pub async fn open(
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, ProblemDocument> {
-    let wire::OpenSession { policy, history, wealth, holding, holdings, renew, rolling, name, notes, tags } = request;
+    let wire::OpenSession { policy, history, wealth, holding, holdings, state, renew, rolling, name, notes, tags } =
+        request;
     let labels = Relabel { name, notes, tags };
     let called = Labels::default().after(&labels);
-    let start = SessionStart { policy, history, wealth, holding, holdings, renew, rolling, labels };
+    let start = SessionStart { policy, history, wealth, holding, holdings, state, renew, rolling, labels };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?, &caller.turn).await?;
     let session = wire::Session { labels: called, ..live.into() };
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
@@ -79,7 +80,7 @@ pub async fn get(
 /// answers that would be given now.
 #[utoipa::path(get, path = "/sessions/{id}/history", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
-        (status = 200, description = "The history.", body = History),
+        (status = 200, description = "The history.", body = HistoryAnswer),
         (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn history(
     State(service): State<Arc<Service>>,
@@ -97,7 +98,7 @@ pub async fn history(
         "correction": 1, "period": 3, "simple_return": 0.011, "reason": "the index was revised"
     })),
     responses(
-        (status = 200, description = "Recorded. Repeating the correction with the same content returns the same answer.", body = Corrected),
+        (status = 200, description = "Recorded. Repeating the correction with the same content returns the same answer.", body = CorrectionAnswer),
         (status = 404, description = "There is no such session.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 409, description = "The correction was reported with other content or is not the next; or it is probably a mistake and is not confirmed.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
@@ -119,7 +120,7 @@ pub async fn correct(
         "renewal": 1, "policy": "2c882522ef92e64d9ad1cb0dd2b4ff4e7c3b0c1e8f5d2a6b9c0d1e2f3a4b5c6d", "window": 240
     })),
     responses(
-        (status = 200, description = "Recorded. Repeating the renewal with the same content returns the same answer.", body = Renewed),
+        (status = 200, description = "Recorded. Repeating the renewal with the same content returns the same answer.", body = RenewalAnswer),
         (status = 404, description = "There is no such session or policy.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 409, description = "The renewal was reported with other content, or is not the next.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]

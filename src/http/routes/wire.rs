@@ -14,6 +14,7 @@ use crate::control::evaluation::report::EvaluationReport;
 use crate::control::posed::Posed;
 use crate::control::progress::Phase;
 use crate::control::request::annualised::Annualised;
+use crate::control::request::by_name::distinct_if_given;
 use crate::control::request::framework::Framework;
 use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
@@ -24,6 +25,7 @@ use crate::service::sessions::assets::Composition;
 use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::live::LiveSession;
 use crate::service::sessions::plan::Renewing;
+use crate::service::sessions::session_state::SessionState;
 use crate::store::{JobKind, JobState, Labels, PolicySummary};
 
 /// A job.
@@ -185,7 +187,11 @@ pub struct OpenSession {
     /// Share of wealth in the risky asset at the start. Default: 0.
     pub holding: Option<f64>,
     /// Share of wealth in each of several assets at the start, by their names. Default: 0.
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub holdings: Option<BTreeMap<String, f64>>,
+    /// States of a declared problem at the start, by name. Default: the problem's own start.
+    #[serde(default, deserialize_with = "distinct_if_given")]
+    pub state: Option<BTreeMap<String, f64>>,
     /// Automatic renewal: the next policy is trained on the returns seen, and the session continues with it. Default:
     /// never.
     pub renew: Option<Renewing>,
@@ -211,7 +217,7 @@ pub enum SessionStatus {
     Completed,
 }
 
-/// A live investor.
+/// A live session: an investor's, or one of a declared problem.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Session {
     pub session: String,
@@ -232,9 +238,17 @@ pub struct Session {
     /// without a day gets this day. Null if this is not known, or the session is completed.
     #[schema(value_type = Option<String>, format = Date)]
     pub next: Option<Date>,
-    pub wealth: f64,
-    /// Share of wealth in the risky asset, before trading; for several assets, the share in all of them.
-    pub holding: f64,
+    /// Null if the session lives a declared problem.
+    pub wealth: Option<f64>,
+    /// Share of wealth in the risky asset, before trading; for several assets, the share in all of them. Null if the
+    /// session lives a declared problem.
+    pub holding: Option<f64>,
+    /// States of a declared problem before the coming period, by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub states: Option<BTreeMap<String, f64>>,
+    /// Rewards of a declared problem since the start of the session, discounted to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub earned: Option<f64>,
     /// Holdings of several assets, before the coming period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<Composition>,
@@ -264,17 +278,23 @@ pub fn session_state(observed: usize, horizon: usize, is_due: bool) -> SessionSt
 
 impl From<LiveSession> for Session {
     fn from(live: LiveSession) -> Self {
+        let (account, declared) = match &live.standing {
+            SessionState::Account(account) => (Some(account), None),
+            SessionState::Declared(declared) => (None, Some(declared)),
+        };
         Session {
             period: live.observed + 1,
             state: session_state(live.observed, live.horizon(), live.is_due()),
-            date: live.standing.days.last,
+            date: live.standing.days().last,
             next: live.next_day(),
-            wealth: live.standing.state.wealth,
-            holding: live.standing.state.holding,
-            assets: live.standing.assets.as_ref().map(|assets| assets.composed()),
-            sample_size: live.standing.state.law.sample_size(),
+            wealth: account.map(|account| account.state.wealth),
+            holding: account.map(|account| account.state.holding),
+            states: declared.map(|declared| declared.named()),
+            earned: declared.map(|declared| declared.state.earned),
+            assets: account.and_then(|account| account.assets.as_ref()).map(|assets| assets.composed()),
+            sample_size: live.standing.sample_size(),
             corrections: live.corrections,
-            drift: live.standing.bet.drift(),
+            drift: live.standing.bet().drift(),
             session: live.row.session.clone(),
             labels: Labels::default(),
             policy: live.current.policy.clone(),

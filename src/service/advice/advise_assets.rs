@@ -12,6 +12,7 @@ use crate::control::policy::levels::WhyNothing;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::assets::AssetsProblem;
+use crate::control::request::by_name::distinct_if_given;
 use crate::control::request::rules;
 use crate::control::request::specification::{Specification, default_seed};
 use crate::control::request::warnings::Warning;
@@ -29,6 +30,7 @@ pub struct AdviseAssets {
     /// Wealth now. Default: the problem's initial wealth.
     pub wealth: Option<f64>,
     /// Share of wealth in each asset now, before trading, by its name. Default: 0 for each.
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub holdings: Option<BTreeMap<String, f64>>,
     /// Seed of the simulated bridges.
     #[serde(default = "default_seed")]

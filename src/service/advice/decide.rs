@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::error::FieldError;
 use crate::control::policy::declared::Decided;
-use crate::control::request::declared::distinct_if_given;
+use crate::control::request::by_name::distinct_if_given;
 use crate::service::advice::explain::ATOM_BYTES;
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
+use crate::service::sessions::current_advice::of_state;
 use crate::store::Tenant;
 
 /// A state of a declared problem, and what was seen on the way to it.
@@ -62,15 +62,5 @@ impl Sessions {
         let room = self.memory.answers(returns * ATOM_BYTES).await?;
         let decided = self.resolving.run_on_record(tenant, returns, solve).await?.map_err(of_state)?;
         Ok(Large { value: DecideAnswer { policy, decided }, room })
-    }
-}
-
-/// Names the field of this request in a fault that a state leads to.
-fn of_state(fault: FieldError) -> FieldError {
-    match fault.field.strip_prefix("problem") {
-        None => fault,
-        Some(_) => {
-            FieldError::new("state", "a state of the policy's problem", format!("must lead to no fault, but {fault}"))
-        }
     }
 }

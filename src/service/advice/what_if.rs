@@ -10,6 +10,7 @@ use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::AdviceMode;
 use crate::control::policy::what_if::{Hypothesis, HypotheticalRadius, WhatIfResult};
 use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
+use crate::control::request::by_name::distinct_if_given;
 use crate::service::advice::explain::{self, ATOM_BYTES, Explain};
 use crate::service::advice::what_if_assets::{AssetsWhatIfPoint, WhatIfScenario};
 use crate::service::entries::report::{OF_ONE, OF_SEVERAL, Report, log_return_of, none_of};
@@ -42,15 +43,20 @@ pub struct WhatIf {
     /// The return as `price / previous price - 1` instead.
     pub simple_return: Option<f64>,
     /// Share of wealth in each of several assets now, before trading, by name; each has one.
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub holdings: Option<BTreeMap<String, f64>>,
     /// Returns of several assets in the coming period, in one of three ways; the advice is for the period after.
     #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub log_returns: Option<BTreeMap<String, Option<f64>>>,
     /// The returns as `price / previous price - 1` instead.
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub simple_returns: Option<BTreeMap<String, Option<f64>>>,
     /// Prices of several assets at the end of the coming period.
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub prices: Option<BTreeMap<String, Option<f64>>>,
     /// Prices of several assets at its start. Default: those reported for the period before.
+    #[serde(default, deserialize_with = "distinct_if_given")]
     pub previous_prices: Option<BTreeMap<String, Option<f64>>>,
     /// `worst_case`: solve the step, and show the whole worst-case law.
     pub explain: Option<Explain>,
@@ -218,13 +224,8 @@ impl WhatIf {
             ];
             return none_of(&of_one, OF_ONE);
         }
-        let of_several = [
-            ("holdings", self.holdings.is_some()),
-            ("log_returns", self.log_returns.is_some()),
-            ("simple_returns", self.simple_returns.is_some()),
-            ("prices", self.prices.is_some()),
-            ("previous_prices", self.previous_prices.is_some()),
-        ];
+        let returns = self.report().map(|(field, _)| (field, true));
+        let of_several: Vec<_> = [("holdings", self.holdings.is_some())].into_iter().chain(returns).collect();
         none_of(&of_several, OF_SEVERAL)
     }
 
@@ -270,10 +271,11 @@ impl Sessions {
         let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
         live.check_active()?;
-        let explained = explain::atoms(request.explain, hypotheses.len(), live.standing.state.law.sample_size())?;
-        let assets = live.standing.assets.as_ref().map_or(1, |assets| assets.names.len());
+        let account = live.standing.account()?;
+        let explained = explain::atoms(request.explain, hypotheses.len(), account.state.law.sample_size())?;
+        let assets = account.assets.as_ref().map_or(1, |assets| assets.names.len());
         let room = self.memory.answers(explained * assets * ATOM_BYTES).await?;
-        let several = live.standing.assets.is_some();
+        let several = account.assets.is_some();
         request.fits(several)?;
         if several {
             let mut points = self.suppose_of_assets(tenant, &request, &live, hypotheses).await?;
@@ -288,7 +290,7 @@ impl Sessions {
         let mode = request.mode();
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
-            let (advisor, state) = (advisor.clone(), live.standing.state.clone());
+            let (advisor, state) = (advisor.clone(), account.state.clone());
             let (step, following) = (live.step(), live.following());
             let solves = mode == AdviceMode::Resolve || hypothesis.radius.is_some();
             let turns = if solves { &self.resolving } else { &self.advising };

@@ -12,10 +12,10 @@ use crate::control::policy::what_if::{Hypothesis, WhatIfResult};
 use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::control::problem::dynamics::Dynamics;
 use crate::service::entries::report::Report;
+use crate::service::sessions::account_state::AccountState;
 use crate::service::sessions::assets::shares;
 use crate::service::sessions::fund_advice::FundAdvice;
 use crate::service::sessions::live::LiveSession;
-use crate::service::sessions::session_state::SessionState;
 
 /// The advice on several assets under one hypothesis.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -46,7 +46,7 @@ pub struct AssetsWhatIfPoint {
 /// A hypothesis about several assets, besides one about wealth and radius.
 #[derive(Debug, Clone)]
 pub(super) struct WhatIfScenario {
-    standing: SessionState,
+    standing: AccountState,
     /// Periods observed.
     observed: usize,
     step: usize,
@@ -69,13 +69,14 @@ impl WhatIfScenario {
         holdings: Option<&BTreeMap<String, f64>>,
         report: Option<(&'static str, Report)>,
     ) -> Result<Self, FieldError> {
-        let names = &live.standing.assets.as_ref().ok_or_else(of_one)?.names;
+        let account = live.standing.account()?;
+        let names = &account.assets.as_ref().ok_or_else(of_one)?.names;
         if let (Some((field, _)), None) = (&report, live.following()) {
             let rule = "must be absent: the coming period is the last, so there is none after it to advise";
             return Err(FieldError::new(*field, "given", rule));
         }
         Ok(WhatIfScenario {
-            standing: live.standing.clone(),
+            standing: account.clone(),
             observed: live.observed,
             step: live.step(),
             following: live.following(),

@@ -73,6 +73,14 @@ impl Policies {
         self.kept.get_or_prepare(&key(tenant, policy), PreparedPolicy::bytes, self.read(tenant, policy)).await
     }
 
+    /// Returns the policy of either kind, prepared as above.
+    ///
+    /// # Errors
+    /// As above.
+    pub async fn policy(&self, tenant: &Tenant, policy: &str) -> Result<PreparedPolicy, ServiceError> {
+        Ok(PreparedPolicy::clone(&*self.prepared(tenant, policy).await?))
+    }
+
     /// Returns the policy of an investor, prepared as above.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use crate::control::problem::dynamics::Dynamics;
 use crate::service::entries::periods::{Periods, ReplayedPeriod};
 use crate::service::entries::record::SessionRecord;
 use crate::service::error::ServiceError;
-use crate::service::sessions::session_state::SessionState;
+use crate::service::sessions::account_state::{AccountPeriod, AccountState};
 
 /// Money of a period, after all corrections.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -52,7 +52,7 @@ struct FixedShares {
 }
 
 impl FixedShares {
-    fn at(start: &SessionState, composition: Vec<f64>, total: f64) -> Self {
+    fn at(start: &AccountState, composition: Vec<f64>, total: f64) -> Self {
         let holdings = match &start.assets {
             Some(assets) => assets.fund.holdings.clone(),
             None => vec![start.state.holding],
@@ -106,7 +106,7 @@ pub(super) struct Accounts {
 /// A recorded report no longer keeps the rules.
 pub(super) fn of(periods: &Periods) -> Result<Accounts, ServiceError> {
     let mut passage = periods.passage()?;
-    let start = &passage.standing;
+    let start = passage.standing.account()?;
     let assets = start.names().len().max(1);
     let composition = start.assets.as_ref().map_or_else(|| vec![1.0], |assets| assets.fund.composition.clone());
     let mut equal_weights = FixedShares::at(start, equal(assets), 1.0);
@@ -122,13 +122,14 @@ pub(super) fn of(periods: &Periods) -> Result<Accounts, ServiceError> {
             names = next;
         }
         let Some(passed) = passage.next().map_err(ServiceError::of_recorded)? else { break };
-        let ReplayedPeriod { before, seen, turnover, dynamics, .. } = passed;
+        let ReplayedPeriod { before, seen, moved } = passed;
+        let AccountPeriod { turnover, dynamics, .. } = *moved.account()?;
         let moves = seen.moves();
         accounts.push(PeriodAccount {
             rate: dynamics.rate_per_step,
             flow: dynamics.contribution,
             turnover,
-            cost: before.state.wealth * dynamics.trading_cost * turnover,
+            cost: before.account()?.state.wealth * dynamics.trading_cost * turnover,
             benchmarks: Benchmarks {
                 equal_weights: equal_weights.pass(dynamics, &moves),
                 initial_composition: initial.pass(dynamics, &moves),

@@ -1,16 +1,29 @@
 //! The parts of an acknowledged answer to an observation that a replay reads.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 
 use crate::service::entries::notes::{self, PeriodNote};
 use crate::service::entries::report::Report;
+use crate::service::error::ServiceError;
 use crate::service::sessions::assets::{Composition, ObservedAssets};
+use crate::service::sessions::content::answer;
+use crate::service::sessions::session_state::{AdvisedActions, SessionState};
+use crate::store::EntryRow;
 
 /// The numbers of the answer to an observation.
+#[derive(Debug, Clone)]
+pub(super) enum Acknowledged {
+    Account(Box<AcknowledgedAccount>),
+    Declared(Box<AcknowledgedProblem>),
+}
+
+/// Those of an investor.
 #[derive(Debug, Clone, Deserialize)]
-pub(super) struct Acknowledged {
+pub(super) struct AcknowledgedAccount {
     log_return: Option<f64>,
-    pub advised_allocation: f64,
+    advised_allocation: f64,
     executed_allocation: f64,
     wealth: f64,
     assets: Option<ObservedAssets>,
@@ -18,13 +31,83 @@ pub(super) struct Acknowledged {
     notes: Vec<PeriodNote>,
 }
 
+/// Those of a declared problem.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct AcknowledgedProblem {
+    noise: Option<f64>,
+    advised: Option<BTreeMap<String, f64>>,
+    executed: BTreeMap<String, f64>,
+    state: BTreeMap<String, f64>,
+}
+
 impl Acknowledged {
+    /// Reads the answer of an entry of the session that began in the state `start`.
+    ///
+    /// # Errors
+    /// It is not such an answer.
+    pub(super) fn of(start: &SessionState, entry: &EntryRow, names: &[String]) -> Result<Self, ServiceError> {
+        Ok(match start {
+            SessionState::Account(_) => Acknowledged::Account(answer(entry, names)?),
+            SessionState::Declared(_) => Acknowledged::Declared(answer(entry, names)?),
+        })
+    }
+
     /// Returns the report with the acknowledged numbers, so that a replay on another processor or library agrees with
     /// them.
-    pub(in crate::service) fn report(&self, reported: &Report) -> Report {
+    pub(super) fn report(&self, reported: &Report) -> Report {
+        match self {
+            Acknowledged::Account(account) => account.report(reported),
+            Acknowledged::Declared(problem) => Report {
+                noise: problem.noise,
+                missing: problem.noise.is_none(),
+                executed: Some(problem.executed.clone()),
+                state: Some(problem.state.clone()),
+                date: reported.date,
+                ..Report::recorded()
+            },
+        }
+    }
+
+    /// Returns the report. Several assets or actions that were executed as advised get what was advised as executed.
+    pub(super) fn held_as_advised(&self, reported: &Report) -> Report {
+        let mut report = reported.clone();
+        match self {
+            Acknowledged::Account(account) => {
+                if let Some(assets) = &account.assets {
+                    report.executed_allocations.get_or_insert_with(|| assets.advised_allocations.clone());
+                }
+            }
+            Acknowledged::Declared(problem) if report.executed.is_none() => {
+                report = report.with_acknowledged(&problem.executed);
+            }
+            Acknowledged::Declared(_) => {}
+        }
+        report
+    }
+
+    /// Returns what was advised.
+    pub(super) fn advised(&self) -> AdvisedActions {
+        match self {
+            Acknowledged::Account(account) => AdvisedActions::Allocation(account.advised_allocation),
+            Acknowledged::Declared(problem) => {
+                AdvisedActions::Actions(problem.advised.iter().flat_map(BTreeMap::values).copied().collect())
+            }
+        }
+    }
+
+    /// Returns the acknowledged composition if there are several assets.
+    pub(super) fn composed(&self) -> Option<&Composition> {
+        match self {
+            Acknowledged::Account(account) => account.assets.as_ref().map(|assets| &assets.composed),
+            Acknowledged::Declared(_) => None,
+        }
+    }
+}
+
+impl AcknowledgedAccount {
+    fn report(&self, reported: &Report) -> Report {
         let Report { date, rate, flow, .. } = *reported;
-        let wealth = Some(self.wealth);
-        let common = Report { wealth, date, rate, flow, is_recorded: true, ..Report::default() };
+        let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::recorded() };
         let of_lost = |asset| notes::is_lost(&self.notes, asset).then_some(f64::NEG_INFINITY);
         match &self.assets {
             Some(assets) => Report {
@@ -41,19 +124,5 @@ impl Acknowledged {
                 Report { log_return, missing: log_return.is_none(), executed_allocation, ..common }
             }
         }
-    }
-
-    /// Returns the report. Several assets that were held as advised get their advised allocations as the executed ones.
-    pub(super) fn held_as_advised(&self, reported: &Report) -> Report {
-        let mut report = reported.clone();
-        if let Some(assets) = &self.assets {
-            report.executed_allocations.get_or_insert_with(|| assets.advised_allocations.clone());
-        }
-        report
-    }
-
-    /// Returns the acknowledged composition if there are several assets.
-    pub(in crate::service) fn composed(&self) -> Option<&Composition> {
-        self.assets.as_ref().map(|assets| &assets.composed)
     }
 }

@@ -1,16 +1,108 @@
 //! Answers to observations and corrections. They are stored, so that a repeated request gets the same answer.
 
+use std::collections::BTreeMap;
+
 use jiff::civil::Date;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::policy::advice::Uncertainty;
 use crate::control::problem::actions::Band;
-use crate::service::entries::drift::Drift;
+use crate::service::entries::drift::{Drift, DriftLevel};
 use crate::service::entries::notes::PeriodNote;
 use crate::service::sessions::assets::{Composition, ObservedAssets};
 
-/// The session after an observation.
+/// The session after an observation: an investor's, or one of a declared problem.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum ObservationAnswer {
+    Account(Box<Observed>),
+    Declared(Box<DeclaredObserved>),
+}
+
+/// The session after a correction: an investor's, or one of a declared problem.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum CorrectionAnswer {
+    Account(Box<Corrected>),
+    Declared(Box<DeclaredCorrected>),
+}
+
+/// The part of an answer to an observation that has nothing to do with the problem.
+pub(in crate::service) struct ReportedPeriod {
+    pub session: String,
+    pub period: usize,
+    pub completed: bool,
+    pub uncertainty: Uncertainty,
+}
+
+impl ObservationAnswer {
+    /// Returns the radius of the law that learned the period, and the level of its drift.
+    pub(super) fn radius_and_drift(&self) -> (f64, DriftLevel) {
+        match self {
+            ObservationAnswer::Account(answer) => (answer.uncertainty.radius, answer.drift.level),
+            ObservationAnswer::Declared(answer) => (answer.uncertainty.radius, answer.drift.level),
+        }
+    }
+}
+
+/// The session of a declared problem after an observation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DeclaredObserved {
+    pub session: String,
+    pub period: usize,
+    /// Null if it is missing.
+    pub noise: Option<f64>,
+    /// The actions advised for the period, by name. Null if none were: from the states before it every action may lead out
+    /// of a range.
+    pub advised: Option<BTreeMap<String, f64>>,
+    /// The actions executed in it, by name.
+    pub executed: BTreeMap<String, f64>,
+    /// The reward of the period by the problem's formula; null if the noise is missing.
+    pub reward: Option<f64>,
+    /// Rewards since the start of the session, discounted to it.
+    pub earned: f64,
+    /// The states after the period, by name.
+    pub state: BTreeMap<String, f64>,
+    /// The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
+    /// period.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
+    /// True if the horizon is reached.
+    pub completed: bool,
+    /// The test of whether noises still come from the same law.
+    pub drift: Drift,
+    /// In the unit of the noise.
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
+
+/// The session of a declared problem after a correction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DeclaredCorrected {
+    pub session: String,
+    pub correction: usize,
+    /// The period corrected, inserted or removed.
+    pub period: usize,
+    /// Its noise now; null if it is missing or removed.
+    pub noise: Option<f64>,
+    /// Periods observed now.
+    pub observed: usize,
+    /// Rewards since the start of the session, discounted to it.
+    pub earned: f64,
+    /// The states now, by name.
+    pub state: BTreeMap<String, f64>,
+    /// The last day of the last period, if it is known.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
+    /// The test of whether the corrected noises still come from the same law.
+    pub drift: Drift,
+    /// In the unit of the noise.
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
+
+/// The session of an investor after an observation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Observed {
     pub session: String,
@@ -47,7 +139,7 @@ pub struct Observed {
     pub uncertainty: Uncertainty,
 }
 
-/// The session after a correction.
+/// The session of an investor after a correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Corrected {
     pub session: String,
@@ -76,12 +168,12 @@ pub struct Corrected {
     pub uncertainty: Uncertainty,
 }
 
-/// The state of a session, as far as every answer that changes it reports it.
+/// The state of a session, as far as every answer that changes it reports it. A declared problem has no wealth.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct StateSummary {
-    pub wealth: f64,
-    pub holding: f64,
-    pub wealth_change: f64,
+    pub wealth: Option<f64>,
+    pub holding: Option<f64>,
+    pub wealth_change: Option<f64>,
     pub date: Option<Date>,
     pub drift: Drift,
     /// Standard deviation of the log-returns in the law, if the moments determine it.

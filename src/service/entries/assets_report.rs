@@ -7,7 +7,8 @@
 use std::collections::BTreeMap;
 
 use crate::control::error::FieldError;
-use crate::service::entries::report::{OF_ONE, Report, between, by_name, none_of, reported_log_return};
+use crate::control::request::by_name::by_name;
+use crate::service::entries::report::{OF_ONE, Report, between, none_of, reported_log_return};
 
 const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
 
@@ -59,8 +60,11 @@ impl Report {
         names: &[String],
         known: &[Option<f64>],
     ) -> Result<Vec<Option<f64>>, FieldError> {
-        let given =
-            self.previous_prices.as_ref().map(|before| by_name("previous_prices", before, names)).transpose()?;
+        let given = self
+            .previous_prices
+            .as_ref()
+            .map(|before| by_name("previous_prices", "asset", before, names))
+            .transpose()?;
         if given.is_none() && known.iter().all(Option::is_none) {
             let rule = "must be given with prices if the period before was not reported with prices";
             return Err(FieldError::new("previous_prices", "null", rule));
@@ -83,7 +87,7 @@ impl Report {
 
 /// Reads the values of a field by the names of the assets; at least one is not null.
 fn read(field: &str, values: &Values, names: &[String], of: &ReadOne<'_>) -> Result<Vec<Option<f64>>, FieldError> {
-    let values = by_name(field, values, names)?;
+    let values = by_name(field, "asset", values, names)?;
     if values.iter().all(Option::is_none) {
         return Err(FieldError::new(field, "null for every asset", "must be left out: give missing instead"));
     }
@@ -91,4 +95,26 @@ fn read(field: &str, values: &Values, names: &[String], of: &ReadOne<'_>) -> Res
         value.map(|value| of(&format!("{field}.{}", names[asset]), asset, value)).transpose()
     };
     values.into_iter().enumerate().map(one).collect()
+}
+
+impl Report {
+    /// Lists the fields of several assets, and whether each is given.
+    pub(super) fn of_several(&self) -> [(&'static str, bool); 5] {
+        [
+            ("log_returns", self.log_returns.is_some()),
+            ("simple_returns", self.simple_returns.is_some()),
+            ("prices", self.prices.is_some()),
+            ("previous_prices", self.previous_prices.is_some()),
+            ("executed_allocations", self.executed_allocations.is_some()),
+        ]
+    }
+
+    /// Returns the field that gave the return of one of several assets, and its value.
+    pub(in crate::service) fn given_of(&self, asset: &str) -> (String, Option<f64>) {
+        let ways = [("simple_returns", &self.simple_returns), ("prices", &self.prices)];
+        let given = ways.into_iter().find_map(|(field, values)| values.as_ref().map(|values| (field, values)));
+        let (field, values) =
+            given.map_or(("log_returns", self.log_returns.as_ref()), |(field, all)| (field, Some(all)));
+        (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied().flatten()))
+    }
 }

@@ -20,10 +20,10 @@ pub(super) struct AppliedCorrection {
     pub standing: SessionState,
     /// Periods observed after it.
     pub observed: usize,
-    /// Log-return of the period corrected or inserted; `None` if it is missing or removed.
-    pub log_return: Option<f64>,
-    /// Change of wealth over the last period, after the correction.
-    pub wealth_change: f64,
+    /// The period corrected or inserted as it is now; `None` if it is removed.
+    pub now: Option<ReplayedPeriod>,
+    /// The state before the last period, after the correction.
+    pub before_last: SessionState,
 }
 
 impl Correct {
@@ -64,7 +64,7 @@ impl Periods {
     ) -> Result<AppliedCorrection, ServiceError> {
         let (mut previous, mut passage) = (Vec::with_capacity(self.all.len() + 1), self.passage()?);
         while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
-            previous.push(Some((step.seen, passage.standing.days.last)));
+            previous.push(Some((step.seen, passage.standing.days().last)));
         }
         let before = passage.standing;
         self.correct(correction, entry)?;
@@ -73,34 +73,35 @@ impl Periods {
             Change::Insert => previous.insert(correction.period - 1, None),
             Change::Remove => drop(previous.remove(correction.period - 1)),
         }
-        let (mut log_return, mut doubts, mut passage) = (None, Vec::new(), self.passage()?);
-        let mut wealth_before = passage.standing.state.wealth;
+        let (mut now, mut doubts, mut passage) = (None, Vec::new(), self.passage()?);
+        let mut before_last = passage.standing.clone();
         for (period, previous) in (1..).zip(previous) {
             let periods_per_year = passage.stretch().terms.periods_per_year;
             let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
-            let Some(ReplayedPeriod { before, seen, log_return: now, .. }) = passed else { break };
-            wealth_before = before.state.wealth;
+            let Some(passed) = passed else { break };
+            let ReplayedPeriod { before, seen, .. } = &passed;
             let report = &self.all[period - 1].report;
             let (seen_before, day_before) = previous.unzip();
-            if period == correction.period && correction.change != Change::Remove {
-                log_return = now;
-                if day_before != Some(passage.standing.days.last) {
-                    doubts.extend(doubts::of_day(&before.days, report.date, periods_per_year, today));
-                }
+            let is_corrected = period == correction.period && correction.change != Change::Remove;
+            if is_corrected && day_before != Some(passage.standing.days().last) {
+                doubts.extend(doubts::of_day(before.days(), report.date, periods_per_year, today));
             }
             // A corrected price also changes the return after it.
-            if seen_before.as_ref() != Some(&seen) {
+            if seen_before.as_ref() != Some(seen) {
                 doubts.extend(
-                    before.return_doubts(report, &seen).into_iter().map(|doubt| later(period, correction, doubt)),
+                    before.noise_doubts(report, seen).into_iter().map(|doubt| later(period, correction, doubt)),
                 );
+            }
+            before_last.clone_from(before);
+            if is_corrected {
+                now = Some(passed);
             }
         }
         if !doubts.is_empty() && !correction.confirm {
             return Err(ServiceError::Unconfirmed(Doubts(doubts)));
         }
         let standing = passage.stands();
-        let wealth_change = standing.state.wealth - wealth_before;
-        Ok(AppliedCorrection { before, standing, observed: self.all.len(), log_return, wealth_change })
+        Ok(AppliedCorrection { before, standing, observed: self.all.len(), now, before_last })
     }
 }
 

@@ -7,6 +7,7 @@ use std::ops::RangeInclusive;
 
 use jiff::civil::Date;
 
+use crate::control::error::FieldError;
 use crate::service::jobs::due::next_day;
 
 /// Days from one last day to the next, and the number of such periods in a year.
@@ -52,6 +53,20 @@ impl Days {
     pub(in crate::service) fn next(&self, policy: Option<f64>) -> Option<Date> {
         let periods = self.periods_per_year(policy)?;
         (0..=self.undated).try_fold(self.last?, |day, _| next_day(day, periods))
+    }
+
+    /// Checks that a reported day is later than the last one.
+    ///
+    /// # Errors
+    /// It is not.
+    pub(in crate::service) fn check_later(&self, date: Option<Date>) -> Result<(), FieldError> {
+        match (date, self.last) {
+            (Some(date), Some(last)) if date <= last => {
+                let rule = format!("must be later than {last}, the date of an earlier period");
+                Err(FieldError::new("date", date, rule))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Returns the days after a period reported with this day, or without one.

@@ -54,6 +54,8 @@ pub enum DoubtReason {
     FutureDay,
     /// Its return lies more than 4 standard deviations from the record.
     UnusualReturn,
+    /// Its noise lies more than 4 standard deviations from those known.
+    UnusualNoise,
     /// Its return is -100 %.
     TotalLoss,
     /// Most reports in the list for the same policy and day have another return.
@@ -151,6 +153,20 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
     };
     let missing = if missing.len() > LISTED { Vec::new() } else { missing };
     Some(Doubt { missing, ..Doubt::new(DoubtReason::MissingPeriods, "date", day.to_string(), sentence) })
+}
+
+/// Doubts the noise of a declared problem as [`of_return`] doubts a return.
+pub(in crate::service) fn of_noise(noise: f64, (mean, deviation): (f64, f64)) -> Option<Doubt> {
+    let distance = (noise - mean).abs();
+    // Rounding apart, a record whose noises are all equal has no deviation.
+    if distance <= (UNUSUAL_DEVIATIONS * deviation).max(ROUNDING * mean.abs()) {
+        return None;
+    }
+    let sentence = match (distance / deviation).is_finite() {
+        true => format!("{noise} lies {:.1} standard deviations from the noises known", distance / deviation),
+        false => format!("{noise} differs from the noises known, which are all {mean}"),
+    };
+    Some(Doubt::new(DoubtReason::UnusualNoise, "noise", noise, sentence))
 }
 
 /// Doubts a total loss, and a log-return z that lies far from a record with mean m and standard deviation s: |z - m| > 4 s, at any size.

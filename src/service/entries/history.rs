@@ -6,27 +6,36 @@ use jiff::civil::Date;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::control::assets::advice::named;
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::AdviceMode;
 use crate::control::request::terms::Terms;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::entries::account::{self, Accounts, PeriodAccount};
-use crate::service::entries::answer::{Corrected, Observed};
+use crate::service::entries::answer::{Corrected, Observed, ReportedPeriod};
+use crate::service::entries::declared_history::DeclaredHistory;
 use crate::service::entries::notes::{self, PeriodNote};
 use crate::service::entries::periods::{Periods, Replay, ReplayedPeriod, SessionPeriod};
 use crate::service::entries::report::{Correct, Report};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
-use crate::service::sessions::assets::{Composition, ObservedAssets};
+use crate::service::sessions::account_state::AccountState;
+use crate::service::sessions::assets::Composition;
 use crate::service::sessions::content::{answer, content};
 use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::plan::{Renew, Renewed, SessionPlan};
 use crate::service::sessions::session_state::SessionState;
-use crate::store::{EntryKind, SessionFacts, SessionRow, Tenant};
+use crate::store::{EntryKind, InitialAccount, SessionFacts, SessionRow, Tenant};
 
-/// The start of a session, and everything recorded since.
+/// The history of a session: an investor's, or one of a declared problem.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum HistoryAnswer {
+    Account(Box<History>),
+    Declared(Box<DeclaredHistory>),
+}
+
+/// The start of an investor's session, and everything recorded since.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct History {
     pub session: String,
@@ -150,15 +159,20 @@ impl Sessions {
         tenant: &Tenant,
         session: &str,
         turn: &HeavyPermit,
-    ) -> Result<Large<History>, ServiceError> {
+    ) -> Result<Large<HistoryAnswer>, ServiceError> {
         let Large { value: facts, room } = self.facts(tenant, session).await?;
         let is_large = room.is_some();
         let reading = move || {
             let periods = Periods::of(&facts)?;
-            let (corrections, renewals) = amendments(&facts, &periods)?;
-            Ok::<_, ServiceError>((facts, periods, corrections, renewals))
+            Ok::<_, ServiceError>(match periods.at_start() {
+                SessionState::Account(_) => Read::Account((facts, periods).into()),
+                SessionState::Declared(start) => Read::Declared(DeclaredHistory::of(&facts, &periods, start)?),
+            })
         };
-        let (facts, periods, corrections, renewals) = self.apart(tenant, is_large, reading).await??;
+        let (facts, periods) = match self.apart(tenant, is_large, reading).await?? {
+            Read::Account(read) => *read,
+            Read::Declared(history) => return Ok(Large { value: HistoryAnswer::Declared(history.into()), room }),
+        };
         let first = periods.first_changed();
         let changed = match first < periods.all.len() {
             true => {
@@ -168,22 +182,25 @@ impl Sessions {
             false => Vec::new(),
         };
         let SessionPlan { terms, assets, .. } = SessionPlan::of(&facts.row)?;
-        let start = periods.at_start(terms.learning);
+        let start = periods.at_start().account()?.clone().with_law(terms.learning).state;
         let listing = move || {
             let Accounts { accounts, record } = account::of(&periods)?;
-            Ok::<_, ServiceError>((observations(&facts, &periods, (first, changed), accounts)?, record, facts.row))
+            let observations = observations(&facts, &periods, (first, changed), accounts)?;
+            Ok::<_, ServiceError>((observations, amendments(&facts, &periods)?, record, facts.row))
         };
-        let (observations, record, row) = self.apart(tenant, is_large, listing).await??;
+        let (observations, (corrections, renewals), record, row) = self.apart(tenant, is_large, listing).await??;
         let first = self.policies.advisor(tenant, &row.policy).await?;
         let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
-        let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = row;
+        let SessionRow { session, policy, account, initial_history: history, .. } = row;
+        let InitialAccount { wealth, holding } =
+            account.ok_or_else(|| ServiceError::internal("a session of an investor has no wealth"))?;
         let value = History {
             session,
             policy,
             terms,
-            initial_wealth,
-            initial_holding,
+            initial_wealth: wealth,
+            initial_holding: holding,
             initial_radius,
             history: InitialHistory::of(history, assets.as_ref().map(Vec::len)),
             record: InitialHistory::of(record.all().to_vec(), assets.as_ref().map(|_| record.assets())),
@@ -193,7 +210,7 @@ impl Sessions {
             corrections,
             renewals,
         };
-        Ok(Large { value, room })
+        Ok(Large { value: HistoryAnswer::Account(value.into()), room })
     }
 
     /// Returns each period from `first` on, the first that differs from its acknowledgement. Each waits for its own
@@ -211,8 +228,8 @@ impl Sessions {
             let passed = passage.next().map_err(ServiceError::of_recorded)?;
             let Some(passed) = passed.filter(|_| step >= first) else { continue };
             let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
-            let before = passed.before.clone().with_law(stretch.terms.learning).state;
-            let (law, after) = (advising.clone(), passage.stands().state);
+            let before = passed.before.account()?.clone().with_law(stretch.terms.learning).state;
+            let (law, after) = (advising.clone(), passage.stands().account()?.state.clone());
             let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
             let advice = self.resolving.run(tenant, advise).await?;
             // The radius after a period is the one of the next advice.
@@ -221,13 +238,13 @@ impl Sessions {
                 true => {
                     let uncertainty = self.resolving.run(tenant, move || law.uncertainty(&after)).await?;
                     let name = (session, step + 1);
-                    Some(inserted(name, &passed, &passage.standing, (&advice, uncertainty)))
+                    Some(inserted(name, &passed, passage.standing.account()?, (&advice, uncertainty))?)
                 }
                 false => None,
             };
-            changed.push((now(period, passed, &passage.standing, &advice), inserted));
+            changed.push((now(period, &passed, passage.standing.account()?, &advice)?, inserted));
         }
-        let (measuring, policy) = (passage.stands().state, &periods.current().policy);
+        let (measuring, policy) = (passage.stands().account()?.state.clone(), &periods.current().policy);
         let advisor = self.policies.advisor(tenant, policy).await?;
         let radius = self.resolving.run(tenant, move || advisor.radius(&measuring)).await?;
         changed.last_mut().into_iter().for_each(|(last, _)| last.radius = radius);
@@ -283,20 +300,25 @@ fn observations(
 }
 
 /// Builds the period that leaves the session in the state `after`.
-fn now(period: &SessionPeriod, passed: ReplayedPeriod, after: &SessionState, advice: &Advice) -> Now {
-    let ReplayedPeriod { before, seen, log_return, executed_allocation, .. } = passed;
-    Now {
+fn now(
+    period: &SessionPeriod,
+    passed: &ReplayedPeriod,
+    after: &AccountState,
+    advice: &Advice,
+) -> Result<Now, ServiceError> {
+    let (before, moved) = (passed.before.account()?, passed.moved.account()?);
+    Ok(Now {
         reported: (!period.corrections.is_empty()).then(|| period.report.clone()),
-        log_return,
-        notes: notes::of(&seen, before.names()),
-        assets: before.assets.as_ref().map(|assets| AssetsNow { log_returns: assets.shown(&seen) }),
+        log_return: moved.log_return,
+        notes: notes::of(&passed.seen, before.names()),
+        assets: before.assets.as_ref().map(|assets| AssetsNow { log_returns: assets.shown(&passed.seen) }),
         advised_allocation: advice.allocation,
-        executed_allocation,
+        executed_allocation: moved.executed_allocation,
         wealth: after.state.wealth,
         holding: after.state.holding,
         date: after.days.last,
         radius: f64::NAN,
-    }
+    })
 }
 
 /// Builds the answer for an inserted period as if it had been observed. The executed allocation counts as the advised
@@ -304,30 +326,22 @@ fn now(period: &SessionPeriod, passed: ReplayedPeriod, after: &SessionState, adv
 fn inserted(
     (session, period): (&str, usize),
     passed: &ReplayedPeriod,
-    after: &SessionState,
+    after: &AccountState,
     (advice, uncertainty): (&Advice, Uncertainty),
-) -> Observed {
-    let assets = passed.before.assets.as_ref().map(|assets| ObservedAssets {
-        log_returns: assets.shown(&passed.seen),
-        advised_allocations: named(&assets.names, &passed.executed),
-        executed_allocations: named(&assets.names, &passed.executed),
-        composed: assets.composed(),
-    });
-    Observed {
-        session: session.to_owned(),
-        period,
-        log_return: passed.log_return,
-        notes: notes::of(&passed.seen, passed.before.names()),
-        band: advice.band,
-        advised_allocation: passed.executed_allocation,
-        executed_allocation: passed.executed_allocation,
-        wealth: after.state.wealth,
-        holding: after.state.holding,
-        assets,
-        wealth_change: after.state.wealth - passed.before.state.wealth,
-        date: after.days.last,
-        completed: false,
-        drift: after.bet.drift(),
-        uncertainty,
+) -> Result<Observed, ServiceError> {
+    let (before, moved) = (passed.before.account()?, passed.moved.account()?);
+    let advice = Advice { allocation: moved.executed_allocation, ..advice.clone() };
+    let about = ReportedPeriod { session: session.to_owned(), period, completed: false, uncertainty };
+    let mut observed = after.observed(before, (&passed.seen, moved), &advice, about);
+    if let Some((shown, assets)) = observed.assets.as_mut().zip(before.assets.as_ref()) {
+        shown.advised_allocations.clone_from(&shown.executed_allocations);
+        shown.composed = assets.composed();
     }
+    Ok(observed)
+}
+
+/// The rows of an investor's session, or the history of another.
+enum Read {
+    Account(Box<(SessionFacts, Periods)>),
+    Declared(DeclaredHistory),
 }

@@ -4,10 +4,12 @@
 pub mod account;
 pub(super) mod acknowledged;
 pub mod answer;
+pub(super) mod answering;
 pub(super) mod assets_report;
 pub mod change;
 pub(super) mod corrections;
 pub(super) mod days;
+pub mod declared_history;
 pub mod doubts;
 pub mod drift;
 pub mod history;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::problem::state::LEAST_LEARNED;
-use crate::service::entries::record::PeriodReturns;
+use crate::service::entries::record::PeriodNoise;
 
 /// A note on a recorded period.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -32,7 +32,7 @@ pub enum NoteReason {
 }
 
 /// Returns the notes on a period of assets with these `names`, which are empty for one asset.
-pub(in crate::service) fn of(seen: &PeriodReturns, names: &[String]) -> Vec<PeriodNote> {
+pub(in crate::service) fn of(seen: &PeriodNoise, names: &[String]) -> Vec<PeriodNote> {
     if seen.is_missing() {
         return Vec::new();
     }
@@ -69,7 +69,7 @@ pub(in crate::service) fn of(seen: &PeriodReturns, names: &[String]) -> Vec<Peri
         };
         Some(PeriodNote { reason, asset: name.cloned(), sentence })
     };
-    seen.log_returns.iter().enumerate().filter_map(of_asset).collect()
+    seen.values.iter().enumerate().filter_map(of_asset).collect()
 }
 
 /// Returns whether the notes say that the asset, named if there are several, lost everything.

@@ -6,21 +6,20 @@
 
 use std::collections::BTreeMap;
 
+use serde::Deserialize;
+
 use crate::control::error::FieldError;
-use crate::control::problem::dynamics::Dynamics;
-use crate::control::problem::state::State;
-use crate::control::request::learning::Learning;
 use crate::service::entries::acknowledged::Acknowledged;
-use crate::service::entries::answer::Corrected;
 use crate::service::entries::change::Change;
-use crate::service::entries::record::{PeriodReturns, SessionRecord};
+use crate::service::entries::record::{PeriodNoise, SessionRecord};
 use crate::service::entries::report::{Correct, Report};
 use crate::service::error::ServiceError;
 use crate::service::sessions::asset_change::{AssetChange, AssetNames};
-use crate::service::sessions::assets::{Assets, Composition, PlannedAssets};
+use crate::service::sessions::assets::Composition;
 use crate::service::sessions::content::{answer, content, names_after};
-use crate::service::sessions::plan::{PolicyTenure, Renew, Renewed, SessionPlan};
-use crate::service::sessions::session_state::{SessionState, Transition};
+use crate::service::sessions::plan::{DeclaredRenewed, PolicyTenure, Renew, Renewed, SessionPlan, terms_of};
+use crate::service::sessions::session_state::{Moved, NextPolicy, SessionState};
+use crate::service::sessions::transition::Transition;
 use crate::store::{EntryKind, SessionFacts};
 
 /// A period according to its entries.
@@ -60,8 +59,8 @@ pub struct Periods {
 enum BetweenPeriods {
     /// The composition of several assets that an answer reported.
     Composed(Box<Composition>),
-    /// The next policy began, perhaps with other assets.
-    Renewed(Option<Box<AssetChange>>),
+    /// The next policy began.
+    Renewed(Box<NextPolicy>),
 }
 
 /// A replay of a session up to some period.
@@ -69,7 +68,7 @@ pub struct Replay<'a> {
     periods: &'a Periods,
     /// The state under the policy that comes next.
     pub standing: SessionState,
-    /// All observed returns, in order.
+    /// All that the law could learn, in order.
     pub record: SessionRecord,
     /// Periods replayed.
     step: usize,
@@ -81,16 +80,8 @@ pub struct Replay<'a> {
 pub struct ReplayedPeriod {
     /// The state before it.
     pub before: SessionState,
-    pub seen: PeriodReturns,
-    /// `None` if it is missing; for several assets, the return of the holdings.
-    pub log_return: Option<f64>,
-    pub executed_allocation: f64,
-    /// Shares of wealth held in several assets; empty for one asset.
-    pub executed: Vec<f64>,
-    /// Share of wealth bought and sold for them.
-    pub turnover: f64,
-    /// The dynamics of the period, with the rate and the flow reported.
-    pub dynamics: Dynamics,
+    pub seen: PeriodNoise,
+    pub moved: Moved,
 }
 
 impl SessionPeriod {
@@ -108,27 +99,13 @@ impl Periods {
     pub(in crate::service) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
         let SessionFacts { row, entries, .. } = facts;
         let plan = SessionPlan::of(row)?;
-        let history = SessionRecord::new(
-            plan.assets.as_ref().map_or(1, |assets| assets.names.len()),
-            row.initial_history.clone(),
-        );
-        let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed }| {
-            Assets::with_composition(names, history.rows_of(history.all()), composed).map(Box::new)
-        });
-        let assets = assets.transpose()?;
-        let (wealth, learning) = (row.initial_wealth, plan.terms.learning);
-        let state = match &assets {
-            // The returns of a fund may vary less than those of a history must.
-            Some(assets) => State { wealth, holding: 0.0, law: learning.law(&assets.fund.returns()) },
-            None => State::new(history.all(), wealth, learning)?,
-        };
-        let state = state.with_holding(row.initial_holding)?;
+        let (start, history) = SessionState::start(row, &plan)?;
         let first = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         let mut periods = Periods {
             all: Vec::new(),
             corrections: 0,
             stretches: vec![first],
-            start: SessionState::at(&row.session, state, assets),
+            start,
             history,
             names: AssetNames::from(plan.names()),
             events: BTreeMap::new(),
@@ -142,22 +119,31 @@ impl Periods {
             match entry.kind {
                 EntryKind::Observation => periods.all.push(SessionPeriod {
                     report: content(entry, names)?,
-                    acknowledged: Some(answer(entry, names)?),
+                    acknowledged: Some(Acknowledged::of(&periods.start, entry, names)?),
                     stands: true,
                     entry: index,
                     corrections: Vec::new(),
                 }),
                 EntryKind::Correction => {
                     periods.correct(&content(entry, names)?, index)?;
-                    let composition = answer::<Corrected>(entry, names)?.assets;
-                    periods.add(composition.map(composed));
+                    let Recomposed { assets } = answer(entry, names)?;
+                    periods.add(assets.map(composed));
                 }
                 EntryKind::Renewal => {
                     let renew: Renew = content(entry, names)?;
-                    let Renewed { terms, assets, .. } = answer(entry, names)?;
-                    let change = AssetChange::new((&own, names), &renew, periods.all.len())?;
-                    periods
-                        .add([BetweenPeriods::Renewed(change.map(Box::new))].into_iter().chain(assets.map(composed)));
+                    let (next, terms, assets) = match &periods.start {
+                        SessionState::Account(_) => {
+                            let Renewed { terms, assets, .. } = answer(entry, names)?;
+                            let change = AssetChange::new((&own, names), &renew, periods.all.len())?;
+                            (NextPolicy::Account(change), terms, assets)
+                        }
+                        SessionState::Declared(_) => {
+                            let DeclaredRenewed { problem, .. } = answer(entry, names)?;
+                            let terms = terms_of(&problem);
+                            (NextPolicy::Declared(problem.into()), terms, None)
+                        }
+                    };
+                    periods.add([BetweenPeriods::Renewed(next.into())].into_iter().chain(assets.map(composed)));
                     periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
@@ -224,9 +210,9 @@ impl Periods {
         self.all.iter().position(|period| !period.stands).unwrap_or(self.all.len())
     }
 
-    /// Returns the state behind the first advice.
-    pub(super) fn at_start(&self, learning: Learning) -> State {
-        self.start.clone().with_law(learning).state
+    /// Returns the state at the start. The law of several assets is not rebuilt.
+    pub(super) fn at_start(&self) -> &SessionState {
+        &self.start
     }
 
     /// Starts a replay, to be advanced period by period. Cost of each period: a copy of the law.
@@ -261,24 +247,22 @@ impl<'a> Replay<'a> {
         let Some(SessionPeriod { report, acknowledged, stands, .. }) = self.periods.all.get(self.step) else {
             return Ok(None);
         };
-        let (dynamics, period) = (self.stretch().dynamics(self.step), self.step + 1);
+        let period = self.step + 1;
         let (completed, advised) = match acknowledged {
-            Some(acknowledged) if *stands => (acknowledged.report(report), acknowledged.advised_allocation),
-            Some(acknowledged) => (acknowledged.held_as_advised(report), acknowledged.advised_allocation),
+            Some(acknowledged) if *stands => (acknowledged.report(report), acknowledged.advised()),
+            Some(acknowledged) => (acknowledged.held_as_advised(report), acknowledged.advised()),
             // Nothing was advised for it, so nothing was traded.
-            None => (self.standing.held_on(report), self.standing.state.holding),
+            None => self.standing.held_on(report),
         };
-        let passed =
-            self.standing.after(dynamics, period, &completed, (advised, self.stretch().terms.periods_per_year));
-        let passed = passed.map_err(|error| (period, error))?;
-        let Transition { seen, log_return, executed_allocation, executed, turnover, dynamics, mut standing } = passed;
+        let passed = self.standing.after((self.stretch(), self.step), &completed, &advised);
+        let Transition { seen, moved, mut standing } = passed.map_err(|error| (period, error))?;
         standing.price_as(report);
         let before = std::mem::replace(&mut self.standing, standing);
         self.record.learn(period, &seen);
         self.step = period;
         let composed = acknowledged.as_ref().and_then(|acknowledged| acknowledged.composed());
         self.renew(composed).map_err(|error| (period, error))?;
-        Ok(Some(ReplayedPeriod { before, seen, log_return, executed_allocation, executed, turnover, dynamics }))
+        Ok(Some(ReplayedPeriod { before, seen, moved }))
     }
 
     /// Returns the state with the law of the fund of several assets, which a replay does not keep up to date.
@@ -298,19 +282,24 @@ impl<'a> Replay<'a> {
         for event in self.periods.events.get(&self.step).into_iter().flatten() {
             match event {
                 BetweenPeriods::Composed(reported) => self.standing.take(reported)?,
-                BetweenPeriods::Renewed(change) => {
+                BetweenPeriods::Renewed(next) => {
                     self.stretch += 1;
-                    let change = change.as_deref();
-                    if let Some(change) = change {
+                    if let Some(change) = next.asset_change() {
                         self.record = change.record(&self.record);
                     }
-                    let PolicyTenure { window, terms, .. } = self.stretch();
-                    self.standing = self.standing.renewed(&self.record, *window, terms.learning, change)?;
+                    self.standing = self.standing.renewed(&self.record, self.stretch(), next)?;
                 }
             }
         }
         Ok(())
     }
+}
+
+/// The part of the answer to a correction that a replay reads.
+#[derive(Deserialize)]
+struct Recomposed {
+    #[serde(default)]
+    assets: Option<Composition>,
 }
 
 fn composed(reported: Composition) -> BetweenPeriods {

@@ -1,37 +1,43 @@
-//! All observed returns of a session, date by date.
+//! All that was observed of the noise of a session, date by date.
 
 use crate::control::problem::state::LEAST_LEARNED;
 use crate::control::request::assets::DATES;
 use crate::control::request::rules;
 
-/// The log-returns of a period, one for each asset of the session.
+/// The noise of a period: the log-returns of the assets, or the one noise of a declared problem in the unit of the
+/// solver.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PeriodReturns {
+pub struct PeriodNoise {
     /// In the order of the assets: minus infinity after a total loss, and `None` if it is missing.
-    pub log_returns: Vec<Option<f64>>,
+    pub values: Vec<Option<f64>>,
     /// Indices of the assets whose return also covers earlier periods, in which their price did not come.
     pub late: Vec<usize>,
 }
 
-impl PeriodReturns {
-    /// Returns whether every return is missing.
+impl PeriodNoise {
+    /// Returns the noise of one series.
+    pub(in crate::service) fn of(value: Option<f64>) -> Self {
+        PeriodNoise { values: vec![value], late: Vec::new() }
+    }
+
+    /// Returns whether every value is missing.
     pub(in crate::service) fn is_missing(&self) -> bool {
-        self.log_returns.iter().all(Option::is_none)
+        self.values.iter().all(Option::is_none)
     }
 
     /// Returns the log-returns that move wealth: an asset without a return counts as unmoved.
     pub(in crate::service) fn moves(&self) -> Vec<f64> {
-        self.log_returns.iter().map(|log_return| log_return.unwrap_or(0.0)).collect()
+        self.values.iter().map(|log_return| log_return.unwrap_or(0.0)).collect()
     }
 
     /// Returns the row that a law learns. `None` if there is no return of every asset over this period alone.
     pub(in crate::service) fn learned(&self) -> Option<Vec<f64>> {
-        let row: Option<Vec<f64>> = self.log_returns.iter().copied().collect();
+        let row: Option<Vec<f64>> = self.values.iter().copied().collect();
         row.filter(|_| self.late.is_empty()).map(|row| row.into_iter().map(|z| z.max(LEAST_LEARNED)).collect())
     }
 }
 
-/// Log-returns in the order observed; several assets date after date.
+/// The noises that a law learned, in the order observed; several assets date after date.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionRecord {
     assets: usize,
@@ -48,7 +54,7 @@ impl SessionRecord {
     }
 
     /// Appends the returns of a period, if there is one of every asset.
-    pub(in crate::service) fn learn(&mut self, period: usize, seen: &PeriodReturns) {
+    pub(in crate::service) fn learn(&mut self, period: usize, seen: &PeriodNoise) {
         if let Some(row) = seen.learned() {
             self.add(period as i64, &row);
         }

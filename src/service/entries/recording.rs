@@ -11,17 +11,18 @@ use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::callers::keys::Caller;
-use crate::service::entries::answer::{Corrected, Observed};
+use crate::service::entries::answer::{Corrected, CorrectionAnswer, Observed};
 use crate::service::entries::corrections::AppliedCorrection;
 use crate::service::entries::drift::{self, DriftLevel};
-use crate::service::entries::periods::Periods;
+use crate::service::entries::periods::{Periods, ReplayedPeriod};
 use crate::service::entries::report::{Correct, Observe};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::process::spans;
 use crate::service::sessions::asset_change::AssetNames;
 use crate::service::sessions::content::{self, Packed, json};
-use crate::service::sessions::live::{LiveSession, with_uncertainty};
+use crate::service::sessions::current_advice::with_uncertainty;
+use crate::service::sessions::live::LiveSession;
 use crate::service::sessions::plan::{Renewed, SessionPlan};
 use crate::service::sessions::session_state::SessionState;
 use crate::service::sessions::slots::SlotGuard;
@@ -55,6 +56,7 @@ impl Sessions {
             let (standing, answer) = live.after(observe, &report, (&means, self.clock.today())).await?;
             let Packed { content_json, answer_json, numbers, sent } =
                 Packed::of(&report, &answer, live.standing.names())?;
+            let (radius, drift) = answer.radius_and_drift();
             let new = EntryRow {
                 session: session.clone(),
                 entry: live.seen.entries() + 1,
@@ -66,7 +68,7 @@ impl Sessions {
                 created_ms: self.clock.now_milliseconds(),
                 key: observe.reported_by.to_string(),
             };
-            let levels = (live.standing.bet.level(), answer.drift.level);
+            let levels = (live.standing.bet().level(), drift);
             let next = LiveSession {
                 row: live.row.clone(),
                 names: live.names.clone(),
@@ -77,7 +79,7 @@ impl Sessions {
                 current: live.current.clone(),
                 renew: live.renew,
                 seen: live.seen.followed_by(&new),
-                radius: Some(answer.uncertainty.radius),
+                radius: Some(radius),
                 advice: None,
             };
             if self.append(&self.store, &mut held, new, next, levels).await? {
@@ -109,19 +111,19 @@ impl Sessions {
                 return self.repeat(session, (EntryKind::Correction, number), correct, &periods.names).await;
             }
             let (renewals, current, names) = (periods.renewals(), periods.current().clone(), periods.names.clone());
-            let advisor = self.policies.advisor(tenant, &current.policy).await?;
-            current.follows(correct.period, advisor.specification().problem.framework)?;
+            let policy = self.policies.policy(tenant, &current.policy).await?;
+            current.follows(correct.period, &policy)?;
             current.check_change(correct, periods.all.len())?;
             let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
             let renew = SessionPlan::of(&facts.row)?.renew;
-            let AppliedCorrection { before, standing, observed, log_return, wealth_change } =
+            let AppliedCorrection { before, standing, observed, now, before_last } =
                 self.advising.run(tenant, move || periods.apply_correction(&putting, entry, today)).await??;
             let step = current.step_from(observed, renew, renewals);
             let (standing, uncertainty) =
-                with_uncertainty(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
-            let moved = (observed, log_return, wealth_change);
-            let answer = corrected(session, correct, moved, &standing, uncertainty);
-            let levels = (before.bet.level(), answer.drift.level);
+                with_uncertainty(&self.means_of(policy, Some(turn)), tenant, step, standing).await?;
+            let radius = uncertainty.radius;
+            let answer = corrected((session, correct), observed, (now, &before_last), &standing, uncertainty)?;
+            let levels = (before.bet().level(), standing.bet().level());
             let Packed { content_json, answer_json, numbers, sent } = Packed::of(correct, &answer, standing.names())?;
             let new = EntryRow {
                 session: session.to_owned(),
@@ -144,7 +146,7 @@ impl Sessions {
                 renewals,
                 current: current.into(),
                 seen: facts.seen.followed_by(&new),
-                radius: Some(answer.uncertainty.radius),
+                radius: Some(radius),
                 advice: None,
             };
             if self.append(&self.store.by(caller.actor()), &mut held, new, next, levels).await? {
@@ -219,29 +221,27 @@ impl Sessions {
     }
 }
 
-/// Returns the answer to a correction: the periods observed after it, the log-return of its period, and the change of
-/// wealth over the last one.
+/// Returns the answer to a correction: the periods observed after it, its period as it is now, and the state before the
+/// last one.
 fn corrected(
-    session: &str,
-    correct: &Correct,
-    (observed, log_return, wealth_change): (usize, Option<f64>, f64),
+    of: (&str, &Correct),
+    observed: usize,
+    (now, before_last): (Option<ReplayedPeriod>, &SessionState),
     standing: &SessionState,
     uncertainty: Uncertainty,
-) -> Corrected {
-    Corrected {
-        session: session.to_owned(),
-        correction: correct.correction,
-        period: correct.period,
-        log_return,
-        observed,
-        wealth: standing.state.wealth,
-        holding: standing.state.holding,
-        assets: standing.assets.as_ref().map(|assets| assets.composed()),
-        wealth_change,
-        date: standing.days.last,
-        drift: standing.bet.drift(),
-        uncertainty,
-    }
+) -> Result<CorrectionAnswer, ServiceError> {
+    Ok(match standing {
+        SessionState::Account(after) => {
+            let now = now.as_ref().map(|now| now.moved.account()).transpose()?;
+            let answer = after.corrected(of, observed, (now, before_last.account()?), uncertainty);
+            CorrectionAnswer::Account(answer.into())
+        }
+        SessionState::Declared(after) => {
+            let noise = now.and_then(|now| now.moved.noise());
+            let answer = after.corrected(of, observed, noise, uncertainty);
+            CorrectionAnswer::Declared(answer.into())
+        }
+    })
 }
 
 /// Returns the answer of an entry as it was sent.

@@ -9,20 +9,30 @@ use std::sync::Arc;
 use tracing::Instrument;
 
 use crate::control::error::FieldError;
+use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::advisor::Advisor;
+use crate::control::policy::declared::DeclaredAdvisor;
+use crate::control::policy_document::PreparedPolicy;
+use crate::control::request::declared::DeclaredProblem;
 use crate::control::request::terms::Terms;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::entries::periods::{Periods, Replay};
 use crate::service::entries::recording::{is_repeat, numbered};
+use crate::service::entries::report::{OF_INVESTORS, none_of};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::process::spans;
 use crate::service::sessions::Sessions;
+use crate::service::sessions::account_state::AccountState;
 use crate::service::sessions::asset_change::AssetChange;
 use crate::service::sessions::content::Packed;
-use crate::service::sessions::live::{LiveSession, with_uncertainty};
-use crate::service::sessions::plan::{MOST_RENEWALS, Renew, Renewed, SessionPlan, check_window};
-use crate::service::sessions::session_state::SessionState;
+use crate::service::sessions::current_advice::with_uncertainty;
+use crate::service::sessions::live::LiveSession;
+use crate::service::sessions::plan::{
+    DeclaredRenewed, MOST_PERIODS, MOST_RENEWALS, PolicyTenure, Renew, RenewalAnswer, Renewed, SessionPlan,
+    check_window, terms_of,
+};
+use crate::service::sessions::session_state::{NextPolicy, SessionState};
 use crate::store::{Actor, EntryKind, EntryRow, RenewalTarget, SessionFacts, Tenant};
 
 impl Sessions {
@@ -77,30 +87,29 @@ impl Sessions {
         periods: Periods,
         renew: &Renew,
     ) -> Result<DecidedRenewal, ServiceError> {
-        let advisor = self.policies.advisor(tenant, &renew.policy).await?;
+        let policy = match periods.at_start() {
+            SessionState::Account(_) => PreparedPolicy::Investor(self.policies.advisor(tenant, &renew.policy).await?),
+            SessionState::Declared(_) => PreparedPolicy::Declared(self.policies.decider(tenant, &renew.policy).await?),
+        };
         let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
-        let (plan, problem) = (SessionPlan::of(&facts.row)?, &advisor.specification().problem);
-        plan.renew.map_or(Ok(()), |renew| renew.check(problem))?;
-        let (onto, planned, renewal) = (advisor.clone(), plan.clone(), renew.clone());
+        let plan = SessionPlan::of(&facts.row)?;
+        let (onto, planned, renewal) = (policy.clone(), plan.clone(), renew.clone());
         let (mut names, entry) = (periods.names.clone(), facts.seen.entries() + 1);
-        let go_on = move || go_on(&periods, &planned, &onto, &renewal);
-        let Continuation { standing, terms, names: changed } = self.advising.run(tenant, go_on).await??;
-        changed.iter().for_each(|changed| names.change(entry, changed.clone()));
-        self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
-        let (standing, uncertainty) = with_uncertainty(&self.means_of(advisor, turn), tenant, 0, standing).await?;
+        let go_on = move || match onto {
+            PreparedPolicy::Investor(onto) => go_on(&periods, &planned, &onto, &renewal),
+            PreparedPolicy::Declared(onto) => declared_goes_on(&periods, &planned, &onto, &renewal),
+        };
+        let Continuation { standing, terms, next: onto } = self.advising.run(tenant, go_on).await??;
+        if let Some(change) = onto.asset_change() {
+            names.change(entry, change.names.clone());
+        }
+        if let PreparedPolicy::Investor(advisor) = &policy {
+            self.policies.starts_from(advisor, standing.sample_size(), terms.horizon)?;
+        }
+        let (standing, uncertainty) = with_uncertainty(&self.means_of(policy, turn), tenant, 0, standing).await?;
         let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
         let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
-        let answer = Renewed {
-            session: facts.row.session.clone(),
-            renewal: renew.renewal,
-            policy: renew.policy.clone(),
-            period: observed + 1,
-            horizon,
-            terms: current.terms.clone(),
-            names: changed.map(|names| names.to_vec()),
-            assets: standing.assets.as_ref().map(|assets| assets.composed()),
-            uncertainty,
-        };
+        let answer = answered((&facts.row.session, renew), (observed + 1, &current), (onto, &standing), uncertainty)?;
         let Packed { content_json, answer_json, numbers, sent } = Packed::of(renew, &answer, standing.names())?;
         let new = EntryRow {
             session: facts.row.session.clone(),
@@ -137,12 +146,12 @@ impl Sessions {
 struct Continuation {
     standing: SessionState,
     terms: Terms,
-    /// The names of the assets, if it changes them.
-    names: Option<Arc<[String]>>,
+    next: NextPolicy,
 }
 
-/// Returns the state and the terms that a renewal leads to.
+/// Returns the state and the terms that the renewal of an investor's session leads to.
 fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -> Result<Continuation, ServiceError> {
+    plan.renew.map_or(Ok(()), |every| every.check(&Terms::of(&onto.specification().problem)))?;
     let (observed, window) = (periods.all.len(), renew.window);
     let Replay { standing, mut record, .. } = periods.replay()?;
     let change = AssetChange::new((standing.names(), assets_of(onto)), renew, observed)?;
@@ -152,9 +161,72 @@ fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -
     let dates = record.last(window).len() / record.assets();
     let terms = plan.terms(onto, dates, observed);
     let terms = terms.map_err(|rule| FieldError::new("policy", &renew.policy, rule))?;
-    let standing = standing.renewed(&record, window, terms.learning, change.as_ref())?;
+    let standing = standing.account()?.renewed(&record, window, terms.learning, change.as_ref())?;
     accepts(onto, record.last(window), &standing)?;
-    Ok(Continuation { standing, terms, names: change.map(|change| change.names) })
+    let standing = SessionState::Account(standing.into());
+    Ok(Continuation { standing, terms, next: NextPolicy::Account(change) })
+}
+
+/// Returns the state and the terms that the renewal of a declared problem's session leads to. The law begins with the
+/// policy's own history.
+fn declared_goes_on(
+    periods: &Periods,
+    plan: &SessionPlan,
+    onto: &DeclaredAdvisor,
+    renew: &Renew,
+) -> Result<Continuation, ServiceError> {
+    let of_investors = [
+        ("window", renew.window.is_some()),
+        ("records", !renew.records.is_empty()),
+        ("leaving", !renew.leaving.is_empty()),
+    ];
+    none_of(&of_investors, OF_INVESTORS)?;
+    let problem = DeclaredProblem { history: Vec::new(), ..onto.policy().specification().problem.clone() };
+    let (observed, terms) = (periods.all.len(), terms_of(&problem));
+    plan.renew.map_or(Ok(()), |every| every.check(&terms))?;
+    if observed + terms.horizon > MOST_PERIODS {
+        let rule = format!("must end within {MOST_PERIODS} periods of the session: open a new session with its state");
+        return Err(FieldError::new("policy", &renew.policy, rule).into());
+    }
+    let Replay { standing, .. } = periods.replay()?;
+    let SessionState::Declared(standing) = standing else {
+        return Err(ServiceError::internal("a session of another problem"));
+    };
+    let standing = SessionState::Declared(standing.renewed(&problem)?.into());
+    Ok(Continuation { standing, terms, next: NextPolicy::Declared(problem.into()) })
+}
+
+/// Returns the answer to a renewal, which begins with this period.
+fn answered(
+    (session, renew): (&str, &Renew),
+    (period, current): (usize, &PolicyTenure),
+    (next, standing): (NextPolicy, &SessionState),
+    uncertainty: Uncertainty,
+) -> Result<RenewalAnswer, ServiceError> {
+    let (session, renewal, policy) = (session.to_owned(), renew.renewal, renew.policy.clone());
+    let horizon = current.horizon();
+    Ok(match next {
+        NextPolicy::Account(change) => RenewalAnswer::Account(Box::new(Renewed {
+            session,
+            renewal,
+            policy,
+            period,
+            horizon,
+            terms: current.terms.clone(),
+            names: change.map(|change| change.names.to_vec()),
+            assets: standing.account()?.assets.as_ref().map(|assets| assets.composed()),
+            uncertainty,
+        })),
+        NextPolicy::Declared(problem) => RenewalAnswer::Declared(Box::new(DeclaredRenewed {
+            session,
+            renewal,
+            policy,
+            period,
+            horizon,
+            problem: *problem,
+            uncertainty,
+        })),
+    })
 }
 
 /// A renewal to append, and the state it leads to.
@@ -167,7 +239,7 @@ struct DecidedRenewal {
 }
 
 /// Checks that a session with this record and state can use the policy, whose assets it has.
-fn accepts(advisor: &Advisor, record: &[f64], standing: &SessionState) -> Result<(), FieldError> {
+fn accepts(advisor: &Advisor, record: &[f64], standing: &AccountState) -> Result<(), FieldError> {
     let returns = standing.assets.as_ref().map(|assets| assets.fund.returns());
     let state = advisor.initial_state(Some(returns.as_deref().unwrap_or(record)), Some(standing.state.wealth))?;
     advisor.check_withdrawals(&state)

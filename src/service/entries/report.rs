@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::by_name::distinct_if_given;
 use crate::control::request::rules;
 use crate::service::entries::change::Change;
 use crate::service::entries::doubts::Doubt;
@@ -25,6 +26,10 @@ pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
 pub(in crate::service) const OF_SEVERAL: &str =
     "must be absent: the session has one asset, and the field is for several";
+pub(in crate::service) const OF_DECLARED: &str =
+    "must be absent: the session is of an investor, and the field is for declared problems";
+pub(in crate::service) const OF_INVESTORS: &str =
+    "must be absent: the session is of a declared problem, and the field is for investors";
 pub(in crate::service) const OF_ONE: &str = "must be absent: the session has several assets, and the field is for one";
 
 /// Defines a struct with its own fields and those of a report.
@@ -51,20 +56,29 @@ macro_rules! reporting {
             pub previous_price: Option<f64>,
             /// Log-returns of several assets by name. Each has one, or null if its price did not come.
             #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
-            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
             pub log_returns: Option<BTreeMap<String, Option<f64>>>,
             /// `price / previous price - 1` of several assets by name; -1 is a total loss. The return after a null
             /// covers every period since the last price.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
             pub simple_returns: Option<BTreeMap<String, Option<f64>>>,
             /// Prices of several assets at the end of the period; 0 is a total loss.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
             pub prices: Option<BTreeMap<String, Option<f64>>>,
             /// Prices of several assets at the start of the period, or the last one that came. Default: those reported
             /// before.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
             pub previous_prices: Option<BTreeMap<String, Option<f64>>>,
-            /// Given instead of a return if none is known: the law does not change, and the holdings count as unmoved.
+            /// The noise that a declared problem's period brought.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub noise: Option<f64>,
+            /// Actions that were executed in a declared problem's period, each by its name. Default: the advised ones.
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
+            pub executed: Option<BTreeMap<String, f64>>,
+            /// States that a declared problem's period led to, each by its name. Default: those that the formulas give.
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
+            pub state: Option<BTreeMap<String, f64>>,
+            /// Given instead of a return or a noise if none is known: the law does not change, and holdings count as unmoved.
             #[serde(default, skip_serializing_if = "std::ops::Not::not")]
             pub missing: bool,
             /// The last day of the period, later than that of the period before.
@@ -81,7 +95,7 @@ macro_rules! reporting {
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub executed_allocation: Option<f64>,
             /// Share of wealth held in each of several assets through the period. Default: the advised allocations.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "distinct_if_given")]
             pub executed_allocations: Option<BTreeMap<String, f64>>,
             /// Wealth reached, with what was added, if it differs from what the fields above give.
             #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -150,17 +164,20 @@ macro_rules! report_of {
         impl $name {
             /// Returns the report alone, as it is recorded.
             pub(in crate::service) fn report(&self) -> Report {
-                let $name { log_return, simple_return, price, previous_price, missing, date, .. } = *self;
+                let $name { log_return, simple_return, price, previous_price, missing, date, noise, .. } = *self;
                 let $name { rate, flow, executed_allocation, wealth, .. } = *self;
                 let $name { log_returns, simple_returns, prices, previous_prices, executed_allocations, .. } = self;
+                let $name { executed, state, .. } = self;
                 let done = Report { rate, flow, executed_allocation, wealth, ..Report::default() };
-                let one = Report { log_return, simple_return, price, previous_price, missing, date, ..done };
+                let one = Report { log_return, simple_return, price, previous_price, missing, date, noise, ..done };
                 Report {
                     log_returns: log_returns.clone(),
                     simple_returns: simple_returns.clone(),
                     prices: prices.clone(),
                     previous_prices: previous_prices.clone(),
                     executed_allocations: executed_allocations.clone(),
+                    executed: executed.clone(),
+                    state: state.clone(),
                     ..one
                 }
             }
@@ -188,6 +205,22 @@ pub(in crate::service) fn log_return_of(field: &str, simple_return: f64) -> Resu
 }
 
 impl Report {
+    /// Returns a report to be filled with recorded numbers.
+    pub(super) fn recorded() -> Self {
+        Report { is_recorded: true, ..Report::default() }
+    }
+
+    /// Returns the report of the actions that an answer to it acknowledged, with no check of their bounds: they were
+    /// allowed in the state that was known then.
+    pub(super) fn with_acknowledged(self, executed: &BTreeMap<String, f64>) -> Self {
+        Report { executed: Some(executed.clone()), is_recorded: true, ..self }
+    }
+
+    /// Returns true if its numbers come from the record.
+    pub(in crate::service) fn is_recorded(&self) -> bool {
+        self.is_recorded
+    }
+
     /// Checks every field that can be checked without the session, except the return.
     ///
     /// # Errors
@@ -234,24 +267,24 @@ impl Report {
         }
     }
 
-    /// Lists the fields of several assets, and whether each is given.
-    fn of_several(&self) -> [(&'static str, bool); 5] {
-        [
-            ("log_returns", self.log_returns.is_some()),
-            ("simple_returns", self.simple_returns.is_some()),
-            ("prices", self.prices.is_some()),
-            ("previous_prices", self.previous_prices.is_some()),
-            ("executed_allocations", self.executed_allocations.is_some()),
-        ]
+    /// Lists the fields of a declared problem, and whether each is given.
+    pub(in crate::service) fn of_declared(&self) -> [(&'static str, bool); 3] {
+        [("noise", self.noise.is_some()), ("executed", self.executed.is_some()), ("state", self.state.is_some())]
     }
 
-    /// Returns the field that gave the return of one of several assets, and its value.
-    pub(in crate::service) fn given_of(&self, asset: &str) -> (String, Option<f64>) {
-        let ways = [("simple_returns", &self.simple_returns), ("prices", &self.prices)];
-        let given = ways.into_iter().find_map(|(field, values)| values.as_ref().map(|values| (field, values)));
-        let (field, values) =
-            given.map_or(("log_returns", self.log_returns.as_ref()), |(field, all)| (field, Some(all)));
-        (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied().flatten()))
+    /// Lists the fields of an investor, and whether each is given.
+    pub(in crate::service) fn of_investors(&self) -> Vec<(&'static str, bool)> {
+        let one = [
+            ("log_return", self.log_return.is_some()),
+            ("simple_return", self.simple_return.is_some()),
+            ("price", self.price.is_some()),
+            ("previous_price", self.previous_price.is_some()),
+            ("rate", self.rate.is_some()),
+            ("flow", self.flow.is_some()),
+            ("executed_allocation", self.executed_allocation.is_some()),
+            ("wealth", self.wealth.is_some()),
+        ];
+        one.into_iter().chain(self.of_several()).collect()
     }
 
     /// Returns the field that gave the return, and its value.
@@ -291,25 +324,6 @@ impl Report {
 pub(in crate::service) fn none_of(fields: &[(&'static str, bool)], rule: &str) -> Result<(), FieldError> {
     let given = fields.iter().find(|(_, is_given)| *is_given);
     given.map_or(Ok(()), |(field, _)| Err(FieldError::new(*field, "given", rule)))
-}
-
-/// Returns the values in the order of the assets, each of which must have one.
-pub(in crate::service) fn by_name<T: Copy + Serialize>(
-    field: &str,
-    values: &BTreeMap<String, T>,
-    names: &[String],
-) -> Result<Vec<T>, FieldError> {
-    if let Some((other, value)) = values.iter().find(|(name, _)| !names.contains(name)) {
-        let rule = format!("must name one of the assets: {}", names.join(", "));
-        return Err(FieldError::new(format!("{field}.{other}"), serde_json::json!(value), rule));
-    }
-    let of = |name: &String| {
-        let value = values.get(name).copied();
-        value.ok_or_else(|| {
-            FieldError::new(format!("{field}.{name}"), "null", "must be given: every asset needs a value")
-        })
-    };
-    names.iter().map(of).collect()
 }
 
 /// Returns the log-return between two prices, minus infinity down to 0; messages use the names of their fields.

@@ -17,8 +17,8 @@ use tokio::time::MissedTickBehavior;
 
 use self::attempts::{Attempts, request};
 use self::naming::next_labels;
+use self::next_problem::next_problem;
 use self::under_way::{Left, UnderWay};
-use crate::service::entries::periods::Periods;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Jobs;
 use crate::service::metrics::RENEWALS;
@@ -47,6 +47,7 @@ pub(in crate::service) const TOLD: usize = 1024;
 
 mod attempts;
 mod naming;
+mod next_problem;
 mod turns;
 mod under_way;
 mod waiting;
@@ -212,7 +213,9 @@ impl Renewer {
     async fn onto(&self, live: &LiveSession, policy: &str, renew: Renewing, number: usize) -> Result<(), ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
         let (records, leaving) = (BTreeMap::new(), Vec::new());
-        let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window, records, leaving };
+        // The next policy of a declared problem was trained on the window, and its law is that of its own history.
+        let window = renew.window.filter(|_| live.standing.account().is_ok());
+        let renewal = Renew { renewal: number, policy: policy.to_owned(), window, records, leaving };
         let by = Actor::service(self.clock.now_milliseconds());
         match self.sessions.renew(tenant, by, session, &renewal, None).await {
             Ok(_) => {
@@ -232,20 +235,15 @@ impl Renewer {
     /// Queues the next attempt.
     async fn train(&self, live: &LiveSession, renew: Renewing, attempts: &Attempts) -> Result<Left, ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
-        let advisor = self.sessions.advisor(tenant, live).await?;
+        let policy = self.sessions.policies.policy(tenant, &live.current.policy).await?;
         let Large { value: facts, room: _room } = self.sessions.facts(tenant, session).await?;
-        let wealth = live.standing.state.wealth;
-        let specify = move || {
-            let periods = Periods::of(&facts)?;
-            let record = periods.replay()?.record;
-            let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
-            Ok::<_, ServiceError>(advisor.specification().next(record.last(renew.window), rate, wealth)?)
-        };
-        let specification = self.sessions.resolving.run(tenant, specify).await??;
+        let standing = live.standing.clone();
+        let specify = move || next_problem(&policy, &standing, &facts, renew);
+        let posed = self.sessions.resolving.run(tenant, specify).await??;
         let request = request(live, attempts.number, attempts.count);
         let parent = self.store.labels(tenant, &live.current.policy).await?;
         let labels = next_labels(&parent.name, self.clock.now_milliseconds());
-        Ok(match self.jobs.train_for_session(tenant, specification, labels, request).await? {
+        Ok(match self.jobs.train_for_session(tenant, posed, labels, request).await? {
             SessionTraining::Job(row) => {
                 let (job, renewal) = (row.job, attempts.number);
                 tracing::info!(session, job, renewal, "training the next policy of a session");

@@ -11,12 +11,13 @@ use crate::control::assets::fund::Fund;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::state::State;
+use crate::control::request::by_name::by_name;
 use crate::control::request::fund::CompositionRule;
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::service::entries::record::PeriodReturns;
-use crate::service::entries::report::{Report, by_name};
+use crate::service::entries::record::PeriodNoise;
+use crate::service::entries::report::Report;
 
 /// The largest sum of shares of wealth, with room for rounding.
 const WHOLE: f64 = 1.0 + 1e-9;
@@ -112,7 +113,7 @@ impl Assets {
     /// # Errors
     /// It names other assets.
     pub(in crate::service) fn take(&mut self, reported: &Composition) -> Result<(), FieldError> {
-        self.fund.take(by_name("composition", &reported.composition, &self.names)?);
+        self.fund.take(by_name("composition", "asset", &reported.composition, &self.names)?);
         self.one_step = reported.one_step.clone();
         Ok(())
     }
@@ -173,16 +174,16 @@ impl Assets {
     ///
     /// # Errors
     /// They are not given in exactly one way, are not of these assets, or one breaks a rule.
-    pub(in crate::service) fn read(&self, report: &Report) -> Result<PeriodReturns, FieldError> {
+    pub(in crate::service) fn read(&self, report: &Report) -> Result<PeriodNoise, FieldError> {
         let log_returns = report.log_returns(&self.names, &self.prices)?;
         let came = |asset: &usize| self.waiting[*asset] && log_returns[*asset].is_some();
         let late = (0..log_returns.len()).filter(came).collect();
-        Ok(PeriodReturns { log_returns, late })
+        Ok(PeriodNoise { values: log_returns, late })
     }
 
     /// Returns the log-returns of a period by name, `None` if they are missing.
-    pub(in crate::service) fn shown(&self, seen: &PeriodReturns) -> Option<BTreeMap<String, Option<f64>>> {
-        (!seen.is_missing()).then(|| named(&self.names, &seen.log_returns))
+    pub(in crate::service) fn shown(&self, seen: &PeriodNoise) -> Option<BTreeMap<String, Option<f64>>> {
+        (!seen.is_missing()).then(|| named(&self.names, &seen.values))
     }
 
     /// Returns the share of wealth that is traded to reach `executed`, with all that is sold of assets that left.
@@ -192,17 +193,17 @@ impl Assets {
 
     /// Updates record and holdings after a period in which `executed` was held and that left the share `holding` in all
     /// assets.
-    pub(in crate::service) fn passed(&mut self, executed: &[f64], seen: &PeriodReturns, holding: f64) {
+    pub(in crate::service) fn passed(&mut self, executed: &[f64], seen: &PeriodNoise, holding: f64) {
         self.fund.passed(executed, &seen.moves(), seen.learned(), holding);
         self.leaving.clear();
         if !seen.is_missing() {
-            self.waiting = seen.log_returns.iter().map(Option::is_none).collect();
+            self.waiting = seen.values.iter().map(Option::is_none).collect();
         }
     }
 
     /// Takes over the prices reported with the last period. An asset that waits for its price keeps the last one.
     pub(in crate::service) fn price_as(&mut self, report: &Report) {
-        let prices = report.prices.as_ref().and_then(|prices| by_name("prices", prices, &self.names).ok());
+        let prices = report.prices.as_ref().and_then(|prices| by_name("prices", "asset", prices, &self.names).ok());
         for (asset, known) in self.prices.iter_mut().enumerate() {
             if !self.waiting[asset] {
                 *known = prices.as_ref().and_then(|prices| prices[asset]);
@@ -238,7 +239,7 @@ pub(in crate::service) fn shares(
     values: &BTreeMap<String, f64>,
     names: &[String],
 ) -> Result<Vec<f64>, FieldError> {
-    let shares = by_name(field, values, names)?;
+    let shares = by_name(field, "asset", values, names)?;
     for (name, share) in names.iter().zip(&shares) {
         rules::share(&format!("{field}.{name}"), *share)?;
     }

@@ -4,43 +4,17 @@ use std::sync::Arc;
 
 use jiff::civil::Date;
 
-use crate::control::assets::advice::named;
-use crate::control::policy::advice::{Advice, Uncertainty};
-use crate::control::policy::advisor::{Advisor, OutsideDesign};
-use crate::control::problem::state::State;
-use crate::service::callers::allowance::HeavyPermit;
-use crate::service::callers::fair_queue::FairQueue;
-use crate::service::entries::answer::Observed;
+use crate::service::entries::answer::{ObservationAnswer, ReportedPeriod};
 use crate::service::entries::doubts::{self, Doubt, Doubts};
-use crate::service::entries::notes;
 use crate::service::entries::periods::Periods;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::error::ServiceError;
 use crate::service::sessions::asset_change::AssetNames;
-use crate::service::sessions::assets::{Assets, ObservedAssets};
+use crate::service::sessions::current_advice::{AdviceContext, CurrentAdvice, with_uncertainty};
 use crate::service::sessions::plan::{PolicyTenure, Renewing, SessionPlan};
-use crate::service::sessions::session_state::{SessionState, Transition};
-use crate::store::{RowVersion, SessionFacts, SessionRow, Tenant};
-
-/// The resources that a call needs: its policy, the queues for its work, and the permits it must acquire before it
-/// solves.
-pub(in crate::service) struct AdviceContext<'a> {
-    pub advisor: Arc<Advisor>,
-    pub advising: &'a FairQueue,
-    pub resolving: &'a FairQueue,
-    /// `None` for the service's own work.
-    pub turn: Option<&'a HeavyPermit>,
-}
-
-impl AdviceContext<'_> {
-    /// Acquires the permits for heavy work that comes next.
-    async fn begin(&self) -> Result<(), ServiceError> {
-        match self.turn {
-            Some(turn) => Ok(turn.begin().await?),
-            None => Ok(()),
-        }
-    }
-}
+use crate::service::sessions::session_state::{AdvisedActions, Moved, SessionState};
+use crate::service::sessions::transition::Transition;
+use crate::store::{RowVersion, SessionFacts, SessionRow};
 
 /// A session replayed from its entries. It holds no policy: its advisor is cached under its name and may be dropped.
 #[derive(Clone)]
@@ -63,15 +37,13 @@ pub struct LiveSession {
     pub(in crate::service) seen: RowVersion,
     /// Radius of the state, once computed.
     pub(in crate::service) radius: Option<f64>,
-    /// The surrogate's advice for the coming period, once computed.
-    pub(in crate::service) advice: Option<Advice>,
+    /// The advice for the coming period, once computed.
+    pub(in crate::service) advice: Option<CurrentAdvice>,
 }
 
 /// Bytes of a session in memory, and of each of its returns: in the law with its weight, and in the history.
 pub(super) const SESSION_BYTES: usize = 3000;
 const RETURN_BYTES: usize = 24;
-/// Copies of the asset names: in the order of the columns, in the plan, and in the answers.
-const COPIES_OF_NAMES: usize = 8;
 
 impl LiveSession {
     /// Replays a session from its entries.
@@ -95,9 +67,7 @@ impl LiveSession {
     }
 
     pub(in crate::service) fn bytes(&self) -> usize {
-        let names =
-            self.standing.assets.as_ref().map_or(0, |assets| assets.names.iter().map(String::len).sum::<usize>());
-        SESSION_BYTES + RETURN_BYTES * self.standing.returns() + COPIES_OF_NAMES * names
+        SESSION_BYTES + RETURN_BYTES * self.standing.noises() + self.standing.text_bytes()
     }
 
     /// Checks that the session may report another period.
@@ -150,7 +120,7 @@ impl LiveSession {
 
     /// Returns the last day of the coming period, if it is known.
     pub fn next_day(&self) -> Option<Date> {
-        self.standing.days.next(self.current.terms.periods_per_year).filter(|_| self.goes_on_after(self.observed))
+        self.standing.days().next(self.current.terms.periods_per_year).filter(|_| self.goes_on_after(self.observed))
     }
 
     /// Checks the report and its doubts.
@@ -162,10 +132,10 @@ impl LiveSession {
         if observe.confirm {
             return Ok(());
         }
-        let of_day = doubts::of_day(&self.standing.days, report.date, self.current.terms.periods_per_year, today);
-        let of_return = self.standing.return_doubts(report, &seen);
+        let of_day = doubts::of_day(self.standing.days(), report.date, self.current.terms.periods_per_year, today);
+        let of_noise = self.standing.noise_doubts(report, &seen);
         let doubts: Vec<Doubt> =
-            of_day.into_iter().chain(of_return).chain(observe.peer_doubts.iter().cloned()).collect();
+            of_day.into_iter().chain(of_noise).chain(observe.peer_doubts.iter().cloned()).collect();
         if doubts.is_empty() { Ok(()) } else { Err(ServiceError::Unconfirmed(Doubts(doubts))) }
     }
 
@@ -178,43 +148,16 @@ impl LiveSession {
         if period == expected { Ok(()) } else { Err(ServiceError::Gap { what: "period", given: period, expected }) }
     }
 
-    /// Returns the surrogate's advice for the coming period, computed once. A short computation runs here, a longer one
-    /// on a thread that may block. A state outside the design is solved, which is heavy work.
-    pub(in crate::service) async fn surrogate_advice(
+    /// Returns the advice for the coming period, computed once, as [`AdviceContext::advise`] does.
+    pub(in crate::service) async fn current_advice(
         &mut self,
         means: &AdviceContext<'_>,
-    ) -> Result<&Advice, ServiceError> {
-        let step = self.step();
+    ) -> Result<&CurrentAdvice, ServiceError> {
         let advice = match self.advice.take() {
             Some(advice) => advice,
-            None => match self.predicted(step, means).await? {
-                Ok(advice) => advice,
-                Err(outside) => {
-                    means.begin().await?;
-                    let (advisor, state) = (means.advisor.clone(), self.standing.state.clone());
-                    let tenant = &self.row.tenant;
-                    means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)).await?
-                }
-            },
+            None => means.advise(&self.row.tenant, (&self.standing, self.radius), self.step()).await?,
         };
         Ok(self.advice.insert(advice))
-    }
-
-    /// Returns the surrogate's prediction for the state, unless the state lies outside the design.
-    async fn predicted(
-        &self,
-        step: usize,
-        means: &AdviceContext<'_>,
-    ) -> Result<Result<Advice, OutsideDesign>, ServiceError> {
-        let predict = move |advisor: &Advisor, state: &State, radius: Option<f64>| {
-            let radius = radius.unwrap_or_else(|| advisor.radius(state));
-            advisor.advise_from_surrogate(step, state, radius)
-        };
-        if means.advisor.is_prompt(step, &self.standing.state) {
-            return Ok(predict(&means.advisor, &self.standing.state, self.radius));
-        }
-        let (advisor, state, radius) = (means.advisor.clone(), self.standing.state.clone(), self.radius);
-        means.advising.run(&self.row.tenant, move || predict(&advisor, &state, radius)).await
     }
 
     /// Returns the state after the report and the answer to it. Nothing changes yet but the memoised advice.
@@ -223,69 +166,40 @@ impl LiveSession {
         observe: &Observe,
         report: &Report,
         (means, today): (&AdviceContext<'_>, Date),
-    ) -> Result<(SessionState, Observed), ServiceError> {
+    ) -> Result<(SessionState, ObservationAnswer), ServiceError> {
         self.check_meant(observe, report, today)?;
-        let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
-        let dynamics = self.current.dynamics(self.observed);
-        let periods_per_year = self.current.terms.periods_per_year;
-        let passed = self.standing.after(dynamics, observe.period, report, (allocation, periods_per_year))?;
-        let Transition { seen, log_return, executed_allocation, executed, standing, .. } = passed;
-        let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
-        let check_active = self.goes_on_after(observe.period);
+        let advice = match self.current_advice(means).await {
+            Ok(advice) => Some(advice.clone()),
+            // What was done is a fact even if nothing can be advised.
+            Err(ServiceError::Field(_)) if report.executed.is_some() => None,
+            Err(error) => return Err(error),
+        };
+        let advised = match &advice {
+            Some(CurrentAdvice::Account(advice)) => AdvisedActions::Allocation(advice.allocation),
+            Some(CurrentAdvice::Declared(decided)) => {
+                AdvisedActions::Actions(decided.actions.values().copied().collect())
+            }
+            None => AdvisedActions::Actions(Vec::new()),
+        };
+        let Transition { seen, moved, standing } =
+            self.standing.after((&self.current, self.observed), report, &advised)?;
+        let completed = !self.goes_on_after(observe.period);
         let next = self.current.step_from(observe.period, self.renew, self.renewals);
         let (standing, uncertainty) = with_uncertainty(means, &self.row.tenant, next, standing).await?;
-        let answer = Observed {
-            session: observe.session.clone(),
-            period: observe.period,
-            log_return,
-            notes: notes::of(&seen, standing.names()),
-            band,
-            advised_allocation: allocation,
-            executed_allocation,
-            wealth: standing.state.wealth,
-            holding: standing.state.holding,
-            assets: standing.assets.as_ref().map(|assets| ObservedAssets {
-                log_returns: assets.shown(&seen),
-                advised_allocations: named(&assets.names, &advised.unwrap_or_default()),
-                executed_allocations: named(&assets.names, &executed),
-                composed: assets.composed(),
-            }),
-            wealth_change: standing.state.wealth - self.standing.state.wealth,
-            date: standing.days.last,
-            completed: !check_active,
-            drift: standing.bet.drift(),
-            uncertainty,
+        let about = ReportedPeriod { session: observe.session.clone(), period: observe.period, completed, uncertainty };
+        let answer = match (&self.standing, &standing, &moved, advice) {
+            (
+                SessionState::Account(before),
+                SessionState::Account(after),
+                Moved::Account(moved),
+                Some(CurrentAdvice::Account(advice)),
+            ) => ObservationAnswer::Account(after.observed(before, (&seen, moved), &advice, about).into()),
+            (_, SessionState::Declared(after), Moved::Declared(moved), advice) => {
+                let advised = advice.and_then(CurrentAdvice::actions);
+                ObservationAnswer::Declared(after.observed(moved, advised, about).into())
+            }
+            _ => return Err(ServiceError::internal("a period of another problem than its session")),
         };
         Ok((standing, answer))
     }
-}
-
-/// Returns the uncertainty set before `step` of the policy. For several assets the composition is chosen first, which
-/// is heavy work if it needs a solve.
-pub(in crate::service) async fn with_uncertainty(
-    means: &AdviceContext<'_>,
-    tenant: &Tenant,
-    step: usize,
-    mut standing: SessionState,
-) -> Result<(SessionState, Uncertainty), ServiceError> {
-    let advisor = &means.advisor;
-    if standing.assets.is_none() && advisor.is_prompt(step, &standing.state) {
-        let uncertainty = advisor.uncertainty(&standing.state);
-        return Ok((standing, uncertainty));
-    }
-    let turns = match standing.assets.is_some() && Assets::must_solve(advisor, step) {
-        true => {
-            means.begin().await?;
-            means.resolving
-        }
-        false => means.advising,
-    };
-    let advisor = advisor.clone();
-    let measure = move || {
-        standing.compose(&advisor, step);
-        let (uncertainty, reached) = (advisor.uncertainty(&standing.state), standing.state.clone());
-        // If this is the first session to get this far, the next advice finds its common random numbers simulated.
-        ((standing, uncertainty), move || advisor.prepare(step, &reached))
-    };
-    turns.run_and_prepare(tenant, measure).await
 }

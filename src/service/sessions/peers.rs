@@ -62,9 +62,10 @@ impl Sessions {
         let day = report.date.or_else(|| live.next_day().filter(|_| is_coming));
         let group = |asset| (live.current.policy.clone(), day, asset);
         // A period that is already recorded is read as given, whatever was reported since.
-        match &live.standing.assets {
+        let account = live.standing.account().ok()?;
+        match &account.assets {
             None => {
-                let log_return = report.log_return(live.standing.price.filter(|_| is_coming)).ok()??;
+                let log_return = report.log_return(account.price.filter(|_| is_coming)).ok()??;
                 let (field, value) = report.given();
                 Some(vec![(group(0), (field.to_owned(), value), log_return.max(LEAST_LEARNED))])
             }
@@ -75,7 +76,7 @@ impl Sessions {
                     let log_return = (*log_return)?.max(LEAST_LEARNED);
                     Some((group(asset), (field, value.unwrap_or(log_return)), log_return))
                 };
-                Some(seen.log_returns.iter().enumerate().filter_map(of_asset).collect())
+                Some(seen.values.iter().enumerate().filter_map(of_asset).collect())
             }
         }
     }

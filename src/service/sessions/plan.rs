@@ -8,9 +8,11 @@ use utoipa::ToSchema;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::advisor::Advisor;
+use crate::control::policy_document::PreparedPolicy;
 use crate::control::problem::dynamics::Dynamics;
+use crate::control::request::by_name::distinct;
 use crate::control::request::contributions::Contributions;
-use crate::control::request::framework::Framework;
+use crate::control::request::declared::DeclaredProblem;
 use crate::control::request::rules;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::terms::Terms;
@@ -43,9 +45,20 @@ pub struct SessionPlan {
     pub(in crate::service) renew: Option<Renewing>,
     /// True if every period is advised by the first step of the policy.
     pub(super) rolling: bool,
+    /// The declared problem, if the session lives one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(in crate::service) problem: Option<Box<PlannedProblem>>,
     /// Several assets, in the order of the record, with their figures at the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(in crate::service) assets: Option<PlannedAssets>,
+}
+
+/// The declared problem of a session, so that a replay does not need its policy, and its state at the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlannedProblem {
+    /// Its history is that of the session, which is stored apart, so that lists need not read it.
+    pub(in crate::service) problem: DeclaredProblem,
+    pub(in crate::service) state: BTreeMap<String, f64>,
 }
 
 /// The policy of a session from some period on.
@@ -77,7 +90,7 @@ pub struct Renew {
     /// Log-returns of each asset that enters the session, by name, oldest first. The last one is that of the last
     /// observed period, and null stands for a period without one. The law keeps the periods with a return of every
     /// asset.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "distinct")]
     #[schema(example = json!({}))]
     pub records: BTreeMap<String, Vec<Option<f64>>>,
     /// Names of the assets that leave the session. What is held of them is sold before the coming period.
@@ -108,6 +121,31 @@ pub struct Renewed {
     pub uncertainty: Uncertainty,
 }
 
+/// The session of a declared problem after a renewal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DeclaredRenewed {
+    pub session: String,
+    pub renewal: usize,
+    pub policy: String,
+    /// The coming period, the first that the policy advises.
+    pub period: usize,
+    /// The last period that the policy advises.
+    pub horizon: usize,
+    /// The problem from here on, without its history.
+    pub problem: DeclaredProblem,
+    /// In the unit of the noise.
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
+
+/// The session after a renewal: an investor's, or one of a declared problem.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum RenewalAnswer {
+    Account(Box<Renewed>),
+    Declared(Box<DeclaredRenewed>),
+}
+
 impl Renewing {
     /// Returns the number of periods after which the session is due for renewal; `None` if it may not continue any
     /// longer.
@@ -116,22 +154,34 @@ impl Renewing {
         (renewals < MOST_RENEWALS && due + current.terms.horizon <= MOST_PERIODS).then_some(due)
     }
 
-    /// Checks the setting against the policy's problem.
+    /// Checks the setting against the terms of the policy.
     ///
     /// # Errors
-    /// A field breaks a rule, or sessions with the policy of this problem cannot renew themselves.
-    pub(in crate::service) fn check(self, problem: &ProblemSpecification) -> Result<(), FieldError> {
+    /// A field breaks a rule, or sessions with the policy of these terms cannot renew themselves.
+    pub(in crate::service) fn check(self, terms: &Terms) -> Result<(), FieldError> {
         let Renewing { every, window } = self;
-        if !(1..problem.horizon).contains(&every) {
-            let rule = format!("must be at least 1 and less than the policy's horizon of {} periods", problem.horizon);
+        if !(1..terms.horizon).contains(&every) {
+            let rule = format!("must be at least 1 and less than the policy's horizon of {} periods", terms.horizon);
             return Err(FieldError::new("renew.every", every, rule));
         }
         check_window("renew.window", window)?;
-        if let Contributions::Listed(amounts) = &problem.contributions {
+        if let Contributions::Listed(amounts) = &terms.contributions {
             let rule = "must be absent if the policy's contributions are a list, which ends with the policy";
             return Err(FieldError::new("renew", format!("{} contributions", amounts.len()), rule));
         }
         Ok(())
+    }
+}
+
+/// Returns the terms of a declared problem, which has no bank.
+pub(in crate::service) fn terms_of(problem: &DeclaredProblem) -> Terms {
+    Terms {
+        horizon: problem.horizon,
+        learning: problem.learning,
+        rate_per_step: 0.0,
+        trading_cost: 0.0,
+        contributions: Contributions::default(),
+        periods_per_year: None,
     }
 }
 
@@ -144,7 +194,7 @@ pub(in crate::service) fn check_window(field: &str, window: Option<usize>) -> Re
 impl SessionPlan {
     /// Returns the plan of a session that runs through the horizon of a policy and ends.
     pub fn once(problem: &ProblemSpecification) -> Self {
-        SessionPlan { terms: Terms::of(problem), renew: None, rolling: false, assets: None }
+        SessionPlan { terms: Terms::of(problem), renew: None, rolling: false, assets: None, problem: None }
     }
 
     /// Returns the plan of a session that starts a policy from `returns` returns.
@@ -153,7 +203,7 @@ impl SessionPlan {
     /// Sessions with this policy cannot renew themselves as `renew` says, or cannot roll.
     pub fn new(advisor: &Advisor, returns: usize, renew: Option<Renewing>, rolling: bool) -> Result<Self, FieldError> {
         let problem = &advisor.specification().problem;
-        renew.map_or(Ok(()), |renew| renew.check(problem))?;
+        renew.map_or(Ok(()), |renew| renew.check(&Terms::of(problem)))?;
         if rolling && renew.is_some() {
             let rule = "must be false if renew is given: a rolling session continues without renewals";
             return Err(FieldError::new("rolling", rolling, rule));
@@ -161,6 +211,19 @@ impl SessionPlan {
         let plan = SessionPlan { renew, rolling, ..SessionPlan::once(problem) };
         let terms = plan.terms(advisor, returns, 0).map_err(|rule| FieldError::new("rolling", rolling, rule))?;
         Ok(SessionPlan { terms, ..plan })
+    }
+
+    /// Returns the plan of a session that lives a declared problem.
+    ///
+    /// # Errors
+    /// Sessions with this policy cannot renew themselves as `renew` says.
+    pub(in crate::service) fn of_declared(
+        planned: PlannedProblem,
+        renew: Option<Renewing>,
+    ) -> Result<Self, FieldError> {
+        let terms = terms_of(&planned.problem);
+        renew.map_or(Ok(()), |renew| renew.check(&terms))?;
+        Ok(SessionPlan { terms, renew, rolling: false, assets: None, problem: Some(planned.into()) })
     }
 
     /// Returns the terms of the periods after `observed` ones, with a policy that starts from `returns` returns. They
@@ -228,18 +291,21 @@ impl PolicyTenure {
         self.after + self.terms.horizon
     }
 
-    /// Checks that its policy, of this framework, can follow a correction of `period`.
+    /// Checks that its policy can follow a correction of `period`.
     ///
     /// # Errors
-    /// The uncertainty set of the policy is frozen at the returns up to that period.
-    pub(in crate::service) fn follows(&self, period: usize, framework: Framework) -> Result<(), FieldError> {
-        if period > self.after || !framework.is_frozen() {
-            return Ok(());
-        }
-        let rule = format!(
-            "must be later than {}: the uncertainty set of the static policy is frozen at the returns up to that period. Renew with another policy first",
-            self.after
-        );
+    /// What the policy knows up to that period is its own history, whatever was reported.
+    pub(in crate::service) fn follows(&self, period: usize, policy: &PreparedPolicy) -> Result<(), FieldError> {
+        let known = match policy {
+            _ if period > self.after => return Ok(()),
+            PreparedPolicy::Investor(advisor) if !advisor.specification().problem.framework.is_frozen() => {
+                return Ok(());
+            }
+            PreparedPolicy::Investor(_) => "the uncertainty set of the static policy is frozen at the returns",
+            PreparedPolicy::Declared(_) => "the policy has a history of its own instead of the noises",
+        };
+        let rule =
+            format!("must be later than {}: {known} up to that period. Renew with another policy first", self.after);
         Err(FieldError::new("period", period, rule))
     }
 

@@ -1,292 +1,300 @@
-//! The state of a session, and the transition that a report causes.
+//! The state of a session of any problem, and the transition that a report causes.
+//!
+//! This is the one place that knows which problems there are: the entries of a session, their order, corrections and
+//! replays are the same for all of them. A problem brings its state, how a report moves it, and how answers show it.
 
-use std::sync::Arc;
-
-use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
-use crate::control::policy::advisor::Advisor;
-use crate::control::problem::dynamics::Dynamics;
-use crate::control::problem::state::{PeriodOutcome, State};
-use crate::control::request::assets::check_rows;
+use crate::control::request::declared::DeclaredProblem;
 use crate::control::request::learning::Learning;
-use crate::control::request::rules;
-use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
-use crate::service::entries::doubts::{self, Doubt};
+use crate::service::entries::doubts::Doubt;
 use crate::service::entries::drift::DriftTest;
-use crate::service::entries::record::{PeriodReturns, SessionRecord};
+use crate::service::entries::record::{PeriodNoise, SessionRecord};
 use crate::service::entries::report::Report;
+use crate::service::error::ServiceError;
+use crate::service::sessions::account_state::{AccountPeriod, AccountState};
 use crate::service::sessions::asset_change::AssetChange;
-use crate::service::sessions::assets::{Assets, Composition, mean};
+use crate::service::sessions::assets::Composition;
+use crate::service::sessions::plan::{PolicyTenure, SessionPlan};
+use crate::service::sessions::problem_state::{ProblemPeriod, ProblemState};
+use crate::service::sessions::transition::Transition;
+use crate::store::SessionRow;
+
+/// Copies of the asset names: in the order of the columns, in the plan, and in the answers.
+const COPIES_OF_NAMES: usize = 8;
 
 /// The state of a session between two periods.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SessionState {
-    /// For several assets, the state of their fund.
-    pub state: State,
-    /// The assets, if there are several.
-    pub assets: Option<Box<Assets>>,
-    /// The price reported for the last period, if one was.
-    pub price: Option<f64>,
-    /// The last days of the periods.
-    pub days: Days,
-    /// The test of whether returns still come from the same law.
-    pub bet: DriftTest,
-    /// All observed returns, if the law holds only the last ones. For several assets always present: the mean of each
-    /// date.
-    seen: Option<EmpiricalDistribution>,
-    session: Arc<str>,
+#[derive(Debug, Clone)]
+pub enum SessionState {
+    /// An investor's.
+    Account(Box<AccountState>),
+    /// A declared problem's.
+    Declared(Box<ProblemState>),
 }
 
-/// The effect of a report of a period.
+/// A period as a report moved it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Transition {
-    pub seen: PeriodReturns,
-    /// For several assets, the log-return of the holdings; minus infinity if they lost everything.
-    pub log_return: Option<f64>,
-    pub executed_allocation: f64,
-    /// Shares of wealth held in several assets; empty for one asset.
-    pub executed: Vec<f64>,
-    /// Share of wealth bought and sold for them.
-    pub turnover: f64,
-    /// The dynamics of the period, with the rate and the flow reported.
-    pub dynamics: Dynamics,
-    pub standing: SessionState,
+pub enum Moved {
+    Account(AccountPeriod),
+    Declared(ProblemPeriod),
+}
+
+/// The changes that the next policy of a session brings.
+#[derive(Debug, Clone)]
+pub enum NextPolicy {
+    /// An investor's, perhaps with other assets.
+    Account(Option<AssetChange>),
+    /// The problem from here on.
+    Declared(Box<DeclaredProblem>),
+}
+
+/// The advice for a period, as a replay needs it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AdvisedActions {
+    /// The share of wealth in all assets.
+    Allocation(f64),
+    /// The actions of a declared problem, in the order of their names.
+    Actions(Vec<f64>),
+}
+
+impl NextPolicy {
+    /// Returns the change of the assets, if there is one.
+    pub(in crate::service) fn asset_change(&self) -> Option<&AssetChange> {
+        match self {
+            NextPolicy::Account(change) => change.as_ref(),
+            NextPolicy::Declared(_) => None,
+        }
+    }
+}
+
+impl AdvisedActions {
+    /// Returns the share of wealth in all assets; none of a declared problem.
+    fn allocation(&self) -> f64 {
+        match self {
+            AdvisedActions::Allocation(allocation) => *allocation,
+            AdvisedActions::Actions(_) => 0.0,
+        }
+    }
+
+    /// Returns the actions of a declared problem; none of an investor.
+    fn actions(&self) -> &[f64] {
+        match self {
+            AdvisedActions::Allocation(_) => &[],
+            AdvisedActions::Actions(actions) => actions,
+        }
+    }
 }
 
 impl SessionState {
-    /// Returns the state at the start of `session`.
-    pub(in crate::service) fn at(session: &str, state: State, assets: Option<Box<Assets>>) -> Self {
-        let seen = assets.as_ref().map(|assets| Assets::means(&assets.fund.rows));
-        SessionState {
-            state,
-            assets,
-            price: None,
-            days: Days::default(),
-            bet: DriftTest::default(),
-            seen,
-            session: session.into(),
+    /// Returns the state before the first period, and the record that its law is made of.
+    ///
+    /// # Errors
+    /// The row is not that of a session.
+    pub(in crate::service) fn start(
+        row: &SessionRow,
+        plan: &SessionPlan,
+    ) -> Result<(Self, SessionRecord), ServiceError> {
+        match &plan.problem {
+            Some(problem) => {
+                let (state, record) = ProblemState::start(row, problem)?;
+                Ok((SessionState::Declared(state.into()), record))
+            }
+            None => {
+                let (state, record) = AccountState::start(row, plan)?;
+                Ok((SessionState::Account(state.into()), record))
+            }
         }
     }
 
-    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns, and with
-    /// changed assets if there is a change.
+    /// Returns the state of an investor.
     ///
     /// # Errors
-    /// They are not a valid history.
-    pub(in crate::service) fn renewed(
-        &self,
-        record: &SessionRecord,
-        window: Option<usize>,
-        learning: Learning,
-        change: Option<&AssetChange>,
-    ) -> Result<Self, FieldError> {
-        let last = record.last(window);
-        let mut assets = self.assets.clone();
-        let state = match &mut assets {
-            Some(assets) => {
-                let rows = record.rows_of(last);
-                check_rows(
-                    change.map_or("history", |_| "records"),
-                    &rows,
-                    change.map_or(&assets.names, |change| &change.names),
-                    None,
-                )?;
-                let mut holding = self.state.holding;
-                if let Some(change) = change {
-                    **assets = change.assets(assets, &rows);
-                    holding = assets.fund.holding();
-                }
-                assets.fund.renew(rows, learning, self.state.wealth, holding)
+    /// The session lives a declared problem.
+    pub fn account(&self) -> Result<&AccountState, FieldError> {
+        match self {
+            SessionState::Account(state) => Ok(state),
+            SessionState::Declared(_) => {
+                let rule = "must be of an investor";
+                Err(FieldError::new("session", "of a declared problem", rule))
             }
-            None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
-        };
-        let seen = match &assets {
-            Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
-            None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
-        };
-        let SessionState { price, days, bet, .. } = *self;
-        Ok(SessionState { state, assets, price, days, bet, seen, session: self.session.clone() })
+        }
     }
 
-    /// Returns the names of the assets if there are several; empty for one asset.
+    /// Returns the last days of the periods.
+    pub fn days(&self) -> &Days {
+        match self {
+            SessionState::Account(state) => &state.days,
+            SessionState::Declared(state) => &state.days,
+        }
+    }
+
+    /// Returns the test of whether the noises still come from the same law.
+    pub fn bet(&self) -> DriftTest {
+        match self {
+            SessionState::Account(state) => state.bet,
+            SessionState::Declared(state) => state.bet,
+        }
+    }
+
+    /// Returns the names of the assets if there are several; otherwise empty.
     pub(in crate::service) fn names(&self) -> &[String] {
-        self.assets.as_ref().map_or(&[][..], |assets| &assets.names)
+        match self {
+            SessionState::Account(state) => state.names(),
+            SessionState::Declared(_) => &[],
+        }
     }
 
-    /// Reads the returns of the coming period from `report`.
+    /// Returns the number of noises that the state holds.
+    pub(in crate::service) fn noises(&self) -> usize {
+        match self {
+            SessionState::Account(state) => state.returns(),
+            SessionState::Declared(state) => state.noises(),
+        }
+    }
+
+    /// Returns the bytes of its names and formulas.
+    pub(in crate::service) fn text_bytes(&self) -> usize {
+        match self {
+            SessionState::Account(state) => COPIES_OF_NAMES * state.names().iter().map(String::len).sum::<usize>(),
+            SessionState::Declared(state) => state.bytes(),
+        }
+    }
+
+    /// Returns the number of noises behind the law.
+    pub fn sample_size(&self) -> usize {
+        match self {
+            SessionState::Account(state) => state.state.law.sample_size(),
+            SessionState::Declared(state) => state.noises(),
+        }
+    }
+
+    /// Returns the number of atoms of the law that an advice shows without being asked: none of an investor's.
+    pub(in crate::service) fn law_shown(&self) -> usize {
+        match self {
+            SessionState::Account(_) => 0,
+            SessionState::Declared(state) => state.noises(),
+        }
+    }
+
+    /// Reads the noise of the coming period from `report`.
     ///
     /// # Errors
     /// A field breaks a rule, or the date is not after the last one.
-    pub(in crate::service) fn read(&self, report: &Report) -> Result<PeriodReturns, FieldError> {
-        report.check()?;
-        if let (Some(date), Some(last)) = (report.date, self.days.last)
-            && date <= last
-        {
-            return Err(FieldError::new(
-                "date",
-                date,
-                format!("must be later than {last}, the date of an earlier period"),
-            ));
-        }
-        match &self.assets {
-            Some(assets) => assets.read(report),
-            None => Ok(PeriodReturns { log_returns: vec![report.log_return(self.price)?], late: Vec::new() }),
+    pub(in crate::service) fn read(&self, report: &Report) -> Result<PeriodNoise, FieldError> {
+        match self {
+            SessionState::Account(state) => state.read(report),
+            SessionState::Declared(state) => state.read(report),
         }
     }
 
-    /// Returns the effect of `report` on `period`, for which a total of `advised` was advised. A report without a day
-    /// takes the next one due, if `periods_per_year` is known.
+    /// Returns doubts about the noise of a report, each against the record.
+    pub(in crate::service) fn noise_doubts(&self, report: &Report, seen: &PeriodNoise) -> Vec<Doubt> {
+        match self {
+            SessionState::Account(state) => state.return_doubts(report, seen),
+            SessionState::Declared(state) => state.noise_doubts(report.noise),
+        }
+    }
+
+    /// Returns the effect of `report` on the period after `observed` ones of a session under `tenure`, for which so much
+    /// was advised. A report without a day takes the next one due, if the periods of a year are known.
     ///
     /// # Errors
-    /// As [`SessionState::read`], or wealth leaves the permitted range.
+    /// As [`Self::read`], or the state leaves its range.
     pub(in crate::service) fn after(
         &self,
-        dynamics: Dynamics,
-        period: usize,
+        (tenure, observed): (&PolicyTenure, usize),
         report: &Report,
-        (advised, periods_per_year): (f64, Option<f64>),
-    ) -> Result<Transition, FieldError> {
-        let seen = self.read(report)?;
-        let Report { rate, flow, .. } = *report;
-        let moves = (!seen.is_missing()).then(|| seen.moves());
-        let (executed, realised) = match &self.assets {
-            Some(assets) => {
-                let executed = assets.executed(report, advised)?;
-                let traded = Some(assets.traded(&executed));
-                let realised = assets.fund.outcome(&executed, moves.as_deref(), rate, flow);
-                (executed, PeriodOutcome { traded, ..realised })
+        advised: &AdvisedActions,
+    ) -> Result<Transition<SessionState, Moved>, FieldError> {
+        match self {
+            SessionState::Account(state) => {
+                let calendar = (advised.allocation(), tenure.terms.periods_per_year);
+                let passed = state.after(tenure.dynamics(observed), observed + 1, report, calendar)?;
+                Ok(passed.map(|state| SessionState::Account(state.into()), Moved::Account))
             }
-            None => {
-                let action = report.executed_allocation.unwrap_or(advised);
-                let log_return = moves.map(|moves| moves[0]);
-                (Vec::new(), PeriodOutcome { action, log_return, rate, flow, traded: None })
+            SessionState::Declared(state) => {
+                let passed = state.after((tenure.step(observed), observed + 1), report, advised.actions())?;
+                Ok(passed.map(|state| SessionState::Declared(state.into()), Moved::Declared))
             }
-        };
-        let turnover = realised.turnover(self.state.holding);
-        let mut state = self.state.next_state(dynamics, &realised);
-        state.wealth = match report.wealth {
-            Some(reported) => reported,
-            None => check_wealth_range(state.wealth, report)?,
-        };
-        let SessionState { assets, bet, seen: known, session, .. } = self;
-        let (assets, seen_before, session) = (assets.clone(), known.clone(), session.clone());
-        let days = self.days.after(report.date, periods_per_year);
-        let mut standing = SessionState { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
-        standing.learn(&seen, &executed, period);
-        standing.price_as(report);
-        let dynamics = realised.dynamics(dynamics);
-        let PeriodOutcome { action: executed_allocation, log_return, .. } = realised;
-        Ok(Transition { seen, log_return, executed_allocation, executed, turnover, dynamics, standing })
+        }
     }
 
-    /// Returns the report of a period without trades unless it gives holdings.
-    pub(in crate::service) fn held_on(&self, reported: &Report) -> Report {
-        let mut report = reported.clone();
-        if let Some(assets) = &self.assets {
-            report.executed_allocations.get_or_insert_with(|| named(&assets.names, &assets.fund.holdings));
+    /// Returns the report of a period for which nothing was advised, and what counts as advised for it: of an investor
+    /// to hold on.
+    pub(in crate::service) fn held_on(&self, reported: &Report) -> (Report, AdvisedActions) {
+        match self {
+            SessionState::Account(state) => (state.held_on(reported), AdvisedActions::Allocation(state.state.holding)),
+            SessionState::Declared(_) => (reported.clone(), AdvisedActions::Actions(Vec::new())),
         }
-        report
-    }
-
-    /// Updates the record, the drift test and the holdings after a period.
-    fn learn(&mut self, seen: &PeriodReturns, executed: &[f64], period: usize) {
-        if let Some(assets) = &mut self.assets {
-            assets.passed(executed, seen, self.state.holding);
-        }
-        let log_return = seen.learned().as_deref().map(mean);
-        self.seen.iter_mut().zip(log_return).for_each(|(seen, log_return)| seen.push(log_return));
-        self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), log_return, &self.session, period);
     }
 
     /// Takes over the prices reported with the last period.
     pub(in crate::service) fn price_as(&mut self, report: &Report) {
-        self.price = report.price;
-        if let Some(assets) = &mut self.assets {
-            assets.price_as(report);
+        if let SessionState::Account(state) = self {
+            state.price_as(report);
         }
     }
 
-    /// Applies a reported composition; the law must be rebuilt afterwards.
+    /// Applies a reported composition of several assets; the law must be rebuilt afterwards.
     ///
     /// # Errors
     /// It names other assets.
     pub(in crate::service) fn take(&mut self, reported: &Composition) -> Result<(), FieldError> {
-        self.assets.as_mut().map_or(Ok(()), |assets| assets.take(reported))
+        match self {
+            SessionState::Account(state) => state.take(reported),
+            SessionState::Declared(_) => Ok(()),
+        }
     }
 
     /// Returns the state with the law of the fund rebuilt, if there are several assets.
     #[must_use]
-    pub(in crate::service) fn with_law(mut self, learning: Learning) -> Self {
-        if let Some(assets) = &self.assets {
-            self.state.law = learning.law(&assets.fund.returns());
+    pub(in crate::service) fn with_law(self, learning: Learning) -> Self {
+        match self {
+            SessionState::Account(state) => SessionState::Account(state.with_law(learning).into()),
+            declared @ SessionState::Declared(_) => declared,
         }
-        self
     }
 
-    /// Chooses the composition before the period after `step`, if there are several assets.
-    pub(in crate::service) fn compose(&mut self, advisor: &Advisor, step: usize) {
-        let Some(assets) = &mut self.assets else { return };
-        self.state = assets.compose(advisor, step, &self.state);
-    }
-
-    /// Replaces wealth, or the holdings of several assets, as of the last choice of the composition.
-    pub(in crate::service) fn suppose(
-        &mut self,
-        advisor: &Advisor,
-        step: usize,
-        wealth: Option<f64>,
-        holdings: Option<Vec<f64>>,
-    ) {
-        let Some(assets) = &mut self.assets else { return };
-        self.state.wealth = wealth.unwrap_or(self.state.wealth);
-        if let Some(holdings) = holdings {
-            self.state.holding = holdings.iter().sum::<f64>().min(1.0);
-            assets.fund.holdings = holdings;
+    /// Returns the state at a renewal under `tenure`: the law of an investor is made of the record.
+    ///
+    /// # Errors
+    /// The record is not a valid history, or the next problem does not fit the session.
+    pub(in crate::service) fn renewed(
+        &self,
+        record: &SessionRecord,
+        tenure: &PolicyTenure,
+        next: &NextPolicy,
+    ) -> Result<Self, FieldError> {
+        match (self, next) {
+            (SessionState::Declared(state), NextPolicy::Declared(problem)) => {
+                Ok(SessionState::Declared(state.renewed(problem)?.into()))
+            }
+            (_, next) => {
+                let change = next.asset_change();
+                let renewed = self.account()?.renewed(record, tenure.window, tenure.terms.learning, change)?;
+                Ok(SessionState::Account(renewed.into()))
+            }
         }
-        self.state = assets.compose_anew(advisor, step, &self.state);
-    }
-
-    /// Returns the number of returns that the state holds.
-    pub(in crate::service) fn returns(&self) -> usize {
-        let seen = self.seen.as_ref().map_or(0, EmpiricalDistribution::sample_size);
-        let of_assets = self.assets.as_ref().map_or(0, |assets| assets.fund.rows.len() * assets.names.len());
-        self.state.law.sample_size() + seen + of_assets
-    }
-
-    /// Returns doubts about the returns of a report, each against the record of its asset.
-    pub(in crate::service) fn return_doubts(&self, report: &Report, seen: &PeriodReturns) -> Vec<Doubt> {
-        let of_asset = |(asset, log_return): (usize, &Option<f64>)| {
-            let log_return = (*log_return)?;
-            let (field, value, moments) = match &self.assets {
-                Some(assets) => {
-                    let (field, value) = report.given_of(&assets.names[asset]);
-                    (field, value.unwrap_or(log_return), assets.moments(asset))
-                }
-                None => {
-                    let (field, value) = report.given();
-                    let record = CentralMoments::of(&self.state.law);
-                    (field.to_owned(), value, (record.mean(), record.variance().sqrt()))
-                }
-            };
-            doubts::of_return(&field, value, moments, log_return)
-        };
-        seen.log_returns.iter().enumerate().filter_map(of_asset).collect()
     }
 }
 
-/// Returns wealth as computed from return, allocation and flow.
-fn check_wealth_range(wealth: f64, report: &Report) -> Result<f64, FieldError> {
-    let (low, high) = rules::WEALTH;
-    if (low..=high).contains(&wealth) {
-        return Ok(wealth);
+impl Moved {
+    /// Returns the noise of a declared problem in its own unit, `None` if it is missing.
+    pub(in crate::service) fn noise(&self) -> Option<f64> {
+        match self {
+            Moved::Account(_) => None,
+            Moved::Declared(moved) => moved.noise,
+        }
     }
-    let leaves = format!(
-        "the return, the allocation and the amount added give a wealth of {wealth}, and wealth must lie in [{low}, {high}]"
-    );
-    Err(match report.flow {
-        Some(flow) => FieldError::new("flow", flow, format!("must leave an allowed wealth: {leaves}")),
-        None => FieldError::new("wealth", "null", format!("must be reported: {leaves}")),
-    })
+
+    /// Returns the period of an investor.
+    ///
+    /// # Errors
+    /// It is of a declared problem.
+    pub(in crate::service) fn account(&self) -> Result<&AccountPeriod, ServiceError> {
+        match self {
+            Moved::Account(moved) => Ok(moved),
+            Moved::Declared(_) => Err(ServiceError::internal("a period of another problem")),
+        }
+    }
 }

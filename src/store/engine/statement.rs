@@ -42,11 +42,11 @@ pub(in crate::store) const OBSERVATIONS: &str = observations!("last.");
 /// True if the next policy of a session is to be trained. Until it exists the session continues, even past its horizon.
 pub(in crate::store) const IS_WAITING: &str =
     concat!("(sessions.due IS NOT NULL AND sessions.due <= ", observations!("last."), ")");
-/// The current wealth of a session.
+/// The current wealth of a session; 0 of a declared problem, which has none.
 pub(in crate::store) const WEALTH: &str = concat!(
     "coalesce(CAST(json_extract(",
     answer!("last."),
-    ", '$.wealth') AS DOUBLE PRECISION), sessions.initial_wealth)"
+    ", '$.wealth') AS DOUBLE PRECISION), sessions.initial_wealth, 0.0)"
 );
 /// Selects sessions that are due for renewal, after the sequence $1, at most $2.
 pub(in crate::store) const DUE: &str = concat!(

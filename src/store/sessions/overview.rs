@@ -15,6 +15,7 @@ use crate::store::labels::Labels;
 use crate::store::sessions::SessionRow;
 use crate::store::sessions::attention::{Attention, CareCounts, Today, needs, needs_any};
 use crate::store::sessions::entries::EntryRow;
+use crate::store::sessions::initial_account::InitialAccount;
 use crate::store::sessions::search::{self, Among, OpeningSpan, Rarest};
 use crate::store::tenants::tenant::Tenant;
 use crate::store::{Store, StoreError};
@@ -102,9 +103,8 @@ pub struct SessionSummary {
     pub policy_name: String,
     /// The periods a year of that policy, if it states them.
     pub periods_per_year: Option<f64>,
-    pub initial_wealth: f64,
-    /// The share of the initial wealth in the risky asset.
-    pub initial_holding: f64,
+    /// The account of an investor at the start.
+    pub account: Option<InitialAccount>,
     /// The last period that the policy advises.
     pub horizon: usize,
     pub created_ms: i64,
@@ -309,8 +309,7 @@ impl SessionSummary {
             policy: row.get("policy")?,
             policy_name: row.get::<Option<String>>("policy_name")?.unwrap_or_default(),
             periods_per_year: row.get("periods_per_year")?,
-            initial_wealth: start.initial_wealth,
-            initial_holding: start.initial_holding,
+            account: start.account,
             horizon: from_sql(row.get("horizon")?)?,
             created_ms: start.created_ms,
             observations,

@@ -66,6 +66,32 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
     return frame.assign(date=pd.to_datetime(frame["date"]))
 
 
+def declared_history(history: wire.DeclaredHistory) -> pd.DataFrame:
+    """Returns the result of ``Session.history`` of a declared problem as a table with a row for each observed period,
+    indexed by the period, with every correction.
+
+    ``date`` is the last day of the period, ``NaT`` if it is not known. ``noise`` is NaN if it is missing, and so is
+    ``reward``, what the period earned. ``earned`` are the rewards since the start, discounted to it. For each action
+    there are ``advised.<name>``, NaN if nothing was advised, and ``executed.<name>``, and for each state
+    ``state.<name>``, its value after the period. Raises ``ImportError`` without pandas.
+    """
+    pd = require_pandas()
+    rows = []
+    for observation in history["observations"]:
+        now, answered = observation["now"], observation["answered"]
+        advised = (answered["advised"] if answered else None) or {}
+        row: dict[str, Any] = {"period": observation["period"], "date": now["date"]}
+        row |= {name: cast(dict[str, Any], now)[name] for name in ("noise", "reward", "earned")}
+        for name, value in now["executed"].items():
+            row |= {f"advised.{name}": advised.get(name), f"executed.{name}": value}
+        rows.append(row | {f"state.{name}": value for name, value in now["state"].items()})
+    frame = pd.DataFrame(rows, columns=None if rows else ["period", "date"]).set_index("period")
+    dates = pd.to_datetime(frame.pop("date"))
+    frame = frame.astype(float)
+    frame.insert(0, "date", dates)
+    return frame
+
+
 def assets_history(
     history: wire.History, figure: AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
 ) -> pd.DataFrame:

@@ -73,6 +73,19 @@ def history(history: wire.History, ax: Axes | None = None) -> Axes:
     return axes
 
 
+def declared_history(history: wire.DeclaredHistory, ax: Axes | None = None) -> Axes:
+    """Draws the states of a declared problem at the start and after each period, by the numbers of the periods."""
+    axes = _axes(ax)
+    lived = frames.declared_history(history)
+    for name, start in history["initial_state"].items():
+        after = list(lived[f"state.{name}"]) if len(lived) else []
+        axes.plot([0, *lived.index], [start, *after], marker=".", label=name)
+    axes.set_xlabel("period")
+    axes.locator_params(axis="x", integer=True)
+    axes.legend()
+    return axes
+
+
 def evaluation(report: wire.EvaluationReport, ax: Axes | None = None) -> Axes:
     """Draws the certainty equivalent of each strategy of an evaluation, with its interval, the best at the top."""
     axes = _axes(ax)

@@ -28,6 +28,7 @@ class Opening(TypedDict, total=False):
     wealth: float | None
     holding: float | None
     holdings: Mapping[str, float] | None
+    state: Mapping[str, float] | None
     renew: wire.Renewing | None
     rolling: bool
     name: str | None
@@ -81,7 +82,10 @@ class _Policy(Labelled):
         return cast(wire.DecideAnswer, await self._transport.json("POST", "/decide", body=question))
 
     async def _session(self, **opening: Unpack[Opening]) -> wire.Session:
-        """Opens a session for an investor.
+        """Opens a session for an investor, or one that lives a declared problem.
+
+        A declared problem starts in ``state``, its states by name, by default where it was declared to. It may
+        ``renew`` itself; all else but labels and ``idempotency_key`` is for investors.
 
         ``history`` are the returns that the investor knows, and ``wealth`` is what they have. By default both are those
         of the policy. ``history``, ``kind`` and ``choices`` are as in :meth:`Ballast.train <ballast.Ballast.train>`,
@@ -105,6 +109,8 @@ class _Policy(Labelled):
             given["history"] = LogReturns(given["history"]["history"])
         if "holdings" in given:
             given["holdings"] = dict(given["holdings"])
+        if "state" in given:
+            given["state"] = dict(given["state"])
         found = None
         if "history" in given:
             found = await self._known(given["history"], kind, choices)

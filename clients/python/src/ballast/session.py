@@ -1,4 +1,4 @@
-"""Sessions: one investor each, who gets advice and reports what happened."""
+"""Sessions: one investor or one declared problem each, which is advised and reports what happened."""
 
 from __future__ import annotations
 
@@ -54,9 +54,14 @@ class _Session(Labelled):
         self.period = session["period"]
         #: ``waiting`` while its next policy is trained. Until then it keeps its policy, even past the horizon.
         self.state: wire.SessionStatus = session["state"]
-        self.wealth = session["wealth"]
-        #: Share of wealth in the risky asset, before trading.
-        self.holding = session["holding"]
+        #: Wealth of an investor; NaN if the session is of a declared problem.
+        self.wealth = _amount(session["wealth"])
+        #: Share of wealth in the risky asset, before trading; NaN if the session is of a declared problem.
+        self.holding = _amount(session["holding"])
+        #: States of a declared problem before the coming period, by name; ``None`` for an investor.
+        self.states = session.get("states")
+        #: Rewards of a declared problem since the start, discounted to it; ``None`` for an investor.
+        self.earned = session.get("earned")
         #: The number of renewals, each by another policy.
         self.renewals = session["renewals"]
         #: The number of corrections of past periods.
@@ -65,6 +70,8 @@ class _Session(Labelled):
         self.read: str | None = cast(dict[str, Any], session).get("read")
         #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
         self.observed: wire.Observed | None = None
+        #: The answer to the last ``observe`` of a declared problem.
+        self.moved: wire.DeclaredObserved | None = None
 
     @property
     def completed(self) -> bool:
@@ -96,6 +103,11 @@ class _Session(Labelled):
         params = {"session": self.id, "mode": mode, "explain": explain}
         return cast(wire.AssetsAction, await self._transport.json("GET", "/action", params=params))
 
+    async def _actions(self) -> wire.DeclaredAdvice:
+        """Returns the robust actions of a declared problem for the coming period, with the worst law that they are best
+        against. Raises :class:`SessionCompleted` after the horizon."""
+        return cast(wire.DeclaredAdvice, await self._transport.json("GET", "/action", params={"session": self.id}))
+
     async def _observe(
         self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]
     ) -> Self:
@@ -106,20 +118,32 @@ class _Session(Labelled):
         really held, by default the advised one. ``rate`` is what the bank paid and ``flow`` what was added, by default
         those of the policy. ``wealth`` is the wealth really reached, and ``date`` is the last day. For several assets
         ``log_returns``, ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by the names
-        of the assets. A return or price that is ``None`` or NaN did not come in the period. ``period`` is by default
-        the coming one. An earlier period with the content first reported for it gets its first answer again. Raises
-        :class:`Unconfirmed` for a report that is probably a mistake, unless ``confirm`` is true, and
+        of the assets. A return or price that is ``None`` or NaN did not come in the period. A declared problem has
+        ``noise`` instead of a return, ``executed`` for its actions by name, by default the advised ones, and ``state``
+        for the states after the period, by default those of its formulas; ``moved`` has the answer. ``period`` is by
+        default the coming one. An earlier period with the content first reported for it gets its first answer again.
+        Raises :class:`Unconfirmed` for a report that is probably a mistake, unless ``confirm`` is true, and
         :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
         number = self.period if period is None else period
         body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **_by_name(report)}
-        observed: wire.Observed = await self._counted("/observe", body, "period" if period is None else None, number)
-        self.observed = observed
-        if observed["period"] >= self.period:
-            self.period, self.wealth = observed["period"] + 1, observed["wealth"]
-            self.holding = observed["holding"]
-            self.state = "completed" if observed["completed"] else self.state
+        answer: dict[str, Any] = await self._counted("/observe", body, "period" if period is None else None, number)
+        if "earned" in answer:
+            self.moved = cast(wire.DeclaredObserved, answer)
+        else:
+            self.observed = cast(wire.Observed, answer)
+        if answer["period"] >= self.period:
+            self.period = answer["period"] + 1
+            self._stand(answer)
+            self.state = "completed" if answer["completed"] else self.state
         return self
+
+    def _stand(self, answer: Mapping[str, Any]) -> None:
+        """Takes over wealth and holding, or the states of a declared problem, from the answer to an entry."""
+        if "earned" in answer:
+            self.states, self.earned = answer["state"], answer["earned"]
+        else:
+            self.wealth, self.holding = answer["wealth"], answer["holding"]
 
     async def _replay(
         self,
@@ -188,7 +212,7 @@ class _Session(Labelled):
         which takes no report, the period is removed. The history keeps the old reports and answers, and all further
         advice uses the correction. Like :meth:`observe`, a correction counts exactly once. ``correction`` is its
         number, by default the one after the last. If an answer is lost, the correction is sent again under the same
-        number.
+        number. The answer for a declared problem is a :class:`wire.DeclaredCorrected <ballast.wire.DeclaredCorrected>`.
         """
         number = self.corrections + 1 if correction is None else correction
         body: wire.Correct = {
@@ -202,8 +226,8 @@ class _Session(Labelled):
         counted: _Counted | None = "correction" if correction is None else None
         corrected: wire.Corrected = await self._counted(f"{self._path}/corrections", body, counted, number)
         if number > self.corrections:
-            self.corrections, self.wealth, self.holding = number, corrected["wealth"], corrected["holding"]
-            self.period = corrected["observed"] + 1
+            self.corrections, self.period = number, corrected["observed"] + 1
+            self._stand(corrected)
         return corrected
 
     async def _renew(
@@ -221,6 +245,9 @@ class _Session(Labelled):
         ``records`` has the log-returns of each that enters, by name: the last one is that of the last observed period,
         and ``None`` or NaN stands for a period without one. ``leaving`` names those that leave. Like :meth:`observe`, a
         renewal counts exactly once. ``renewal`` is its number, by default the one after the last.
+
+        A session of a declared problem begins the law anew with the policy's own history, and gets a
+        :class:`wire.DeclaredRenewed <ballast.wire.DeclaredRenewed>`.
         """
         number = self.renewals + 1 if renewal is None else renewal
         body: wire.Renew = {"renewal": number, "policy": policy, "window": window}
@@ -329,19 +356,25 @@ class _Session(Labelled):
     async def _history(self) -> wire.History:
         """Returns the start of the session, all reports and answers, and what the answers would be now.
 
-        Pass it to ``Policy.session(history=...)`` to open a session that starts as this one did."""
+        Pass it to ``Policy.session(history=...)`` to open a session that starts as this one did. The history of a
+        declared problem is a :class:`wire.DeclaredHistory <ballast.wire.DeclaredHistory>`."""
         history = cast(wire.History, await self._transport.json("GET", f"{self._path}/history"))
-        history["history"] = LogReturns(history["history"])
+        if self.states is None:
+            history["history"] = LogReturns(history["history"])
         return history
 
     async def _frame(self, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
         """Returns the history as a DataFrame, with a row for each observed period: dates, returns, what was advised
         and held, and wealth (:func:`ballast.frames.history` names the columns and their units).
 
-        ``as_of="now"`` includes every correction, and ``"then"`` shows what the service answered at the time. Raises
+        ``as_of="now"`` includes every correction, and ``"then"`` shows what the service answered at the time. The frame
+        of a declared problem includes every correction (:func:`ballast.frames.declared_history`). Raises
         ``ImportError`` without pandas.
         """
-        return frames.history(await self._history(), as_of)
+        history = await self._history()
+        if self.states is not None:
+            return frames.declared_history(cast(wire.DeclaredHistory, history))
+        return frames.history(history, as_of)
 
     async def _assets_frame(
         self, figure: frames.AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
@@ -356,9 +389,13 @@ class _Session(Labelled):
         return frames.worst_case(await self._action(explain="worst_case"))
 
     async def _plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the wealth after each period and the share held through it (:func:`ballast.plots.history`). Raises
-        ``ImportError`` without pandas and matplotlib."""
-        return plots.history(await self._history(), ax)
+        """Draws the wealth after each period and the share held through it (:func:`ballast.plots.history`), or the
+        states of a declared problem after each period (:func:`ballast.plots.declared_history`). Raises ``ImportError``
+        without pandas and matplotlib."""
+        history = await self._history()
+        if self.states is not None:
+            return plots.declared_history(cast(wire.DeclaredHistory, history), ax)
+        return plots.history(history, ax)
 
     async def _refresh(self) -> Self:
         """Updates this object from the service: its period, wealth, holding, state and policy."""
@@ -369,8 +406,9 @@ class _Session(Labelled):
         session: wire.Session = await self._transport.json("GET", self._path)
         self.renewals, self.policy, self.horizon = session["renewals"], session["policy"], session["horizon"]
         self.corrections = session["corrections"]
-        self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
-        self.state = session["state"]
+        self.period, self.state = session["period"], session["state"]
+        self.wealth, self.holding = _amount(session["wealth"]), _amount(session["holding"])
+        self.states, self.earned = session.get("states"), session.get("earned")
         return session
 
     async def _delete(self) -> None:
@@ -379,6 +417,11 @@ class _Session(Labelled):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id} at period {self.period} of {self.horizon}>"
+
+
+def _amount(value: float | None) -> float:
+    """Returns an amount, NaN if there is none."""
+    return math.nan if value is None else value
 
 
 def _by_name(report: wire.Report) -> wire.Report:
@@ -400,6 +443,7 @@ class Session(_Session):
 
     action = Answering(wire.AssetAction).blocking(_Session._action)
     assets_action = Answering(wire.AssetsAction).blocking(_Session._assets_action)
+    actions = Answering(wire.DeclaredAdvice).blocking(_Session._actions)
     observe = blocking(_Session._observe)
     replay = blocking(_Session._replay)
     correct = Answering(wire.Corrected).blocking(_Session._correct)
@@ -421,6 +465,7 @@ class AsyncSession(_Session):
 
     action = _Session._action
     assets_action = _Session._assets_action
+    actions = _Session._actions
     observe = _Session._observe
     replay = _Session._replay
     correct = _Session._correct

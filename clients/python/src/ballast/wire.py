@@ -377,8 +377,14 @@ class Correct(TypedDict):
     Prices of several assets at the start of the period, or the last one that came. Default: those reported
     before.
     """
+    noise: NotRequired[float | None]
+    """The noise that a declared problem's period brought."""
+    executed: NotRequired[dict[str, float]]
+    """Actions that were executed in a declared problem's period, each by its name. Default: the advised ones."""
+    state: NotRequired[dict[str, float]]
+    """States that a declared problem's period led to, each by its name. Default: those that the formulas give."""
     missing: NotRequired[bool]
-    """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
+    """Given instead of a return or a noise if none is known: the law does not change, and holdings count as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
@@ -456,6 +462,23 @@ class DeclaredDesign(TypedDict):
     """Number of design points per step, 10 to 10,000. Default 1000."""
 
 
+class DeclaredNow(TypedDict):
+    """A period of a declared problem after all corrections."""
+
+    noise: NotRequired[float | None]
+    """Null if it is missing."""
+    executed: dict[str, float]
+    """The actions executed, by name."""
+    reward: NotRequired[float | None]
+    """The reward of the period by the problem's formula; null if the noise is missing."""
+    earned: float
+    """Rewards since the start of the session, discounted to it."""
+    state: dict[str, float]
+    """The states after the period, by name."""
+    date: NotRequired[str | None]
+    """Its last day, if it is known."""
+
+
 class DeclaredState(TypedDict):
     """A state: where it starts, and the range that it never leaves."""
 
@@ -499,7 +522,7 @@ DeclaredUtility: TypeAlias = DeclaredUtility1 | DeclaredUtility2 | DeclaredUtili
 """A utility of the amount that a formula of the states gives at the end."""
 
 
-DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "total_loss", "differs_from_peers"]
+DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "unusual_noise", "total_loss", "differs_from_peers"]
 """Why a report is doubted."""
 
 
@@ -849,8 +872,14 @@ class Observe(TypedDict):
     Prices of several assets at the start of the period, or the last one that came. Default: those reported
     before.
     """
+    noise: NotRequired[float | None]
+    """The noise that a declared problem's period brought."""
+    executed: NotRequired[dict[str, float]]
+    """Actions that were executed in a declared problem's period, each by its name. Default: the advised ones."""
+    state: NotRequired[dict[str, float]]
+    """States that a declared problem's period led to, each by its name. Default: those that the formulas give."""
     missing: NotRequired[bool]
-    """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
+    """Given instead of a return or a noise if none is known: the law does not change, and holdings count as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
@@ -1155,8 +1184,14 @@ class Report(TypedDict):
     Prices of several assets at the start of the period, or the last one that came. Default: those reported
     before.
     """
+    noise: NotRequired[float | None]
+    """The noise that a declared problem's period brought."""
+    executed: NotRequired[dict[str, float]]
+    """Actions that were executed in a declared problem's period, each by its name. Default: the advised ones."""
+    state: NotRequired[dict[str, float]]
+    """States that a declared problem's period led to, each by its name. Default: those that the formulas give."""
     missing: NotRequired[bool]
-    """Given instead of a return if none is known: the law does not change, and the holdings count as unmoved."""
+    """Given instead of a return or a noise if none is known: the law does not change, and holdings count as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
@@ -1891,6 +1926,14 @@ class Decided(TypedDict):
     """
 
 
+class DeclaredAdvice(Decided):
+    """The robust actions of a declared problem's coming period."""
+
+    session: str
+    state: dict[str, float]
+    """The states before the period, by name."""
+
+
 class DeclaredProblem(TypedDict):
     """
     `V_t(x, F) = max_a min_{F' in C_t(F)} E_{F'}[ reward + discount V_{t+1}(next, F + Z) ]`, and `V_T = end`. With a
@@ -1923,6 +1966,20 @@ class DeclaredProblem(TypedDict):
     learning: NotRequired[Learning]
     """Weights of older noises in the learned law. Default: `equal`."""
     radius: NotRequired[RadiusRule | None]
+
+
+class DeclaredRenewed(Uncertainty):
+    """The session of a declared problem after a renewal."""
+
+    session: str
+    renewal: int
+    policy: str
+    period: int
+    """The coming period, the first that the policy advises."""
+    horizon: int
+    """The last period that the policy advises."""
+    problem: DeclaredProblem
+    """The problem from here on, without its history."""
 
 
 class DesignSpecification(TypedDict):
@@ -2091,6 +2148,8 @@ class OpenSession(TypedDict):
     """Share of wealth in the risky asset at the start. Default: 0."""
     holdings: NotRequired[dict[str, float]]
     """Share of wealth in each of several assets at the start, by their names. Default: 0."""
+    state: NotRequired[dict[str, float]]
+    """States of a declared problem at the start, by name. Default: the problem's own start."""
     renew: NotRequired[Renewing | None]
     rolling: NotRequired[bool]
     """
@@ -2265,9 +2324,10 @@ class SessionEntry(Labels):
     horizon: int
     """The last period that the policy advises."""
     state: SessionStatus
-    initial_wealth: float
-    wealth: float
-    holding: float
+    initial_wealth: NotRequired[float | None]
+    """Null, as all figures of wealth, if the session lives a declared problem."""
+    wealth: NotRequired[float | None]
+    holding: NotRequired[float | None]
     """Share of wealth in the risky asset, before trading."""
     wealth_change: NotRequired[float | None]
     """Change of wealth in the last period; null before the first."""
@@ -2801,7 +2861,7 @@ class Composition(TypedDict):
 
 
 class Corrected(Uncertainty):
-    """The session after a correction."""
+    """The session of an investor after a correction."""
 
     session: str
     correction: int
@@ -2847,6 +2907,72 @@ class DecideAnswer(Decided):
     """The actions of a period."""
 
     policy: str
+
+
+class DeclaredCorrected(Uncertainty):
+    """The session of a declared problem after a correction."""
+
+    session: str
+    correction: int
+    period: int
+    """The period corrected, inserted or removed."""
+    noise: NotRequired[float | None]
+    """Its noise now; null if it is missing or removed."""
+    observed: int
+    """Periods observed now."""
+    earned: float
+    """Rewards since the start of the session, discounted to it."""
+    state: dict[str, float]
+    """The states now, by name."""
+    date: NotRequired[str | None]
+    """The last day of the last period, if it is known."""
+    drift: Drift
+    """The test of whether the corrected noises still come from the same law."""
+
+
+class DeclaredCorrection(Correct):
+    """One correction of a declared problem's session, as it was made."""
+
+    answer: DeclaredCorrected
+    """The answer to it."""
+    corrected_ms: int
+
+
+class DeclaredObserved(Uncertainty):
+    """The session of a declared problem after an observation."""
+
+    session: str
+    period: int
+    noise: NotRequired[float | None]
+    """Null if it is missing."""
+    advised: NotRequired[dict[str, float]]
+    """
+    The actions advised for the period, by name. Null if none were: from the states before it every action may lead out
+    of a range.
+    """
+    executed: dict[str, float]
+    """The actions executed in it, by name."""
+    reward: NotRequired[float | None]
+    """The reward of the period by the problem's formula; null if the noise is missing."""
+    earned: float
+    """Rewards since the start of the session, discounted to it."""
+    state: dict[str, float]
+    """The states after the period, by name."""
+    date: NotRequired[str | None]
+    """
+    The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
+    period.
+    """
+    completed: bool
+    """True if the horizon is reached."""
+    drift: Drift
+    """The test of whether noises still come from the same law."""
+
+
+class DeclaredRenewal(DeclaredRenewed):
+    """One renewal of a declared problem's session, as it was made."""
+
+    renewed_ms: int
 
 
 class DeclaredSpecification(TypedDict):
@@ -3058,7 +3184,7 @@ class Renewed(Uncertainty):
 
 
 class Session(Labels):
-    """A live investor."""
+    """A live session: an investor's, or one of a declared problem."""
 
     session: str
     policy: str
@@ -3078,9 +3204,17 @@ class Session(Labels):
     Last day of the coming period, by the policy's periods a year, and otherwise by the days reported. A report
     without a day gets this day. Null if this is not known, or the session is completed.
     """
-    wealth: float
-    holding: float
-    """Share of wealth in the risky asset, before trading; for several assets, the share in all of them."""
+    wealth: NotRequired[float | None]
+    """Null if the session lives a declared problem."""
+    holding: NotRequired[float | None]
+    """
+    Share of wealth in the risky asset, before trading; for several assets, the share in all of them. Null if the
+    session lives a declared problem.
+    """
+    states: NotRequired[dict[str, float]]
+    """States of a declared problem before the coming period, by name."""
+    earned: NotRequired[float | None]
+    """Rewards of a declared problem since the start of the session, discounted to it."""
     assets: NotRequired[Composition | None]
     sample_size: int
     corrections: int
@@ -3213,6 +3347,25 @@ BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
 """A walk-forward of one asset, or of several assets if the request has the field `assets`."""
 
 
+CorrectionAnswer: TypeAlias = Corrected | DeclaredCorrected
+"""The session after a correction: an investor's, or one of a declared problem."""
+
+
+class DeclaredObservation(TypedDict):
+    """One period of a declared problem, observed or inserted later."""
+
+    period: int
+    """Its present number."""
+    answered: NotRequired[DeclaredObserved | None]
+    reported: Report
+    """The first report of it."""
+    observed_ms: int
+    corrections: list[int]
+    """Numbers of the corrections that inserted it or reported it again."""
+    now: DeclaredNow
+    """The period after all corrections."""
+
+
 EvaluationQuestion: TypeAlias = EvaluationRequest | DeclaredComparison
 """A comparison of an investor's strategies, or of policies and rules of a declared problem, which has no `problem` of its own."""
 
@@ -3279,7 +3432,7 @@ JobReport: TypeAlias = EvaluationReport | ComparisonReport | BacktestReport | As
 
 
 class Observed(Uncertainty):
-    """The session after an observation."""
+    """The session of an investor after an observation."""
 
     session: str
     period: int
@@ -3338,6 +3491,10 @@ class Renewal(Renewed):
     renewed_ms: int
 
 
+RenewalAnswer: TypeAlias = Renewed | DeclaredRenewed
+"""The session after a renewal: an investor's, or one of a declared problem."""
+
+
 class WhatIfAnswer1(WhatIfPoint):
     """One point, or the points of a sweep in its order."""
 
@@ -3368,19 +3525,23 @@ WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2 | WhatIfAnswer3 | WhatIf
 """One point, or the points of a sweep in its order."""
 
 
-ActionAnswer: TypeAlias = AssetAction | AssetsAction
+ActionAnswer: TypeAlias = AssetAction | AssetsAction | DeclaredAdvice
 """The robust allocation for the coming period."""
 
 
-class ElementAnswered(TypedDict):
-    """The answer to one element of a list."""
+class DeclaredHistory(TypedDict):
+    """The start of a declared problem's session, and everything recorded since."""
 
     session: str
-    period: int
-    status: int
-    """HTTP status that a call with this report alone would get."""
-    answer: NotRequired[Observed | None]
-    problem: NotRequired[ProblemDocument | None]
+    policy: str
+    initial_state: dict[str, float]
+    """States at the start, by name."""
+    history: list[float]
+    """Noises known at the start."""
+    observations: list[DeclaredObservation]
+    corrections: list[DeclaredCorrection]
+    renewals: list[DeclaredRenewal]
+    """The policies that followed the first."""
 
 
 class Observation(Observed):
@@ -3394,6 +3555,10 @@ class Observation(Observed):
     corrections: NotRequired[list[int]]
     """Numbers of the corrections that inserted it or reported it again."""
     now: NotRequired[Now | None]
+
+
+ObservationAnswer: TypeAlias = Observed | DeclaredObserved
+"""The session after an observation: an investor's, or one of a declared problem."""
 
 
 class PolicyDetail(Labels):
@@ -3410,12 +3575,19 @@ class PolicyDetail(Labels):
     diagnostics: list[StepDiagnostics]
 
 
-ReportsAnswered: TypeAlias = Observed | list[ElementAnswered]
-"""The answer to one report, or the answers to a list in its order."""
+class ElementAnswered(TypedDict):
+    """The answer to one element of a list."""
+
+    session: str
+    period: int
+    status: int
+    """HTTP status that a call with this report alone would get."""
+    answer: NotRequired[ObservationAnswer | None]
+    problem: NotRequired[ProblemDocument | None]
 
 
 class History(TypedDict):
-    """The start of a session, and everything recorded since."""
+    """The start of an investor's session, and everything recorded since."""
 
     session: str
     policy: str
@@ -3441,3 +3613,11 @@ class History(TypedDict):
     corrections: list[Correction]
     renewals: list[Renewal]
     """The policies that followed the first."""
+
+
+HistoryAnswer: TypeAlias = History | DeclaredHistory
+"""The history of a session: an investor's, or one of a declared problem."""
+
+
+ReportsAnswered: TypeAlias = ObservationAnswer | list[ElementAnswered]
+"""The answer to one report, or the answers to a list in its order."""

@@ -8,12 +8,14 @@ use crate::control::bellman::solution::Adversary;
 use crate::control::cache::Cache;
 use crate::control::controlled_training::ControlledPolicy;
 use crate::control::error::FieldError;
+use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::prepared_step::{Factor, steps_bytes};
 use crate::control::problem::declared::{Declared, EarnedState};
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::control::surrogate::features::Features;
+use crate::control::uncertainty::radius::Measure;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::statistics::summary::range;
 
@@ -70,6 +72,20 @@ impl DeclaredAdvisor {
         &self.warnings
     }
 
+    /// Returns a state by name: the declared start, or the one that is given.
+    ///
+    /// # Errors
+    /// It is not a state of the problem.
+    pub fn state(
+        &self,
+        field: &str,
+        given: Option<&BTreeMap<String, f64>>,
+    ) -> Result<BTreeMap<String, f64>, FieldError> {
+        let start = || self.policy.specification.problem.states.iter().map(|(name, state)| (name.clone(), state.start));
+        let state = given.cloned().unwrap_or_else(|| start().collect());
+        self.problem.state(field, &state).map(|_| state)
+    }
+
     /// Returns the bytes that it takes, without bridges and factors.
     pub fn bytes(&self) -> usize {
         steps_bytes(&self.policy.steps)
@@ -91,13 +107,11 @@ impl DeclaredAdvisor {
         let horizon = self.policy.specification.problem.horizon;
         rules::whole("period", period, &(1..=horizon))?;
         let step = period - 1;
-        // A state that leaves its range is a fault of this question alone.
-        let problem = self.problem.afresh();
-        let state = match state {
-            Some(state) => problem.state("state", state)?,
-            None if step == 0 => problem.start(),
-            None => return Err(FieldError::new("state", "null", "must be given after the first period")),
-        };
+        let problem = &self.problem;
+        if state.is_none() && step > 0 {
+            return Err(FieldError::new("state", "null", "must be given after the first period"));
+        }
+        let state = problem.state("state", &self.state("state", state)?)?;
         if noises.len() != step {
             let rule = format!("must have {step}, one for each period before this one");
             return Err(FieldError::new("noises", format!("a list of {}", noises.len()), rule));
@@ -105,8 +119,39 @@ impl DeclaredAdvisor {
         let seen =
             noises.iter().enumerate().map(|(index, noise)| problem.checked_noise(&format!("noises[{index}]"), *noise));
         let seen: Vec<f64> = seen.collect::<Result<_, _>>()?;
-        let decision = self.decided(&problem, step, &state, &self.law(&seen));
+        self.advise(step, &state, &seen)
+    }
+
+    /// Solves the robust step after `step` periods at a state, with the noises seen since the start in the unit of the
+    /// solver. What was earned before is not counted. Cost: that of [`Self::decide`].
+    ///
+    /// # Errors
+    /// As [`Self::decide`], but for fields that it alone reads.
+    pub fn advise(&self, step: usize, state: &EarnedState, seen: &[f64]) -> Result<Decided, FieldError> {
+        // A state that leaves its range is a fault of this question alone.
+        let problem = self.problem.afresh();
+        let state = EarnedState { earned: 0.0, ..state.clone() };
+        let decision = self.decided(&problem, step, &state, &self.law(seen));
         problem.fault().map_or(decision, |fault| Err(fault.clone()))
+    }
+
+    /// Returns the uncertainty set once these noises, in the unit of the solver, were seen. Its radius and its moments are
+    /// in the noise's own unit.
+    pub fn uncertainty(&self, seen: &[f64]) -> Uncertainty {
+        let law = self.law(seen);
+        let Measure { radius, quantile } = self.controlled.measure(&law);
+        let own = law.atoms().iter().map(|scaled| self.problem.noise(*scaled));
+        let moment = |power: usize| {
+            let terms = own.clone().zip(law.weights()).map(|(noise, weight)| weight * noise.powi(power as i32));
+            terms.sum::<f64>() / law.total_weight()
+        };
+        Uncertainty {
+            sample_size: law.sample_size(),
+            effective_size: law.effective_size(),
+            moments: (1..=self.specification.surrogate.moment_count).map(moment).collect(),
+            quantile,
+            radius: radius * self.problem.noise_width(),
+        }
     }
 
     /// Returns the law that is known once so many noises were seen.

@@ -9,12 +9,12 @@
 
 mod formula;
 mod jumps;
+mod lived;
 mod reading;
 mod rules;
 mod sampling;
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 use self::formula::Formula;
@@ -90,26 +90,6 @@ impl Declared {
         Declared { left: OnceLock::new(), ..self.clone() }
     }
 
-    /// Reads a state by the names of its numbers, before which nothing was earned.
-    ///
-    /// # Errors
-    /// A name without a number, another name, a number out of its range.
-    pub fn state(&self, field: &str, state: &BTreeMap<String, f64>) -> Result<EarnedState, FieldError> {
-        let names = self.states_named();
-        if let Some((other, value)) = state.iter().find(|(name, _)| !names.contains(name)) {
-            let rule = format!("must name one of the states: {}", names.join(", "));
-            return Err(FieldError::new(format!("{field}.{other}"), value, rule));
-        }
-        let value = |(name, [low, high]): (&String, &[f64; 2])| {
-            let field = format!("{field}.{name}");
-            let value =
-                state.get(name).ok_or_else(|| FieldError::new(&field, "null", "must be given for each state"))?;
-            within(&field, *value, *low, *high).map(|()| *value)
-        };
-        let values = names.iter().zip(&self.ranges).map(value).collect::<Result<_, _>>()?;
-        Ok(EarnedState { values, earned: 0.0 })
-    }
-
     /// Names the numbers of a state in words.
     pub fn named(&self, step: usize, state: &EarnedState) -> String {
         self.point(step, &state.values, None)
@@ -128,6 +108,11 @@ impl Declared {
     /// Returns the names of the actions.
     pub fn actions_named(&self) -> &[String] {
         &self.names[self.ranges.len()..][..self.actions.len()]
+    }
+
+    /// Returns the name and the support of the noise.
+    pub fn noise_named(&self) -> (&str, [f64; 2]) {
+        (&self.names[self.ranges.len() + self.actions.len()], self.noise)
     }
 
     /// Returns the noise in its own unit from that of the solver.
@@ -149,7 +134,8 @@ impl Declared {
         within(field, noise, self.noise[0], self.noise[1]).map(|()| self.scaled(noise))
     }
 
-    fn scaled(&self, noise: f64) -> f64 {
+    /// Returns the noise of the solver from one in its own unit.
+    pub fn scaled(&self, noise: f64) -> f64 {
         let [low, high] = self.noise;
         (noise - low) / (high - low) - 0.5
     }
@@ -208,6 +194,7 @@ impl Declared {
         EarnedState { values, earned: state.earned + self.discount.powi(step as i32) * reward }
     }
 
+    /// Returns why a state left its range.
     fn leaving(
         &self,
         place: usize,

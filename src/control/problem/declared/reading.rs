@@ -32,11 +32,22 @@ const LARGEST: f64 = 1e12;
 const MOST_LETTERS: usize = 40;
 
 impl Declared {
-    /// Reads a declaration.
+    /// Reads a declaration. Cost: its formulas at 10,000 points.
     ///
     /// # Errors
     /// The first field that breaks a rule. For a formula the rule begins with its column.
     pub fn new(problem: &DeclaredProblem) -> Result<Declared, FieldError> {
+        let mut declared = Declared::parsed(problem)?;
+        history(problem)?;
+        (declared.unit, declared.to_come) = declared.sampled(problem)?;
+        Ok(declared)
+    }
+
+    /// Reads a declaration that was read before, with or without its history. It moves states, but is not for training.
+    ///
+    /// # Errors
+    /// As [`Self::new`], but for its history and for what only a trial of the formulas shows.
+    pub fn parsed(problem: &DeclaredProblem) -> Result<Declared, FieldError> {
         let names = names(problem)?;
         numbers(problem)?;
         let (states, moved) = (problem.states.len(), problem.states.len() + problem.actions.len() + 1);
@@ -69,7 +80,7 @@ impl Declared {
             let rule = "must be absent with a utility, which is of the amount at the end alone";
             return Err(FieldError::new("problem.reward", reward, rule));
         }
-        let mut declared = Declared {
+        Ok(Declared {
             ranges: problem.states.values().map(|state| [state.low, state.high]).collect(),
             start: problem.states.values().map(|state| state.start).collect(),
             parameters: problem.parameters.values().copied().collect(),
@@ -85,9 +96,7 @@ impl Declared {
             to_come: Vec::new(),
             left: OnceLock::new(),
             names: names.clone(),
-        };
-        (declared.unit, declared.to_come) = declared.sampled(problem)?;
-        Ok(declared)
+        })
     }
 
     /// Returns what the solver of controlled problems needs to know: the noise in its unit, and the settings.
@@ -204,6 +213,22 @@ fn counted(field: &str, count: usize, least: usize, most: usize) -> Result<(), F
     if (least..=most).contains(&count) { Ok(()) } else { Err(FieldError::new(field, count, rule())) }
 }
 
+/// Checks the noises that are known.
+fn history(problem: &DeclaredProblem) -> Result<(), FieldError> {
+    let noise = &problem.noise;
+    for (index, value) in problem.history.iter().enumerate() {
+        if !(noise.low..=noise.high).contains(value) {
+            let rule = format!("must be from `noise.low`, {}, to `noise.high`, {}", noise.low, noise.high);
+            return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
+        }
+    }
+    if problem.history.windows(2).all(|pair| pair[0] == pair[1]) {
+        let found = problem.history.first().map_or("no values".to_owned(), |value| format!("{value} alone"));
+        return Err(FieldError::new("problem.history", found, "must have two different values at least"));
+    }
+    Ok(())
+}
+
 /// Checks the numbers.
 fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
     let range = |field: String, low: f64, high: f64| {
@@ -227,16 +252,6 @@ fn numbers(problem: &DeclaredProblem) -> Result<(), FieldError> {
     }
     let noise = &problem.noise;
     range("problem.noise".into(), noise.low, noise.high)?;
-    for (index, value) in problem.history.iter().enumerate() {
-        if !(noise.low..=noise.high).contains(value) {
-            let rule = format!("must be from `noise.low`, {}, to `noise.high`, {}", noise.low, noise.high);
-            return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
-        }
-    }
-    if problem.history.windows(2).all(|pair| pair[0] == pair[1]) {
-        let found = problem.history.first().map_or("no values".to_owned(), |value| format!("{value} alone"));
-        return Err(FieldError::new("problem.history", found, "must have two different values at least"));
-    }
     sizes(problem)?;
     choices(problem)?;
     for (name, value) in &problem.parameters {

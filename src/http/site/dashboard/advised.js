@@ -3,7 +3,7 @@
 import { inMoney } from "./advice.js";
 import { get } from "./api.js";
 import { h } from "./dom.js";
-import { allocation, wealth } from "./format.js";
+import { allocation, significant, wealth } from "./format.js";
 import { inMoneyByName } from "./several.js";
 
 /** Browsers keep six connections to one address: this many leave room for what the user clicks meanwhile. */
@@ -25,6 +25,11 @@ export function advised(leaving, changed = () => {}) {
   };
   const fill = async ({ entry, hold, trade }) => {
     const [action, cost] = await Promise.all([get(`/action?session=${entry.session}`, leaving), costOf(entry.policy)]);
+    if (action.actions) {
+      hold.replaceChildren(Object.entries(action.actions).map(([name, value]) => `${name} ${significant(value, 4)}`).join(", "));
+      trade.replaceChildren("\u2013");
+      return;
+    }
     hold.replaceChildren(...held(action));
     trade.replaceChildren(...traded(action, entry.wealth, cost));
     if (action.in_design) return;

@@ -12,6 +12,7 @@ import { netAdded } from "./flows.js";
 import { allocation, count, percent, percentTick, points, tick, wealth } from "./format.js";
 import { called } from "./naming.js";
 import { calendar } from "./periods.js";
+import { investorsSession } from "./specification.js";
 import { worstFalls } from "./track.js";
 
 export async function sessionsBeside(ids, leaving) {
@@ -25,7 +26,7 @@ export async function sessionsBeside(ids, leaving) {
 }
 
 async function read(id, leaving) {
-  const session = await get(`/sessions/${id}`, leaving);
+  const session = investorsSession(await get(`/sessions/${id}`, leaving));
   const [history, policy, action] = await Promise.all([
     get(`/sessions/${id}/history`, leaving),
     get(`/policies/${session.policy}`, leaving),

@@ -8,7 +8,10 @@ import { pointed } from "./number_text.js";
 import { caution, utility, warningList } from "./specification.js";
 
 /** Formats a number of a declared problem, whose unit is not known. */
-const plain = (value) => significant(value, 6);
+export const plain = (value) => significant(value, 6);
+
+/** Says the states of a declared problem. */
+export const statesWords = (states) => Object.entries(states).map(([name, value]) => `${name}: ${plain(value)}`).join(", ");
 
 /** Returns the body of the page of policy `id`. `isCompared` tells whether the service can compare it. */
 export function declaredBody(id, { specification: { problem, design }, warnings }, isCompared) {
@@ -26,6 +29,7 @@ export function declaredBody(id, { specification: { problem, design }, warnings 
     section("What to do in a period", deciding(id, problem, answer)),
     answer,
     isCompared ? beside(id, problem) : "",
+    h("p", {}, h("a", { class: "button quiet", href: `#/sessions/new?policy=${id}`, "data-needs": "operate" }, "Open a session")),
     section("The problem", formulas(problem)),
     h("p", { class: "again", "data-needs": "train" }, h("a", { href: `#/declare?from=${id}` }, "Clone with one thing changed")),
   ];
@@ -112,12 +116,12 @@ function numbers(text) {
   return words.filter(Boolean).flatMap(parts).map(pointed);
 }
 
-/** Shows an answer of `/decide`. */
-function decided({ period, actions, several_peaks, value, radius, worst_law, duality_gap, untrained_share }, { noise: { name: noise }, horizon, utility: ofWealth }) {
+/** Shows the actions of a period, an answer of `/decide` or `/action`, under a heading. `last` is the last period of the horizon. */
+export function decided({ period, actions, several_peaks, value, radius, worst_law, duality_gap, untrained_share }, { noise: { name: noise }, horizon, utility: ofWealth }, { heading = `Period ${period}`, last = horizon } = {}) {
   const warning = (words) => h("p", { class: "note wrong" }, words);
   const share = untrained_share >= 0.01 ? percent(untrained_share, 0) : "Less than 1\u202f%";
   return section(
-    `Period ${period}`,
+    heading,
     h(
       "div",
       { class: "words" },
@@ -126,7 +130,7 @@ function decided({ period, actions, several_peaks, value, radius, worst_law, dua
       several_peaks.length > 0 && warning(`Quite another ${several_peaks.join(" and ")} may be nearly as good: the worth has several peaks.`),
     ),
     facts([
-      [`Worth of ${period === horizon ? "the last period" : `periods ${period} to ${horizon}`}`, plain(value), `${ofWealth ? "certainty equivalent, " : ""}under the worst law`],
+      [`Worth of ${period === last ? "the last period" : `periods ${period} to ${last}`}`, plain(value), `${ofWealth ? "certainty equivalent, " : ""}under the worst law`],
       ["Radius", significant(radius, 4), `in the unit of ${noise}`],
     ]),
     h("h3", {}, `The worst law of ${noise} in this period`),

@@ -2,6 +2,7 @@
 // returns seen.
 
 import { follow, get, isOver, post } from "./api.js";
+import { statesWords } from "./declared_policy.js";
 import { announce, h, table } from "./dom.js";
 import { fieldset, refusal, select, sending } from "./form.js";
 import { count, counted, wealth } from "./format.js";
@@ -50,6 +51,14 @@ export function anew(session, history, { specification, name }, now) {
   return { ...request, name: renewedName(name ?? "", now), tags: ["renewed"] };
 }
 
+/** Returns the request to retrain the policy of a declared problem's session on all it has seen, from its current states. */
+function anewDeclared(session, history, { specification, name }, now) {
+  const request = structuredClone(specification);
+  request.problem.history = [...history.history, ...history.observations.map(({ now }) => now.noise).filter((noise) => noise !== null)];
+  for (const [name, state] of Object.entries(request.problem.states)) state.start = session.states[name];
+  return { ...request, name: renewedName(name ?? "", now), tags: ["renewed"] };
+}
+
 function renewing(sessions, policies, leaving) {
   const choice = select({
     name: "policy",
@@ -64,7 +73,7 @@ function renewing(sessions, policies, leaving) {
     { name: "Session", cell: ({ session, name }) => h("div", { class: "said" }, headed(`#/sessions/${session}`, session, name), outcomes.get(session)) },
     { name: "Policy now", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, policyName(policy)) },
     { name: "Periods", numeric: true, cell: ({ period, horizon, rolling }) => (rolling ? count(period - 1) : `${count(period - 1)} of ${count(horizon)}`) },
-    { name: "Wealth", numeric: true, cell: ({ wealth: now }) => wealth(now) },
+    { name: "Stands at", numeric: true, cell: (session) => (session.states ? statesWords(session.states) : wealth(session.wealth)) },
   ], sessions);
   const line = h("p", { class: "note", role: "status", tabindex: -1 });
   const button = h("button", { type: "submit" }, sessions.length === 1 ? "Continue" : `Continue the ${count(sessions.length)}`);
@@ -77,7 +86,7 @@ function renewing(sessions, policies, leaving) {
   const trainings = new Map();
   const trained = async (session) => {
     const [history, policy] = await Promise.all([get(`/sessions/${session.session}/history`, leaving), get(`/policies/${session.policy}`, leaving)]);
-    const asked = JSON.stringify(anew(session, history, policy, new Date()));
+    const asked = JSON.stringify((session.states ? anewDeclared : anew)(session, history, policy, new Date()));
     if (!trainings.has(asked)) trainings.set(asked, train(asked));
     tell(session, "its policy is being trained\u2026");
     return trainings.get(asked);

@@ -133,9 +133,9 @@ export function foretold(read, { wealth: now, before, cost }) {
  * Sends the request that `compose` makes to `path`, one at a time, then shows the session again by `refresh`. After a failure the same request
  * is sent again; `once` says why that is safe. A doubt of the service is shown as a question below the form, and
  * `numbered(request, count)` is the request after `count` missing periods were reported before it. If somebody else reported meanwhile,
- * their report is shown beside what was typed.
+ * their report is shown beside what was typed, by `words`.
  */
-export function sendReports(form, { button, message, fields, path, compose, once, done, numbered, session, calendar, refresh }) {
+export function sendReports(form, { button, message, fields, path, compose, once, done, numbered, words = INVESTOR, session, calendar, refresh }) {
   let request = null;
   const label = button.textContent;
   const place = h("div", {});
@@ -193,7 +193,7 @@ export function sendReports(form, { button, message, fields, path, compose, once
     }
     if (error.status === 409) {
       const now = await get(`/sessions/${session.session}`).catch(() => null);
-      if (now && (now.period !== session.period || now.corrections !== session.corrections)) return refresh(null, overtaken(refusal, now, { calendar, refresh }));
+      if (now && (now.period !== session.period || now.corrections !== session.corrections)) return refresh(null, overtaken(refusal, now, { calendar, refresh, words }));
     }
     const field = ["log_return", "simple_return"].includes(error.field) ? "return" : error.field;
     showProblem(form, message, { ...error, message: error.message, field });
@@ -207,13 +207,20 @@ function returnWords({ simple_return, log_return, simple_returns, missing }) {
   return percent(simple_return ?? Math.expm1(log_return), 2);
 }
 
+/** What a report of an investor says, and what stands for its period, in words. */
+const INVESTOR = {
+  typed: returnWords,
+  recorded(row) {
+    const { log_return } = row?.now ?? row ?? { log_return: null };
+    return log_return === null ? "as missing" : `as ${percent(Math.expm1(log_return), 2)}`;
+  },
+};
+
 /** Says that a report was not recorded because somebody else was faster: shows what is recorded, what was typed, and a button that corrects
  * it. The result takes the history that is read again. */
-const overtaken = (refusal, now, { calendar, refresh }) => ({ observations }) => {
+const overtaken = (refusal, now, { calendar, refresh, words: { typed, recorded } }) => ({ observations }) => {
   const { session, correction, confirm, reason, ...report } = refusal;
-  const row = observations[report.period - 1];
-  const { log_return } = row?.now ?? row ?? { log_return: null };
-  const stands = log_return === null ? "as missing" : `as ${percent(Math.expm1(log_return), 2)}`;
+  const stands = recorded(observations[report.period - 1]);
   const words = correction
     ? `Not recorded: ${calendar.inText(report.period)} was corrected by somebody else a moment ago, and is now recorded ${stands}. `
     : `Not recorded: ${calendar.inText(report.period)} was reported ${stands} a moment ago. `;
@@ -229,5 +236,5 @@ const overtaken = (refusal, now, { calendar, refresh }) => ({ observations }) =>
     await refresh("The period is corrected.");
   };
   const button = h("button", { type: "button", onclick: ({ target }) => pressed(target, right({})) }, "Correct it");
-  return h("div", { class: "doubts", role: "alert" }, h("p", { class: "error" }, `${words}You typed ${returnWords(report)}. `), place, h("p", { class: "send" }, button));
+  return h("div", { class: "doubts", role: "alert" }, h("p", { class: "error" }, `${words}You typed ${typed(report)}. `), place, h("p", { class: "send" }, button));
 };

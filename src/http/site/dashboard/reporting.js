@@ -19,7 +19,8 @@ const AT_ONCE = 1000;
 
 /** `query`: `sessions=A,B` puts those sessions into the lines. */
 export async function view(query, leaving) {
-  const sessions = await all("/sessions", "sessions", leaving);
+  // A session without wealth is of a declared problem, whose page has its own report.
+  const sessions = (await all("/sessions", "sessions", leaving)).filter(({ wealth }) => wealth !== null);
   const asked = (new URLSearchParams(query ?? "").get("sessions") ?? "").split(",");
   const chosen = sessions.filter(({ session }) => asked.includes(session));
   const trail = h("p", { class: "trail" }, h("a", { href: "#/" }, "Overview"));

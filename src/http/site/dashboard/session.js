@@ -4,6 +4,7 @@ import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
 import { grown, risky } from "./comparators.js";
 import { holdings, wealthCourse, worstFallFact } from "./course.js";
+import { declaredSession } from "./declared_session.js";
 import { announce, facts, h, section } from "./dom.js";
 import { addedIn, banked, netAdded, standing } from "./flows.js";
 import { pressed } from "./form.js";
@@ -13,6 +14,7 @@ import { labelled, titled } from "./naming.js";
 import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
 import { calendar, day, isoDay } from "./periods.js";
+import { due } from "./renewal_due.js";
 import { nearness } from "./sensitivity.js";
 import { severalAdvice, severalHeld, severalWorst } from "./several.js";
 import { presentAssets } from "./several_fields.js";
@@ -22,6 +24,7 @@ import { worstMarket } from "./worst_market.js";
 
 export async function view(id, leaving) {
   const session = await get(`/sessions/${id}`, leaving);
+  if (session.states) return ofDeclared(id, session, leaving);
   const [history, policy, canAsk, canTry] = await Promise.all([
     get(`/sessions/${id}/history`, leaving),
     get(`/policies/${session.policy}`, leaving),
@@ -49,16 +52,19 @@ export async function view(id, leaving) {
     holder.querySelector("#advice")?.focus();
   };
   await fill(holder, known(session, history));
-  const trail = h(
-    "p",
-    { class: "trail" },
-    h("a", { href: "#/sessions" }, "Overview"),
-    " \u203a ",
-    h("a", { href: `#/policies/${session.policy}` }, titled("Policy", session.policy, policy.name)),
-    `, ${utility(policy.specification.problem.utility)}`,
-  );
-  return { title: titled("Session", id, session.name), trail, under: [labelled("Session", `/sessions/${id}`, id, session), letterhead(policy)], body: [holder, h("p", { class: "printed note" }, DISCLAIMER), h("p", { class: "end" }, session.state === "active" ? goOn(id) : null, deletion(id, titled("Session", id, session.name)))] };
+  const trail = [...trailed(session, policy), `, ${utility(policy.specification.problem.utility)}`];
+  return { title: titled("Session", id, session.name), trail: h("p", { class: "trail" }, trail), under: [labelled("Session", `/sessions/${id}`, id, session), letterhead(policy)], body: [holder, h("p", { class: "printed note" }, DISCLAIMER), h("p", { class: "end" }, session.state === "active" ? goOn(id) : null, deletion(id, titled("Session", id, session.name)))] };
 }
+
+/** Returns the page of a session of a declared problem. */
+async function ofDeclared(id, session, leaving) {
+  const policy = await get(`/policies/${session.policy}`, leaving);
+  const title = titled("Session", id, session.name);
+  const trail = h("p", { class: "trail" }, trailed(session, policy));
+  return { title, trail, under: labelled("Session", `/sessions/${id}`, id, session), body: [await declaredSession(id, session, policy, leaving), h("p", { class: "end" }, goOn(id), deletion(id, title))] };
+}
+
+const trailed = (session, policy) => [h("a", { href: "#/sessions" }, "Overview"), " \u203a ", h("a", { href: `#/policies/${session.policy}` }, titled("Policy", session.policy, policy.name))];
 
 /** The text at the end of the printed page. */
 const DISCLAIMER = "This is computed from past returns, which do not predict the future. Statements about the worst market hold only for the markets that the record allows.";
@@ -182,19 +188,6 @@ function completed({ id, session, history }) {
       h("p", { class: "actions" }, goOn(id), h("a", { class: "button quiet", href: `#/sessions/new?policy=${session.policy}` }, "Open another session")),
     ),
   );
-}
-
-/** Says that the next policy is due, and what it waits for. */
-function due({ session: { renewal } }) {
-  if (!renewal) return "";
-  const job = renewal.job ? h("a", { href: "#/jobs" }, "its training") : "its training";
-  const states = {
-    due: ["The next policy is about to be trained: ", job, "."],
-    training: ["The next policy is being trained: ", job, ". Until then this one continues."],
-    trained: ["The next policy is trained and about to take over: ", job, "."],
-    failed: ["The next policy is missing: ", job, ` failed${renewal.error ? ` (${renewal.error})` : ""}. The service will try again; until then this one continues.`],
-  };
-  return h("p", { class: renewal.state === "failed" ? "note wrong" : "note" }, ...states[renewal.state]);
 }
 
 const held = (shown, action) => section("What it held", h("div", { class: "duo" }, ...holdings(shown, action)));

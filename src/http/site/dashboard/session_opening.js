@@ -5,10 +5,10 @@ import { h } from "./dom.js";
 import { fieldset, input, refusal, select, sending, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
 import { labelFields } from "./naming.js";
-import { fraction, typed } from "./number_text.js";
+import { fraction, pointed, typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { returnsField } from "./returns_field.js";
-import { investorsOnly } from "./specification.js";
+import { isDeclared } from "./specification.js";
 
 export async function view(query, leaving) {
   const policies = await all("/policies", "policies", leaving);
@@ -51,6 +51,8 @@ function opening(policies, asked, leaving) {
     changed: (series) => (known = series),
   });
   let assets = null;
+  let states = null;
+  const begins = h("div", { class: "fields", hidden: true });
   const shares = h("div", { class: "fields", hidden: true });
   let usual = "";
   const goingNote = going.element.querySelector(".note");
@@ -72,11 +74,16 @@ function opening(policies, asked, leaving) {
     if (asked === "") return;
     const { specification } = await get(`/policies/${asked}`, leaving);
     if (asked !== policy.control.value) return;
-    investorsOnly(specification);
-    assets = specification.fund?.assets ?? null;
-    allow(specification);
-    holding.element.hidden = assets !== null;
+    states = isDeclared(specification) ? specification.problem.states : null;
+    const state = ([name, { start, low, high }], index) => input({ within: `state-${index}-`, name: `state.${name}`, label: `${name} now`, note: `${low} to ${high}. Blank: ${start}.` });
+    begins.replaceChildren(...Object.entries(states ?? {}).map((entry, index) => state(entry, index).element));
+    begins.hidden = states === null;
+    for (const element of [stake.element, holding.element, other]) element.hidden = states !== null;
+    assets = states ? null : (specification.fund?.assets ?? null);
     shares.hidden = assets === null;
+    allow(specification);
+    if (states) return;
+    holding.element.hidden = assets !== null;
     const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held already, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
     shares.replaceChildren(...(assets ?? []).map((name, index) => field(name, index).element));
   };
@@ -97,7 +104,7 @@ function opening(policies, asked, leaving) {
   const form = h(
     "form",
     { novalidate: true },
-    fieldset("The session", [labels.name, policy, stake, holding, shares]),
+    fieldset("The session", [labels.name, policy, stake, holding, shares, begins]),
     fieldset("How long", [going, every, window]),
     other,
     more,
@@ -110,11 +117,15 @@ function opening(policies, asked, leaving) {
     if (policy.control.value === "") throw { field: policy.name, message: "Choose a policy for this session." };
     if (!(await choosing) && !(await choose())) return;
     const request = { policy: policy.control.value, ...labels.read() };
-    if (known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
-    const wealth = typed(stake.control.value);
+    if (states) {
+      const typedIn = Object.keys(states).map((name, index) => [name, begins.querySelectorAll("input")[index].value.trim()]);
+      if (typedIn.some(([, text]) => text !== "")) request.state = Object.fromEntries(typedIn.map(([name, text]) => [name, text === "" ? states[name].start : pointed(text)]));
+    }
+    if (!states && known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
+    const wealth = states ? null : typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
     const share = (text) => fraction(text) ?? text.trim();
-    const texts = assets ? [...shares.querySelectorAll("input")].map(({ value }) => value) : [holding.control.value];
+    const texts = states ? [] : assets ? [...shares.querySelectorAll("input")].map(({ value }) => value) : [holding.control.value];
     const isSaid = texts.some((text) => text.trim() !== "");
     if (isSaid && assets) request.holdings = Object.fromEntries(assets.map((name, index) => [name, texts[index].trim() === "" ? 0 : share(texts[index])]));
     else if (isSaid) request.holding = share(texts[0]);
@@ -135,12 +146,13 @@ function byDate(series, assets) {
 }
 
 /** Returns the reasons why a session with a policy cannot be renewed automatically or roll, by the choice they disable. */
-function cannot({ horizon, contributions, learning, utility }, { initial_laws }) {
+function cannot({ horizon, contributions, learning, utility, states }, { initial_laws }) {
   const flows = [contributions ?? 0].flat();
   const reasons = {};
   if (horizon < 2) reasons.renews = "A renewed session needs a policy that looks at least two periods ahead. This one looks one period ahead.";
   else if (Array.isArray(contributions)) reasons.renews = "A session cannot be renewed automatically if its policy lists contributions period by period.";
-  if (learning?.kind !== "decay") reasons.rolls = "A rolling session needs a policy that counts older returns less. This one counts all returns equally.";
+  if (states) reasons.rolls = "A rolling session needs an investor.";
+  else if (learning?.kind !== "decay") reasons.rolls = "A rolling session needs a policy that counts older returns less. This one counts all returns equally.";
   else if (initial_laws !== "resampled") reasons.rolls = "A rolling session needs a policy trained for other records than its own.";
   else if (utility.kind === "exponential" || flows.some((amount) => amount !== 0)) reasons.rolls = "A rolling session needs a policy whose advice does not depend on wealth.";
   return reasons;

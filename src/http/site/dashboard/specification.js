@@ -110,6 +110,12 @@ export function investorsOnly(specification) {
   if (isDeclared(specification)) throw new Problem({ title: "Not for this policy", field: "policy", detail: "This policy is of a declared problem, without an investor. Its own page says what to do." });
 }
 
+/** Refuses a session that has no investor; otherwise returns it. */
+export function investorsSession(session) {
+  if (session.states) throw new Problem({ title: "Not for this session", field: "session", detail: "This session is of a declared problem, without an investor. Its own page says what to do." });
+  return session;
+}
+
 /** Tells whether the uncertainty set is a ball of laws. */
 export const hasBall = ({ framework }) => framework === "adaptive" || framework === "static";
 

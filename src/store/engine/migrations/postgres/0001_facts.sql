@@ -101,8 +101,8 @@ CREATE TABLE sessions (
     session         TEXT NOT NULL UNIQUE,
     tenant          TEXT NOT NULL,
     policy          TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
-    initial_wealth  DOUBLE PRECISION NOT NULL,
-    initial_holding DOUBLE PRECISION NOT NULL,
+    initial_wealth  DOUBLE PRECISION,
+    initial_holding DOUBLE PRECISION,
     -- Doubles, little-endian, eight bytes each.
     initial_history BYTEA NOT NULL,
     -- The SHA-256 of the history, so that a list need not read it.

@@ -90,8 +90,8 @@ CREATE TABLE sessions (
     session         TEXT NOT NULL UNIQUE,
     tenant          TEXT NOT NULL,
     policy          TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
-    initial_wealth  ANY NOT NULL,
-    initial_holding ANY NOT NULL,
+    initial_wealth  ANY,
+    initial_holding ANY,
     -- Doubles, little-endian, eight bytes each.
     -- The SHA-256 of the history, so that a list need not read it.
     history_seal    BLOB NOT NULL,

@@ -1,0 +1,71 @@
+//! The periods that are lived: states and executed actions by their names, and where they lead.
+
+use std::collections::BTreeMap;
+
+use super::{Declared, EarnedState};
+use crate::control::error::FieldError;
+use crate::control::problem::controlled::Controlled;
+use crate::control::request::bounds::within;
+use crate::control::request::by_name::by_name;
+
+impl Declared {
+    /// Reads a state by the names of its numbers, before which nothing was earned.
+    ///
+    /// # Errors
+    /// A name without a number, another name, a number out of its range.
+    pub fn state(&self, field: &str, state: &BTreeMap<String, f64>) -> Result<EarnedState, FieldError> {
+        let names = self.states_named();
+        let values = by_name(field, "state", state, names)?;
+        for ((name, value), [low, high]) in names.iter().zip(&values).zip(&self.ranges) {
+            within(&format!("{field}.{name}"), *value, *low, *high)?;
+        }
+        Ok(EarnedState { values, earned: 0.0 })
+    }
+
+    /// Reads executed actions by name, in the order of the names.
+    ///
+    /// # Errors
+    /// An action without a number, another name; unless they are `recorded`, a number that the action may not be in the
+    /// state after `step` periods.
+    pub fn executed(
+        &self,
+        field: &str,
+        (step, state): (usize, &EarnedState),
+        executed: &BTreeMap<String, f64>,
+        recorded: bool,
+    ) -> Result<Vec<f64>, FieldError> {
+        let names = self.actions_named();
+        let actions = by_name(field, "action", executed, names)?;
+        if !recorded {
+            for ((name, action), set) in names.iter().zip(&actions).zip(self.actions(step, state)) {
+                set.checked(&format!("{field}.{name}"), *action)?;
+            }
+        }
+        Ok(actions)
+    }
+
+    /// Returns the state after a period with these actions and a noise in the unit of the solver, and what the period
+    /// earned.
+    ///
+    /// # Errors
+    /// A state leaves its range, or what is earned is no number.
+    pub fn passed(
+        &self,
+        step: usize,
+        state: &EarnedState,
+        actions: &[f64],
+        scaled: f64,
+    ) -> Result<(EarnedState, f64), FieldError> {
+        let problem = self.afresh();
+        let moved = (actions, problem.noise(scaled));
+        let (values, reward) = problem.period(step, state, moved);
+        let next = problem.after((step, state), moved, (values, reward));
+        if let Some(fault) = problem.fault() {
+            return Err(fault.clone());
+        }
+        match reward.is_finite() {
+            true => Ok((next, reward)),
+            false => Err(FieldError::new("problem.reward", reward, "must be a number")),
+        }
+    }
+}

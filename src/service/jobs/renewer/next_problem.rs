@@ -1,0 +1,43 @@
+//! The problem of the next policy of a session.
+
+use crate::control::policy_document::PreparedPolicy;
+use crate::control::posed::Posed;
+use crate::control::request::rules;
+use crate::service::entries::periods::Periods;
+use crate::service::error::ServiceError;
+use crate::service::sessions::plan::Renewing;
+use crate::service::sessions::session_state::SessionState;
+use crate::store::SessionFacts;
+
+/// Returns the problem of a session's next policy: the present one, on what was observed since, from the present state.
+///
+/// # Errors
+/// A recorded report no longer keeps the rules.
+pub(super) fn next_problem(
+    policy: &PreparedPolicy,
+    standing: &SessionState,
+    facts: &SessionFacts,
+    renew: Renewing,
+) -> Result<Posed, ServiceError> {
+    let periods = Periods::of(facts)?;
+    match (policy, standing) {
+        (PreparedPolicy::Declared(advisor), SessionState::Declared(state)) => {
+            let mut next = advisor.policy().specification().clone();
+            let seen = periods.all.iter().filter_map(|period| period.report.noise);
+            next.problem.history = facts.row.initial_history.iter().copied().chain(seen).collect();
+            let most = renew.window.unwrap_or(usize::MAX).min(*rules::HISTORY_LENGTH.end());
+            next.problem.history.drain(..next.problem.history.len().saturating_sub(most));
+            for (name, value) in state.named() {
+                next.problem.states.entry(name).and_modify(|state| state.start = value);
+            }
+            Ok(Posed::Declared(next.into()))
+        }
+        (PreparedPolicy::Investor(advisor), SessionState::Account(account)) => {
+            let record = periods.replay()?.record;
+            let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
+            let next = advisor.specification().next(record.last(renew.window), rate, account.state.wealth)?;
+            Ok(Posed::Investor(next.into()))
+        }
+        _ => Err(ServiceError::internal("a session has the policy of another problem")),
+    }
+}
