@@ -215,7 +215,9 @@ async fn decides_as(app: &App, policy: &str, period: usize, noises: &[f64]) {
 }
 
 async fn a_renewed_session_decides_by_the_next_policy(mut app: App) {
-    app.train(&stock(3)).await;
+    let mut discounted = stock(3);
+    discounted["problem"]["discount"] = json!(0.9);
+    app.train(&discounted).await;
     let first = app.policy.clone();
     app.open_with(json!({ "state": { "stock": 7.0 } })).await;
     for (period, noise) in [(1, 18.5), (2, 11.0)] {
@@ -225,6 +227,7 @@ async fn a_renewed_session_decides_by_the_next_policy(mut app: App) {
     let before = session(&app).await;
     // The next policy has seen more, looks further, and sells for another price.
     let mut next = stock(4);
+    next["problem"]["discount"] = json!(0.5);
     next["problem"]["history"].as_array_mut().unwrap().extend([json!(18.5), json!(11.0)]);
     next["problem"]["parameters"]["price"] = json!(12.0);
     app.train(&next).await;
@@ -262,6 +265,10 @@ async fn a_renewed_session_decides_by_the_next_policy(mut app: App) {
     // 0.5 and 1.5 were left of the first two orders, and 17.5 are sold for the new price.
     assert_eq!(observed["state"]["stock"], 0.0);
     assert!((number(&observed["reward"]) - (12.0 * 17.5 - 5.0 * 16.0)).abs() < 1e-9, "{observed}");
+    // Of two periods with the first discount, and then with the second.
+    let [one, two, three] = [9.0 * 18.5 - 60.0 - 0.25, 9.0 * 11.0 - 60.0 - 0.75, 12.0 * 17.5 - 80.0];
+    let earned = number(&observed["earned"]);
+    assert!((earned - (one + 0.9 * two + 0.81 * three)).abs() < 1e-9, "{observed}");
     decides_as(&app, &second, 2, &[20.0]).await;
     let coming = action(&app).await;
     app.restart().await;

@@ -30,6 +30,8 @@ pub struct ProblemState {
     problem: Arc<Declared>,
     /// The states, and the rewards since the start of the session.
     pub state: EarnedState,
+    /// The worth at the start of an amount of the coming period: the discounts of all periods so far.
+    discounted: f64,
     /// The noises under the present policy that did not miss, in the unit of the solver.
     pub seen: Vec<f64>,
     /// The last days of the periods.
@@ -70,6 +72,7 @@ impl ProblemState {
         let start = ProblemState {
             problem: problem.into(),
             state,
+            discounted: 1.0,
             seen: Vec::new(),
             days: Days::default(),
             bet: DriftTest::default(),
@@ -166,13 +169,13 @@ impl ProblemState {
         };
         let passed = seen.values[0].map(|scaled| self.problem.passed(step, &self.state, &actions, scaled));
         let reported = report.state.as_ref().map(|state| self.problem.state("state", state)).transpose()?;
-        let (state, reward) = match (reported, passed) {
+        let (values, reward) = match (reported, passed) {
             (None, Some(passed)) => {
-                let (next, reward) = passed.map_err(|fault| {
+                let (values, reward) = passed.map_err(|fault| {
                     let rule = format!("must be reported: by the formulas, {} {}", fault.field, fault.rule);
                     FieldError::new("state", "null", rule)
                 })?;
-                (next, Some(reward))
+                (values, Some(reward))
             }
             (None, None) => {
                 return Err(FieldError::new(
@@ -181,12 +184,11 @@ impl ProblemState {
                     "must be given if the noise is missing: it moves the state",
                 ));
             }
-            (Some(reported), passed) => match passed.and_then(Result::ok) {
-                Some((next, reward)) => (EarnedState { earned: next.earned, ..reported }, Some(reward)),
-                None => (EarnedState { earned: self.state.earned, ..reported }, None),
-            },
+            (Some(reported), passed) => (reported.values, passed.and_then(Result::ok).map(|(_, reward)| reward)),
         };
-        let mut standing = ProblemState { state, ..self.clone() };
+        let earned = self.state.earned + self.discounted * reward.unwrap_or(0.0);
+        let discounted = self.discounted * self.problem.discounted(1);
+        let mut standing = ProblemState { state: EarnedState { values, earned }, discounted, ..self.clone() };
         if let Some(scaled) = seen.values[0] {
             standing.seen.push(scaled);
             standing.known.push(scaled);

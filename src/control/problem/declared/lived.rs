@@ -44,8 +44,8 @@ impl Declared {
         Ok(actions)
     }
 
-    /// Returns the state after a period with these actions and a noise in the unit of the solver, and what the period
-    /// earned.
+    /// Returns the values of the states after a period with these actions and a noise in the unit of the solver, and
+    /// what the period earned.
     ///
     /// # Errors
     /// A state leaves its range, or what is earned is no number.
@@ -55,7 +55,7 @@ impl Declared {
         state: &EarnedState,
         actions: &[f64],
         scaled: f64,
-    ) -> Result<(EarnedState, f64), FieldError> {
+    ) -> Result<(Vec<f64>, f64), FieldError> {
         let problem = self.afresh();
         let moved = (actions, problem.noise(scaled));
         let (values, reward) = problem.period(step, state, moved);
@@ -64,7 +64,7 @@ impl Declared {
             return Err(fault.clone());
         }
         match reward.is_finite() {
-            true => Ok((next, reward)),
+            true => Ok((next.values, reward)),
             false => Err(FieldError::new("problem.reward", reward, "must be a number")),
         }
     }
