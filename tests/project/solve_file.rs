@@ -30,6 +30,26 @@ fn the_page_shows_the_example_and_its_answer() {
 }
 
 #[test]
+fn the_page_of_templates_shows_what_each_answers() {
+    let page = read("docs/templates.md");
+    let shown: Vec<(&str, &str)> = page
+        .split("`cargo run --release -- solve ")
+        .skip(1)
+        .map(|part| {
+            let (file, rest) = part.split_once('`').unwrap();
+            (file, rest.split("```text\n").nth(1).unwrap().split("```").next().unwrap())
+        })
+        .collect();
+    let folder = format!("{}/examples/problems", env!("CARGO_MANIFEST_DIR"));
+    assert_eq!(shown.len(), fs::read_dir(folder).unwrap().count(), "a section for each file");
+    for (file, expected) in shown {
+        let answered = solve(&[file]);
+        assert!(answered.status.success(), "{file}: {}", String::from_utf8_lossy(&answered.stderr));
+        assert_eq!(String::from_utf8(answered.stdout).unwrap(), expected, "{file}");
+    }
+}
+
+#[test]
 fn a_fault_of_the_file_names_the_field() {
     let page = read("docs/declared.md");
     let folder = tempfile::tempdir().unwrap();

@@ -54,6 +54,7 @@ const PARTS: &[(&str, &[GuidePage])] = documents! {
         "backtest" "Run a walk-forward" "docs/backtest.md",
         "evaluation" "Evaluate a policy" "docs/evaluation.md",
         "declared" "Solve a problem of your own" "docs/declared.md",
+        "templates" "Start from one of eight problems" "docs/templates.md",
         "python" "Use it from Python" "clients/python/README.md",
         "keys" "Give out keys" "docs/keys.md",
         "operating" "Operate it" "docs/operating.md",
