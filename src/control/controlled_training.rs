@@ -128,7 +128,8 @@ impl<'a, P: Controlled> ControlledTraining<'a, P> {
     ) -> Result<StepSolution, TrainError> {
         let ControlledTraining { problem, start, specification, laws, selection, history, law, far, names } = self;
         let next = after.map(|after| ControlledValue::of(specification, after));
-        let bellman = ControlledStep { problem: *problem, laws, selection, step, next: next.as_ref() };
+        let bellman =
+            ControlledStep { problem: *problem, laws, selection, step, next: next.as_ref(), radius_scale: 1.0 };
         let states = SimulatedStates { bellman, specification, start, history, law, far: *far };
         if names.is_empty() {
             let only = states.solve(0, states.features_at(0))?;
@@ -229,7 +230,7 @@ impl ControlledPolicy {
     /// below the horizon.
     pub fn step<'a, P: Controlled>(&'a self, problem: &'a P, step: usize) -> ControlledStep<'a, P> {
         let ControlledPolicy { laws, selection, values } = self;
-        ControlledStep { problem, laws, selection, step, next: values.get(step) }
+        ControlledStep { problem, laws, selection, step, next: values.get(step), radius_scale: 1.0 }
     }
 }
 

@@ -9,8 +9,10 @@ use crate::returns::MOST_BYTES;
 use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
 use crate::service::advice::decide::Decide;
+use crate::service::advice::policy_map::{InputRange, MOST_RANGES, VALUES};
 use crate::service::advice::returns::ReadReturns;
-use crate::service::advice::what_if::{POINTS, SweepRange, WhatIf};
+use crate::service::advice::sweep::{POINTS, SweepRange};
+use crate::service::advice::what_if::WhatIf;
 use crate::service::entries::report::{
     Correct, END_PRICE, LONGEST_REASON, MOST_CORRECTIONS, Observe, PRICE, REPORTED_RETURN, Report,
 };
@@ -113,7 +115,12 @@ impl Bounded for Decide {
         ("policy", GIVEN),
         ("period", ValueBounds::count(&HORIZON)),
         ("noises", ValueBounds::List(0, *HORIZON.end() - 1, &ValueBounds::Any)),
+        ("across", ValueBounds::List(0, MOST_RANGES, &ValueBounds::Any)),
     ];
+}
+
+impl Bounded for InputRange {
+    const BOUNDS: &'static [FieldBounds] = &[("points", ValueBounds::count(&VALUES))];
 }
 
 impl Bounded for ReadReturns {

@@ -128,6 +128,30 @@ test("it says what to do in the first period and in the second, and nothing old 
   await decided({ period: 3, state: { stock: 7.5 }, noises: [18.5, 22] });
 });
 
+test("it is drawn as a map, of one input and of two", async () => {
+  await visit(`#/policies/${policy}`);
+  const drawn = page.waitForResponse(/\/decide$/);
+  await press("Draw");
+  const { across, points } = await (await drawn).json();
+  assert.deepEqual([across.map(({ input }) => input), points.length], [["stock", "demand"], 169]);
+  const map = page.getByRole("application");
+  await map.waitFor();
+  await map.press("ArrowLeft");
+  const told = plain(await page.locator("#policy-map output").innerText());
+  // The cell beside the middle: the stock is 25, the demand 20 each time.
+  const place = 5 * 13 + 6;
+  assert.ok(Math.abs(Number(told.split("order ")[1]) - points[place].actions.order) < 1e-3 * Math.max(1, points[place].actions.order), `${told} for ${points[place].actions.order}`);
+  assert.ok(told.startsWith("stock 25, demand 20:"), told);
+  await page.getByLabel("Upward").selectOption("");
+  assert.equal(await page.locator("#policy-map").innerText(), "");
+  await page.getByLabel("What is drawn").selectOption("");
+  await press("Draw");
+  await page.getByRole("slider", { name: /^Worth of this period/ }).waitFor();
+  await page.locator("#f-map-period").fill("4");
+  await press("Draw");
+  await page.getByText("In period is 4").waitFor();
+});
+
 test("it is compared with a rule, whose formula is refused with its column", async () => {
   await visit(`#/policies/${policy}`);
   const rule = page.getByLabel("order", { exact: true });
@@ -242,6 +266,16 @@ test("a session lives it: opened at a state, reported, corrected, and ended", as
   const first = await asked();
   assert.ok(Math.abs((await order()) - first.actions.order) < 1e-3 * first.actions.order);
   assert.doesNotMatch(await main(), /undefined|NaN|null|\bbank\b|wealth/i);
+  // More caution and each demand that may come are solved when they are asked for, and record nothing.
+  const swept = page.waitForResponse(/\/what-if$/);
+  await page.getByText("With more or less caution").click();
+  const { points } = await (await swept).json();
+  assert.deepEqual([points.length, points[10].actions.order], [21, first.actions.order]);
+  await page.getByRole("slider", { name: "Worth under the worst law" }).waitFor();
+  await page.getByText("After each demand that may come").click();
+  await page.waitForResponse(/\/what-if$/);
+  await page.getByRole("slider", { name: "order", exact: true }).nth(1).waitFor();
+  assert.equal((await call(ballast.url, `/sessions/${session}`)).period, 1);
   // Nothing is recorded that is blank or beyond its support.
   await press("Report period 1");
   assert.match(await refused(), /^demand is blank/);

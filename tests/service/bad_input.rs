@@ -748,6 +748,8 @@ fn the_walks_cover_every_field() {
     let mut walked: BTreeSet<String> =
         faulty_hypotheses().iter().flat_map(|(_, field)| field.split('.').map(str::to_owned)).collect();
     walked.insert("session".into());
+    // Those of declared problems are walked in `tests/service/declared_sessions.rs`.
+    walked.extend(["state", "noise"].map(str::to_owned));
     // Those of several assets are walked in `tests/service/funds.rs`.
     let of_several = ["holdings", "log_returns", "simple_returns", "prices", "previous_prices"];
     walked.extend(of_several.map(str::to_owned));

@@ -10,6 +10,55 @@ use crate::support::{App, read, specification};
 
 over_either_store![a_trained_declaration_decides_as_the_command_does, a_restart_resumes_to_the_same_policy];
 
+/// A map has the decisions at the points of its ranges.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_map_decides_at_every_point() {
+    let mut app = App::start().await;
+    app.train(&stock(3)).await;
+    let range = |input: &str, from: f64, to: f64, points: usize| json!({ "input": input, "from": from, "to": to, "points": points });
+    let number = |value: &Value| value.as_f64().unwrap();
+    let one = json!({ "period": 2, "noises": [20.0], "across": [range("stock", 0.0, 60.0, 4)] });
+    let (status, map) = decide(&app, one).await;
+    assert_eq!((status, &map["across"][0]["values"]), (StatusCode::OK, &json!([0.0, 20.0, 40.0, 60.0])), "{map}");
+    let both = json!({ "period": 3, "state": { "stock": 1.0 }, "across": [range("demand", 0.0, 40.0, 3), range("stock", 0.0, 60.0, 4)] });
+    let (status, wide) = decide(&app, both).await;
+    assert_eq!(status, 200, "{wide}");
+    assert_eq!((map["points"].as_array().unwrap().len(), wide["points"].as_array().unwrap().len()), (4, 12));
+    for (points, place, question) in [
+        (&map, 1, json!({ "period": 2, "state": { "stock": 20.0 }, "noises": [20.0] })),
+        (&wide, 4, json!({ "period": 3, "state": { "stock": 0.0 }, "noises": [20.0, 20.0] })),
+        (&wide, 11, json!({ "period": 3, "state": { "stock": 60.0 }, "noises": [40.0, 40.0] })),
+    ] {
+        let alone = decide(&app, question).await.1;
+        for field in ["actions", "value", "untrained_share"] {
+            assert_eq!(points["points"][place][field], alone[field], "{field} of {place}");
+        }
+    }
+    // More in stock means a smaller order and a larger worth.
+    for pair in map["points"].as_array().unwrap().windows(2) {
+        assert!(number(&pair[0]["actions"]["order"]) >= number(&pair[1]["actions"]["order"]) - 0.2, "{pair:?}");
+        assert!(number(&pair[0]["value"]) < number(&pair[1]["value"]), "{pair:?}");
+    }
+    for (question, field) in [
+        (json!({ "across": [range("stok", 0.0, 60.0, 4)] }), "across[0].input"),
+        (json!({ "across": [range("demand", 0.0, 40.0, 4)] }), "across[0].input"),
+        (json!({ "across": [range("stock", 0.0, 61.0, 4)] }), "across[0].to"),
+        (json!({ "across": [range("stock", 30.0, 30.0, 4)] }), "across[0].to"),
+        (json!({ "across": [range("stock", 0.0, 60.0, 22)] }), "across[0].points"),
+        (json!({ "across": [range("stock", 0.0, 60.0, 2), range("stock", 0.0, 60.0, 2)] }), "across[1].input"),
+        (
+            json!({ "across": [range("stock", 0.0, 60.0, 2), range("stock", 0.0, 60.0, 2), range("stock", 0.0, 60.0, 2)] }),
+            "across",
+        ),
+        (json!({ "period": 2, "across": [range("stock", 0.0, 60.0, 2)] }), "noises"),
+        (json!({ "period": 2, "noises": [20.0], "across": [range("demand", 0.0, 40.0, 2)] }), "noises"),
+        (json!({ "period": 4, "across": [range("stock", 0.0, 60.0, 2)] }), "period"),
+    ] {
+        let (status, problem) = decide(&app, question.clone()).await;
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{question}: {problem}");
+    }
+}
+
 /// The example of the stock, of fewer periods and states.
 pub(crate) fn stock(horizon: usize) -> Value {
     let path = format!("{}/examples/problems/stock.json", env!("CARGO_MANIFEST_DIR"));

@@ -293,6 +293,52 @@ async fn a_renewed_session_decides_by_the_next_policy(mut app: App) {
     assert_eq!(app.delete(&format!("/policies/{second}")).await, StatusCode::CONFLICT);
 }
 
+async fn what_if(app: &App, mut question: Value) -> (StatusCode, Value) {
+    question["session"] = json!(app.session);
+    app.post("/what-if", &question).await
+}
+
+/// A hypothesis is answered as the session would be if it were true, and nothing is recorded.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hypothesis_is_answered_as_if_it_were_true() {
+    let mut app = App::start().await;
+    app.train(&stock(3)).await;
+    app.open_with(json!({ "state": { "stock": 7.0 } })).await;
+    assert_eq!(app.report(1, json!({ "noise": 18.5, "executed": { "order": 12.0 } })).await.0, 200);
+    let (before, advised) = (session(&app).await, action(&app).await);
+    let same = what_if(&app, json!({ "radius_scale": 1.0 })).await.1;
+    for field in ["actions", "value", "radius", "worst_law", "state", "period"] {
+        assert_eq!(same[field], advised[field], "{field}");
+    }
+    let question = json!({ "policy": app.policy, "period": 2, "state": { "stock": 20.0 }, "noises": [18.5] });
+    let decided = app.post("/decide", &question).await.1;
+    let supposed = what_if(&app, json!({ "state": { "stock": 20.0 } })).await.1;
+    assert_eq!((&supposed["actions"], &supposed["value"]), (&decided["actions"], &decided["value"]));
+    // A larger ball has more laws, so what is sure against all of them is less; a scale is the radius itself.
+    let sweep = json!({ "sweep": { "radius_scale": { "from": 0.0, "to": 2.0, "points": 9 } } });
+    let points = what_if(&app, sweep).await.1["points"].as_array().unwrap().clone();
+    assert_eq!(points.len(), 9);
+    for (index, pair) in points.windows(2).enumerate() {
+        let [less, more] = [&pair[0], &pair[1]].map(|point| number(&point["value"]));
+        assert!(more <= less + 1e-6 * less.abs(), "{less} and {more} at {index}");
+        let expected = 0.25 * (index + 1) as f64 * number(&advised["radius"]);
+        assert!((number(&pair[1]["radius"]) - expected).abs() < 1e-12, "{}", pair[1]);
+    }
+    assert!(number(&points[8]["value"]) < number(&points[0]["value"]) - 1.0);
+    // After a noise, the advice is that of the session once it has come.
+    let supposed = what_if(&app, json!({ "noise": 22.0 })).await.1;
+    let swept = what_if(&app, json!({ "sweep": { "noise": { "from": 10.0, "to": 22.0, "points": 3 } } })).await.1;
+    assert_eq!((&swept["points"][2]["actions"], &swept["points"][1]["noise"]), (&supposed["actions"], &json!(16.0)));
+    assert_eq!(session(&app).await, before);
+    assert_eq!(app.report(2, json!({ "noise": 22.0 })).await.0, 200);
+    let came = action(&app).await;
+    for field in ["actions", "value", "radius", "worst_law", "state", "period"] {
+        assert_eq!(supposed[field], came[field], "{field}");
+    }
+    let (status, problem) = what_if(&app, json!({ "noise": 22.0 })).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("noise")), "{problem}");
+}
+
 /// A session that renews itself goes on by policies trained on what it saw, from the states that it had.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_renews_itself() {
@@ -300,6 +346,7 @@ async fn a_session_renews_itself() {
     app.train(&stock(3)).await;
     app.open_with(json!({ "state": { "stock": 7.0 }, "renew": { "every": 2, "window": 6 } })).await;
     let mut noises = vec![11.6, 19.0, 22.3, 21.1, 18.7];
+    assert_eq!(action(&app).await["caution"], json!([]));
     for renewal in 1..=2 {
         for period in [2 * renewal - 1, 2 * renewal] {
             let noise = 17.3 + period as f64;
@@ -368,8 +415,21 @@ async fn what_is_wrong_is_named() {
     let query = format!("/action?session={}&sensitivity=true", app.session);
     let (status, problem) = app.get(&query).await;
     assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("sensitivity")), "{problem}");
-    let (status, problem) = app.post("/what-if", &json!({ "session": app.session, "radius_scale": 0.5 })).await;
-    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("session")), "{problem}");
+    for (question, field) in [
+        (json!({ "wealth": 100.0 }), "wealth"),
+        (json!({ "radius": 0.1 }), "radius"),
+        (json!({ "holdings": { "a": 0.1 } }), "holdings"),
+        (json!({ "sweep": { "holding": { "from": 0.0, "to": 1.0, "points": 3 } } }), "sweep.holding"),
+        (json!({ "sweep": {} }), "sweep"),
+        (json!({ "radius_scale": 1.0, "sweep": { "radius_scale": { "from": 0, "to": 1, "points": 3 } } }), "sweep"),
+        (json!({ "sweep": { "noise": { "from": 0.0, "to": 40.0, "points": 102 } } }), "sweep.noise.points"),
+        (json!({ "radius_scale": -0.5 }), "radius_scale"),
+        (json!({ "noise": 41.0 }), "noise"),
+        (json!({ "state": { "stock": 61.0 } }), "state.stock"),
+    ] {
+        let (status, problem) = what_if(&app, question.clone()).await;
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{question}: {problem}");
+    }
     for (field, value) in [("window", json!(5)), ("records", json!({ "a": [0.1, 0.2] })), ("leaving", json!(["a"]))] {
         let mut renewal = json!({ "renewal": 1, "policy": app.policy });
         renewal[field] = value;

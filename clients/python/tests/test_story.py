@@ -129,6 +129,8 @@ def test_a_session_of_a_declared_problem(ballast: Ballast) -> None:
     with pytest.raises(package.InvalidField) as refusal:
         session.observe(noise=41.0)
     assert refusal.value.field == "noise" and session.period == 3
+    supposed = cast(dict[str, Any], session.what_if(state={"stock": 1.5}, radius_scale=1.0))
+    assert supposed["actions"] == session.actions()["actions"]
     assert session.observe(noise=20.0).completed
     with pytest.raises(package.SessionCompleted):
         session.actions()

@@ -45,6 +45,8 @@ pub struct ControlledStep<'a, P> {
     pub step: usize,
     /// The value of the step after; `None` at the horizon.
     pub next: Option<&'a ControlledValue>,
+    /// Factor on the radius of this step's ball; 1 but for questions.
+    pub radius_scale: f64,
 }
 
 /// The solution of a controlled problem's robust step at one state.
@@ -113,7 +115,10 @@ impl<P: Controlled> ControlledStep<'_, P> {
     fn at<'a>(&'a self, state: &'a P::State, law: &'a EmpiricalDistribution) -> ControlledState<'a, P> {
         let baseline = self.problem.baseline(self.step, state);
         let choices = ActionChoices::of(self.problem.actions(self.step, state));
-        let set = self.laws.uncertainty_set(law);
+        let set = match self.radius_scale {
+            1.0 => self.laws.uncertainty_set(law),
+            scale => Cow::Owned(self.laws.uncertainty_set_within(law, scale * self.laws.radius(law))),
+        };
         let described = match self.next {
             Some(_) => self.problem.describe(self.step, state).len(),
             None => 0,

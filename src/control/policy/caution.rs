@@ -72,10 +72,10 @@ impl Caution {
     pub fn waiting(period: usize, horizon: usize) -> Self {
         let sentence = match period > horizon {
             true => format!(
-                "The next policy is not trained yet, and the last one ended with period {horizon}. Its last step, which looks one period ahead, gives this advice from all returns reported so far."
+                "The next policy is not trained yet, and the last one ended with period {horizon}. Its last step, which looks one period ahead, gives this advice from all that was reported so far."
             ),
             false => format!(
-                "The next policy is not trained yet. The one before it, which lasts to period {horizon}, gives this advice from all returns reported so far."
+                "The next policy is not trained yet. The one before it, which lasts to period {horizon}, gives this advice from all that was reported so far."
             ),
         };
         Caution { code: CautionCode::Waiting, sentence }

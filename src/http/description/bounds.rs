@@ -31,8 +31,10 @@ use crate::control::request::support::Support;
 use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
 use crate::service::advice::decide::Decide;
+use crate::service::advice::policy_map::InputRange;
 use crate::service::advice::returns::ReadReturns;
-use crate::service::advice::what_if::{SweepRange, WhatIf};
+use crate::service::advice::sweep::SweepRange;
+use crate::service::advice::what_if::WhatIf;
 use crate::service::entries::report::{Correct, Observe, Report};
 use crate::service::field_bounds::LISTED_REPORTS;
 use crate::service::sessions::opening::SessionStart;
@@ -87,6 +89,7 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<DeclaredDesign>(),
         of::<DeclaredComparison>(),
         of::<Decide>(),
+        of::<InputRange>(),
         of::<WhatIf>(),
         of::<SweepRange>(),
         of::<Report>(),

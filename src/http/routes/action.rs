@@ -30,6 +30,8 @@ pub struct DeclaredAdvice {
     pub state: BTreeMap<String, f64>,
     #[serde(flatten)]
     pub decided: Decided,
+    /// Points to know before you follow the advice.
+    pub caution: Vec<Caution>,
 }
 
 /// The robust allocation of one asset for the coming period.
@@ -70,7 +72,8 @@ impl ActionAnswer {
             AdviceKind::Account(account) => *account,
             AdviceKind::Declared(decided, state) => {
                 let decided = Decided { period, ..*decided };
-                return ActionAnswer::Declared(Box::new(DeclaredAdvice { session, state, decided }));
+                let caution = waiting.map(|horizon| Caution::waiting(period, horizon)).into_iter().collect();
+                return ActionAnswer::Declared(Box::new(DeclaredAdvice { session, state, decided, caution }));
             }
         };
         let mut caution = cautions(&advice, sensitivity.as_ref());

@@ -11,7 +11,7 @@ use crate::http::gate::bodies;
 use crate::http::gate::extract::JsonBody;
 use crate::http::problem::ProblemDocument;
 use crate::service::Service;
-use crate::service::advice::decide::{Decide, DecideAnswer};
+use crate::service::advice::decide::{Decide, DecideReply};
 use crate::service::metrics::ACTION_SECONDS;
 
 /// Returns the actions of a declared problem at a state, with their worst law. They are solved, and nothing is stored.
@@ -21,7 +21,7 @@ use crate::service::metrics::ACTION_SECONDS;
         "period": 2, "state": { "stock": 7.0 }, "noises": [18.0]
     })),
     responses(
-        (status = 200, description = "The actions and their worst law.", body = DecideAnswer),
+        (status = 200, description = "The actions and their worst law, or the actions over ranges of inputs.", body = DecideReply),
         (status = 404, description = "There is no such policy.", body = ProblemDocument, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn decide(

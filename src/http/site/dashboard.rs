@@ -87,6 +87,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "picture.js": SCRIPT,
         "policies.js": SCRIPT,
         "policy.js": SCRIPT,
+        "policy_map.js": SCRIPT,
         "problem_words.js": SCRIPT,
         "renewal_due.js": SCRIPT,
         "renewing.js": SCRIPT,

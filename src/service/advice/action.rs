@@ -92,7 +92,7 @@ impl Sessions {
         let (period, waiting) = (live.observed + 1, live.is_due().then(|| live.horizon()));
         let AdviceOptions { mode, explain, sensitivity } = question;
         let is_current = mode == AdviceMode::Surrogate && !explain && !sensitivity;
-        if let (true, Some(advice)) = (is_current, &live.advice) {
+        if let (true, 0, Some(advice)) = (is_current, live.standing.law_shown(), &live.advice) {
             return Ok(Large::from(PeriodAdvice::current(live, advice)?));
         }
         let means = self.means(tenant, live, turn).await?;

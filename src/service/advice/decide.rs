@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::control::policy::declared::Decided;
 use crate::control::request::by_name::distinct_if_given;
 use crate::service::advice::explain::ATOM_BYTES;
+use crate::service::advice::policy_map::{InputRange, MapQuestion, PolicyMap};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
@@ -32,6 +33,11 @@ pub struct Decide {
     #[serde(default)]
     #[schema(example = json!([18.0]))]
     pub noises: Vec<f64>,
+    /// Ranges of one or two inputs: decides at all of their values instead. An input is a state, or the noise, which then
+    /// was the same in every period before this one. Default: none.
+    #[serde(default)]
+    #[schema(example = json!([]))]
+    pub across: Vec<InputRange>,
 }
 
 fn first() -> usize {
@@ -46,21 +52,34 @@ pub struct DecideAnswer {
     pub decided: Decided,
 }
 
+/// The answer to a decision: at a state, or over ranges of inputs.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum DecideReply {
+    One(Box<DecideAnswer>),
+    Map(Box<PolicyMap>),
+}
+
 impl Sessions {
     /// Decides a period at a state. The robust step is solved against the value that was trained for the step after.
     ///
     /// # Errors
     /// There is no such policy, a field breaks a rule, actions lead the state out of its range, or too much work waits
     /// already.
-    pub async fn decide(&self, tenant: &Tenant, question: Decide) -> Result<Large<DecideAnswer>, ServiceError> {
-        let Decide { policy, period, state, noises } = question;
+    pub async fn decide(&self, tenant: &Tenant, question: Decide) -> Result<Large<DecideReply>, ServiceError> {
+        let Decide { policy, period, state, noises, across } = question;
         let advisor = self.policies.decider(tenant, &policy).await?;
+        if !across.is_empty() {
+            let map = MapQuestion::new(advisor.clone(), period, (state, noises), across)?;
+            let columns = self.map_columns(tenant, &map).await?;
+            return Ok(Large::from(DecideReply::Map(map.answer(policy, columns).into())));
+        }
         let problem = &advisor.specification().problem;
         // Noises beyond the horizon are refused.
         let returns = problem.history.len() + problem.horizon;
         let solve = move || advisor.decide(period, state.as_ref(), &noises);
         let room = self.memory.answers(returns * ATOM_BYTES).await?;
         let decided = self.resolving.run_on_record(tenant, returns, solve).await?.map_err(of_state)?;
-        Ok(Large { value: DecideAnswer { policy, decided }, room })
+        Ok(Large { value: DecideReply::One(DecideAnswer { policy, decided }.into()), room })
     }
 }

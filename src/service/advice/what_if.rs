@@ -5,23 +5,22 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::AdviceMode;
-use crate::control::policy::what_if::{Hypothesis, HypotheticalRadius, WhatIfResult};
+use crate::control::policy::what_if::{Hypothesis, WhatIfResult};
 use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::control::request::by_name::distinct_if_given;
 use crate::service::advice::explain::{self, ATOM_BYTES, Explain};
+use crate::service::advice::sweep::Sweep;
 use crate::service::advice::what_if_assets::{AssetsWhatIfPoint, WhatIfScenario};
-use crate::service::entries::report::{OF_ONE, OF_SEVERAL, Report, log_return_of, none_of};
+use crate::service::advice::what_if_problem::ProblemWhatIfPoint;
+use crate::service::entries::report::{OF_DECLARED, none_of};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
 use crate::service::sessions::live::LiveSession;
+use crate::service::sessions::session_state::SessionState;
 use crate::store::Tenant;
-
-/// Number of points of a sweep; each waits for its own permit among the robust steps that requests cause.
-pub const POINTS: std::ops::RangeInclusive<usize> = 2..=101;
 
 /// A hypothesis about a session. Fields left out stay as they are.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]
@@ -58,35 +57,17 @@ pub struct WhatIf {
     /// Prices of several assets at its start. Default: those reported for the period before.
     #[serde(default, deserialize_with = "distinct_if_given")]
     pub previous_prices: Option<BTreeMap<String, Option<f64>>>,
+    /// States of a declared problem now, each by its name.
+    #[serde(default, deserialize_with = "distinct_if_given")]
+    #[schema(example = json!({ "stock": 7.0 }))]
+    pub state: Option<BTreeMap<String, f64>>,
+    /// Noise of a declared problem's coming period, in which the advised actions are executed; the advice is for the
+    /// period after.
+    pub noise: Option<f64>,
     /// `worst_case`: solve the step, and show the whole worst-case law.
     pub explain: Option<Explain>,
     /// A range for one of the fields above; every point is solved.
     pub sweep: Option<Sweep>,
-}
-
-/// The swept range, exactly one.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Sweep {
-    pub wealth: Option<SweepRange>,
-    pub holding: Option<SweepRange>,
-    pub radius_scale: Option<SweepRange>,
-    pub radius: Option<SweepRange>,
-    pub log_return: Option<SweepRange>,
-    pub simple_return: Option<SweepRange>,
-}
-
-/// Evenly spaced values, including both ends.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SweepRange {
-    #[schema(example = 0.0)]
-    pub from: f64,
-    #[schema(example = 2.0)]
-    pub to: f64,
-    /// 2 to 101.
-    #[schema(example = 21)]
-    pub points: usize,
 }
 
 /// The advice under one hypothesis.
@@ -138,126 +119,16 @@ pub enum WhatIfAnswer {
         session: String,
         points: Vec<AssetsWhatIfPoint>,
     },
-}
-
-impl SweepRange {
-    fn values(&self, field: &str) -> Result<Vec<f64>, FieldError> {
-        if !POINTS.contains(&self.points) {
-            let rule = format!("must lie in [{}, {}]", POINTS.start(), POINTS.end());
-            return Err(FieldError::new(format!("sweep.{field}.points"), self.points, rule));
-        }
-        let last = self.points - 1;
-        // Both ends are exact.
-        let at = |index| {
-            if index == last { self.to } else { self.from + (self.to - self.from) * index as f64 / last as f64 }
-        };
-        Ok((0..self.points).map(at).collect())
-    }
-}
-
-impl WhatIf {
-    fn hypothesis(&self) -> Result<Hypothesis, FieldError> {
-        let log_return = match (self.log_return, self.simple_return) {
-            (Some(_), Some(value)) => {
-                return Err(FieldError::new("simple_return", value, "must be absent if log_return is given"));
-            }
-            (None, Some(value)) => Some(log_return_of("simple_return", value)?),
-            (log_return, None) => log_return,
-        };
-        let radius = match (self.radius_scale, self.radius) {
-            (Some(_), Some(value)) => {
-                return Err(FieldError::new("radius", value, "must be absent if radius_scale is given"));
-            }
-            (Some(scale), None) => Some(HypotheticalRadius::Scaled(scale)),
-            (None, radius) => radius.map(HypotheticalRadius::Fixed),
-        };
-        let hypothesis = Hypothesis { wealth: self.wealth, holding: self.holding, log_return, radius };
-        hypothesis.check()?;
-        Ok(hypothesis)
-    }
-
-    /// Returns every hypothesis of the request in order. Checking the ends of the ranges covers all values between.
-    fn hypotheses(&self) -> Result<Vec<Hypothesis>, FieldError> {
-        let Some(sweep) = &self.sweep else { return Ok(vec![self.hypothesis()?]) };
-        type Field = fn(&mut WhatIf) -> &mut Option<f64>;
-        let fields: [(&str, Option<SweepRange>, Field); 6] = [
-            ("wealth", sweep.wealth, |request| &mut request.wealth),
-            ("holding", sweep.holding, |request| &mut request.holding),
-            ("radius_scale", sweep.radius_scale, |request| &mut request.radius_scale),
-            ("radius", sweep.radius, |request| &mut request.radius),
-            ("log_return", sweep.log_return, |request| &mut request.log_return),
-            ("simple_return", sweep.simple_return, |request| &mut request.simple_return),
-        ];
-        let given: Vec<_> = fields.iter().filter_map(|(name, range, field)| Some((*name, (*range)?, *field))).collect();
-        let [(name, range, field)] = given[..] else {
-            return Err(FieldError::new("sweep", format!("{} ranges", given.len()), "must hold exactly one range"));
-        };
-        let mut point = self.clone();
-        if let Some(value) = *field(&mut point) {
-            return Err(FieldError::new(name, value, format!("must be absent if sweep.{name} is given")));
-        }
-        let mut at = |value: f64| {
-            *field(&mut point) = Some(value);
-            point.hypothesis()
-        };
-        // Rules are intervals: if both ends keep them, all values between do.
-        for (end, value) in [("from", range.from), ("to", range.to)] {
-            at(value).map_err(|error| match error.field == name {
-                true => FieldError { field: format!("sweep.{name}.{end}"), ..error },
-                false => error,
-            })?;
-        }
-        range.values(name)?.into_iter().map(at).collect()
-    }
-
-    /// Rejects fields that do not fit a session of one asset or of several.
-    fn fits(&self, several: bool) -> Result<(), FieldError> {
-        let sweep = self.sweep.clone().unwrap_or_default();
-        if several {
-            let of_one = [
-                ("holding", self.holding.is_some()),
-                ("log_return", self.log_return.is_some()),
-                ("simple_return", self.simple_return.is_some()),
-                ("sweep.holding", sweep.holding.is_some()),
-                ("sweep.log_return", sweep.log_return.is_some()),
-                ("sweep.simple_return", sweep.simple_return.is_some()),
-            ];
-            return none_of(&of_one, OF_ONE);
-        }
-        let returns = self.report().map(|(field, _)| (field, true));
-        let of_several: Vec<_> = [("holdings", self.holdings.is_some())].into_iter().chain(returns).collect();
-        none_of(&of_several, OF_SEVERAL)
-    }
-
-    /// Returns the hypothetical report of several assets for the coming period, and the field that gives it.
-    fn report(&self) -> Option<(&'static str, Report)> {
-        let WhatIf { log_returns, simple_returns, prices, previous_prices, .. } = self.clone();
-        let field = match (&log_returns, &simple_returns, &prices, &previous_prices) {
-            (Some(_), ..) => "log_returns",
-            (None, Some(_), ..) => "simple_returns",
-            (None, None, Some(_), _) => "prices",
-            (None, None, None, Some(_)) => "previous_prices",
-            _ => return None,
-        };
-        Some((field, Report { log_returns, simple_returns, prices, previous_prices, ..Report::default() }))
-    }
-
-    fn mode(&self) -> AdviceMode {
-        let solves = self.sweep.is_some() || self.explain.is_some();
-        if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate }
-    }
-
-    /// Renames the field of an error about the hypothetical return to the one that the request used.
-    fn renamed(&self, error: FieldError) -> FieldError {
-        let sweep = self.sweep.clone().unwrap_or_default();
-        let given = match error.field.as_str() {
-            "log_return" if sweep.log_return.is_some() => "sweep.log_return",
-            "log_return" if sweep.simple_return.is_some() => "sweep.simple_return",
-            "log_return" if self.simple_return.is_some() => "simple_return",
-            _ => return error,
-        };
-        FieldError { field: given.into(), ..error }
-    }
+    /// One point for a declared problem.
+    OneOfProblem {
+        session: String,
+        #[serde(flatten)]
+        point: Box<ProblemWhatIfPoint>,
+    },
+    SweepOfProblem {
+        session: String,
+        points: Vec<ProblemWhatIfPoint>,
+    },
 }
 
 impl Sessions {
@@ -268,10 +139,25 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule, there is no such session, it has reached its horizon, or too much work waits already.
     pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<Large<WhatIfAnswer>, ServiceError> {
-        let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
         live.check_active()?;
-        let account = live.standing.account()?;
+        let account = match &live.standing {
+            SessionState::Account(account) => account,
+            SessionState::Declared(state) => {
+                let question = (request.state.as_ref(), request.of_problem()?);
+                let Large { value: mut points, room } = self.what_if_problem(tenant, &live, state, question).await?;
+                let session = request.session;
+                let value = match (request.sweep, points.pop()) {
+                    (None, Some(point)) => WhatIfAnswer::OneOfProblem { session, point: Box::new(point) },
+                    (_, last) => {
+                        WhatIfAnswer::SweepOfProblem { session, points: points.into_iter().chain(last).collect() }
+                    }
+                };
+                return Ok(Large { value, room });
+            }
+        };
+        none_of(&request.of_declared(), OF_DECLARED)?;
+        let hypotheses = request.hypotheses()?;
         let explained = explain::atoms(request.explain, hypotheses.len(), account.state.law.sample_size())?;
         let assets = account.assets.as_ref().map_or(1, |assets| assets.names.len());
         let room = self.memory.answers(explained * assets * ATOM_BYTES).await?;

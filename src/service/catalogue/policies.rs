@@ -89,8 +89,7 @@ impl Policies {
         match &*self.prepared(tenant, policy).await? {
             PreparedPolicy::Investor(advisor) => Ok(advisor.clone()),
             PreparedPolicy::Declared(_) => {
-                let rule =
-                    "must be of an investor's problem; this one is of a declared problem, for which POST /decide is";
+                let rule = "must be of an investor's problem; this one is of a declared problem";
                 Err(FieldError::new("policy", policy, rule).into())
             }
         }
@@ -104,7 +103,7 @@ impl Policies {
         match &*self.prepared(tenant, policy).await? {
             PreparedPolicy::Declared(advisor) => Ok(advisor.clone()),
             PreparedPolicy::Investor(_) => {
-                let rule = "must be of a declared problem; this one is of an investor, for whom a session is";
+                let rule = "must be of a declared problem; this one is of an investor";
                 Err(FieldError::new("policy", policy, rule).into())
             }
         }

@@ -108,7 +108,7 @@ impl AdviceContext<'_> {
             AdvisedState::Declared(state, advisor) => {
                 self.begin().await?;
                 let (advisor, state, seen) = (advisor.clone(), state.state.clone(), state.seen.clone());
-                let solve = move || advisor.advise(step, &state, &seen);
+                let solve = move || advisor.advise(step, &state, &seen, 1.0);
                 Ok(CurrentAdvice::Declared(self.resolving.run(tenant, solve).await?.map_err(of_state)?))
             }
         }

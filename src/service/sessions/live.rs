@@ -67,7 +67,7 @@ impl LiveSession {
     }
 
     pub(in crate::service) fn bytes(&self) -> usize {
-        SESSION_BYTES + RETURN_BYTES * self.standing.noises() + self.standing.text_bytes()
+        SESSION_BYTES + RETURN_BYTES * self.standing.noises() + self.standing.other_bytes()
     }
 
     /// Checks that the session may report another period.

@@ -23,6 +23,8 @@ use crate::store::SessionRow;
 
 /// Bytes of a parsed formula for each byte of its text.
 const PARSED: usize = 16;
+/// Bytes of the worst law that an advice shows, for each noise known: most noises are moved to two others at most.
+const MOVES: usize = 48;
 
 /// The state of a declared problem's session between two periods.
 #[derive(Debug, Clone)]
@@ -88,9 +90,18 @@ impl ProblemState {
         self.known.sample_size()
     }
 
-    /// Returns the bytes of its formulas.
+    /// Returns the bytes of its formulas and of its advice.
     pub(in crate::service) fn bytes(&self) -> usize {
-        PARSED * self.formulas
+        PARSED * self.formulas + MOVES * self.noises()
+    }
+
+    /// Returns the same with other values of the states, read from a field with this name.
+    ///
+    /// # Errors
+    /// They are not values of the states.
+    pub(in crate::service) fn at(&self, field: &str, values: &BTreeMap<String, f64>) -> Result<Self, FieldError> {
+        let supposed = self.problem.state(field, values)?;
+        Ok(ProblemState { state: EarnedState { earned: self.state.earned, ..supposed }, ..self.clone() })
     }
 
     /// Returns the states by name.

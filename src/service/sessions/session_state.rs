@@ -152,8 +152,8 @@ impl SessionState {
         }
     }
 
-    /// Returns the bytes of its names and formulas.
-    pub(in crate::service) fn text_bytes(&self) -> usize {
+    /// Returns the bytes of its names, and of the formulas and the advice of a declared problem.
+    pub(in crate::service) fn other_bytes(&self) -> usize {
         match self {
             SessionState::Account(state) => COPIES_OF_NAMES * state.names().iter().map(String::len).sum::<usize>(),
             SessionState::Declared(state) => state.bytes(),

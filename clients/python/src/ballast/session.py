@@ -300,11 +300,13 @@ class _Session(Labelled):
         radius: float | None = None,
         log_return: float | None = None,
         simple_return: float | None = None,
+        state: Mapping[str, float] | None = None,
+        noise: float | None = None,
         explain: Literal["worst_case"] | None = None,
         sweep: wire.Sweep | None = None,
     ) -> wire.WhatIfAnswer:
         """Returns the advice for a hypothetical wealth, holding, radius or next return, or for a ``sweep`` of one of
-        them. The session does not change.
+        them. For a declared problem these are ``state``, ``radius_scale`` and ``noise``. The session does not change.
         """
         scenario: wire.WhatIf = {
             "session": self.id,
@@ -314,9 +316,12 @@ class _Session(Labelled):
             "radius": radius,
             "log_return": log_return,
             "simple_return": simple_return,
+            "noise": noise,
             "explain": explain,
             "sweep": sweep,
         }
+        if state is not None:
+            scenario["state"] = dict(state)
         return cast(wire.WhatIfAnswer, await self._transport.json("POST", "/what-if", body=scenario))
 
     async def _assets_what_if(

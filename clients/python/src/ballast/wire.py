@@ -410,19 +410,6 @@ class Costs(TypedDict):
     """Mean seconds of one re-solved step; null if there was none."""
 
 
-class Decide(TypedDict):
-    """A state of a declared problem, and what was seen on the way to it."""
-
-    policy: str
-    """The policy."""
-    period: NotRequired[int]
-    """The period to decide, from 1. Default: 1."""
-    state: NotRequired[dict[str, float]]
-    """The states before the period, each by its name. Default in the first period: the declared start."""
-    noises: NotRequired[list[float]]
-    """The noises of all periods before this one, oldest first. Default: none."""
-
-
 class DeclaredAction(TypedDict):
     """An action: any number between two bounds, or one of some values."""
 
@@ -683,6 +670,24 @@ InitialLaws: TypeAlias = Literal["given", "resampled"]
 """Starting point of the design's empirical laws."""
 
 
+InputRange = TypedDict(
+    "InputRange",
+    {
+        "input": str,
+        "from": float,
+        "to": float,
+        "points": int,
+    },
+)
+
+
+class InputValues(TypedDict):
+    """The values of an input."""
+
+    input: str
+    values: list[float]
+
+
 class Interval(TypedDict):
     """A closed interval."""
 
@@ -792,6 +797,19 @@ class LevelsAdvised(TypedDict):
     """
     levels: list[LevelAdvised]
     """The levels, from the boldest to the paper's."""
+
+
+class MapPoint(TypedDict):
+    """The decision at one point of a map."""
+
+    actions: NotRequired[dict[str, float]]
+    """The best actions, by name; null if there are none."""
+    value: NotRequired[float | None]
+    """Worth of this period and those after it, as in a decision at a state."""
+    untrained_share: NotRequired[float | None]
+    """Share of the worst law's outcomes whose worth is a guess, as in a decision at a state."""
+    fault: NotRequired[str | None]
+    """The reason why nothing can be decided here: every action may lead a state out of its range."""
 
 
 class MixtureComponent(TypedDict):
@@ -973,6 +991,18 @@ class PolicyEntry(Labels):
     created_ms: int
     bytes: int
     """Length of the exported document, in bytes."""
+
+
+class PolicyMap(TypedDict):
+    """The actions of a period over ranges of inputs."""
+
+    policy: str
+    period: int
+    """The period decided, from 1."""
+    across: list[InputValues]
+    """The values of each input, in the order of the question."""
+    points: list[MapPoint]
+    """The decisions, those of each value of the first input in the order of the values of the second."""
 
 
 class PolicyPage(TypedDict):
@@ -1899,6 +1929,24 @@ class CoverageAtSize(TypedDict):
     """Share of paths whose ball held the true law."""
 
 
+class Decide(TypedDict):
+    """A state of a declared problem, and what was seen on the way to it."""
+
+    policy: str
+    """The policy."""
+    period: NotRequired[int]
+    """The period to decide, from 1. Default: 1."""
+    state: NotRequired[dict[str, float]]
+    """The states before the period, each by its name. Default in the first period: the declared start."""
+    noises: NotRequired[list[float]]
+    """The noises of all periods before this one, oldest first. Default: none."""
+    across: NotRequired[list[InputRange]]
+    """
+    Ranges of one or two inputs: decides at all of their values instead. An input is a state, or the noise, which then
+    was the same in every period before this one. Default: none.
+    """
+
+
 class Decided(TypedDict):
     """The best actions of a period, their worth, and the law that is worst for them."""
 
@@ -1932,6 +1980,8 @@ class DeclaredAdvice(Decided):
     session: str
     state: dict[str, float]
     """The states before the period, by name."""
+    caution: list[Caution]
+    """Points to know before you follow the advice."""
 
 
 class DeclaredProblem(TypedDict):
@@ -2245,6 +2295,17 @@ class ProblemSpecification(TypedDict):
     """
 
 
+class ProblemWhatIfPoint(Decided):
+    """The advice of a declared problem under one hypothesis."""
+
+    state: dict[str, float]
+    """The states before the period advised, by name."""
+    noise: NotRequired[float | None]
+    """The noise of the hypothesis, if it has one."""
+    radius_scale: NotRequired[float | None]
+    """The factor on the radius in the hypothesis, if it has one."""
+
+
 class ReadReturns(TypedDict):
     """A text with returns, and the choices for reading it."""
 
@@ -2436,6 +2497,7 @@ class Sweep(TypedDict):
 
     holding: NotRequired[SweepRange | None]
     log_return: NotRequired[SweepRange | None]
+    noise: NotRequired[SweepRange | None]
     radius: NotRequired[SweepRange | None]
     radius_scale: NotRequired[SweepRange | None]
     simple_return: NotRequired[SweepRange | None]
@@ -2544,8 +2606,28 @@ class WhatIf(TypedDict):
     """Prices of several assets at the end of the coming period."""
     previous_prices: NotRequired[dict[str, float | None]]
     """Prices of several assets at its start. Default: those reported for the period before."""
+    state: NotRequired[dict[str, float]]
+    """States of a declared problem now, each by its name."""
+    noise: NotRequired[float | None]
+    """
+    Noise of a declared problem's coming period, in which the advised actions are executed; the advice is for the
+    period after.
+    """
     explain: NotRequired[Explain | None]
     sweep: NotRequired[Sweep | None]
+
+
+class WhatIfAnswer5(ProblemWhatIfPoint):
+    """One point for a declared problem."""
+
+    session: str
+
+
+class WhatIfAnswer6(TypedDict):
+    """One point, or the points of a sweep in its order."""
+
+    session: str
+    points: list[ProblemWhatIfPoint]
 
 
 class WorstCase(TypedDict):
@@ -2907,6 +2989,10 @@ class DecideAnswer(Decided):
     """The actions of a period."""
 
     policy: str
+
+
+DecideReply: TypeAlias = DecideAnswer | PolicyMap
+"""The answer to a decision: at a state, or over ranges of inputs."""
 
 
 class DeclaredCorrected(Uncertainty):
@@ -3521,7 +3607,7 @@ class WhatIfAnswer4(TypedDict):
     points: list[AssetsWhatIfPoint]
 
 
-WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2 | WhatIfAnswer3 | WhatIfAnswer4
+WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2 | WhatIfAnswer3 | WhatIfAnswer4 | WhatIfAnswer5 | WhatIfAnswer6
 """One point, or the points of a sweep in its order."""
 
 

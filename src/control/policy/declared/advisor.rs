@@ -119,19 +119,26 @@ impl DeclaredAdvisor {
         let seen =
             noises.iter().enumerate().map(|(index, noise)| problem.checked_noise(&format!("noises[{index}]"), *noise));
         let seen: Vec<f64> = seen.collect::<Result<_, _>>()?;
-        self.advise(step, &state, &seen)
+        self.advise(step, &state, &seen, 1.0)
     }
 
     /// Solves the robust step after `step` periods at a state, with the noises seen since the start in the unit of the
-    /// solver. What was earned before is not counted. Cost: that of [`Self::decide`].
+    /// solver, against a ball with the radius of the law times `radius_scale`. What was earned before is not counted.
+    /// Cost: that of [`Self::decide`].
     ///
     /// # Errors
     /// As [`Self::decide`], but for fields that it alone reads.
-    pub fn advise(&self, step: usize, state: &EarnedState, seen: &[f64]) -> Result<Decided, FieldError> {
+    pub fn advise(
+        &self,
+        step: usize,
+        state: &EarnedState,
+        seen: &[f64],
+        radius_scale: f64,
+    ) -> Result<Decided, FieldError> {
         // A state that leaves its range is a fault of this question alone.
         let problem = self.problem.afresh();
         let state = EarnedState { earned: 0.0, ..state.clone() };
-        let decision = self.decided(&problem, step, &state, &self.law(seen));
+        let decision = self.decided(&problem, step, &state, (&self.law(seen), radius_scale));
         problem.fault().map_or(decision, |fault| Err(fault.clone()))
     }
 
@@ -184,9 +191,9 @@ impl DeclaredAdvisor {
         problem: &Declared,
         step: usize,
         state: &EarnedState,
-        law: &EmpiricalDistribution,
+        (law, radius_scale): (&EmpiricalDistribution, f64),
     ) -> Result<Decided, FieldError> {
-        let bellman = self.controlled.step(problem, step);
+        let bellman = ControlledStep { radius_scale, ..self.controlled.step(problem, step) };
         let (found, worths) = bellman.solve_with_worths(state, law);
         let found = finite(found, problem, step, state)?;
         let names = problem.actions_named();
@@ -197,7 +204,7 @@ impl DeclaredAdvisor {
             actions: names.iter().cloned().zip(found.actions.iter().copied()).collect(),
             several_peaks: (0..names.len()).filter(has_several).map(|place| names[place].clone()).collect(),
             value: found.certainty_equivalent / earned_later,
-            radius: self.controlled.radius(law) * problem.noise_width(),
+            radius: radius_scale * self.controlled.radius(law) * problem.noise_width(),
             worst_law: moves(&found.adversary, problem),
             duality_gap: found.duality_gap / earned_later,
             untrained_share: self.untrained_share(&bellman, (state, law), &found.actions, &found.adversary),

@@ -13,8 +13,8 @@ export const plain = (value) => significant(value, 6);
 /** Says the states of a declared problem. */
 export const statesWords = (states) => Object.entries(states).map(([name, value]) => `${name}: ${plain(value)}`).join(", ");
 
-/** Returns the body of the page of policy `id`. `isCompared` tells whether the service can compare it. */
-export function declaredBody(id, { specification: { problem, design }, warnings }, isCompared) {
+/** Returns the body of the page of policy `id`, with `map`, its map. `isCompared` tells whether the service can compare it. */
+export function declaredBody(id, { specification: { problem, design }, warnings }, isCompared, map) {
   const { horizon, history } = problem;
   const answer = h("div", { id: "decision" });
   return [
@@ -28,6 +28,7 @@ export function declaredBody(id, { specification: { problem, design }, warnings 
     ]),
     section("What to do in a period", deciding(id, problem, answer)),
     answer,
+    map,
     isCompared ? beside(id, problem) : "",
     h("p", {}, h("a", { class: "button quiet", href: `#/sessions/new?policy=${id}`, "data-needs": "operate" }, "Open a session")),
     section("The problem", formulas(problem)),

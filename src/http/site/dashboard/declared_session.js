@@ -1,6 +1,6 @@
 // One session of a declared problem: what to do now, the noise to report, how it went, and how to correct it.
 
-import { get } from "./api.js";
+import { get, post } from "./api.js";
 import { lineChart } from "./chart.js";
 import { csvText } from "./csv.js";
 import { decided, plain, statesWords } from "./declared_policy.js";
@@ -47,6 +47,7 @@ async function fill(holder, shown, notice) {
     notice,
     action === null ? "" : section(`Report ${shown.calendar.inText(session.period)}`, reporting(shown, action.actions ?? null)),
     figures(shown),
+    action?.actions ? section("What if", supposing(shown)) : "",
     first ? "" : course(shown),
     first ? "" : periods(shown),
   );
@@ -108,6 +109,26 @@ function periodFields({ problem: { noise, actions, states } }, within, advised, 
     }),
     trouble: () => (isMissing() || isTyped(seen) ? null : { field: "noise", message: `${noise.name} is blank.` }),
   };
+}
+
+/** Returns what the advice would be with more or less caution, and after each noise that may come, drawn when it is opened. */
+function supposing({ id, session, problem: { actions, noise }, leaving }) {
+  const POINTS = 21;
+  const drawn = (summary, field, [from, to], x, more) =>
+    disclosure(summary, () => {
+      const place = h("div", {}, h("p", { class: "note" }, "Solving\u2026"));
+      post("/what-if", { session: id, sweep: { [field]: { from, to, points: POINTS } } }, leaving).then(({ points }) => {
+        const axis = { ...x, values: points.map((point) => point[field]), domain: [from, to], tick };
+        const chart = (title, of) => lineChart({ title, gutter: 64, height: 150, x: axis, y: { format: plain, tick }, series: [{ name: title, kind: "line", values: points.map(of) }] });
+        place.replaceChildren(...Object.keys(actions).map((name) => chart(name, (point) => point.actions[name])), ...more(chart));
+      }, (error) => leaving.aborted || place.replaceChildren(h("p", { class: "error", role: "alert" }, error.message)));
+      return place;
+    });
+  const times = (value) => `${plain(value)} times the radius`;
+  const caution = drawn("With more or less caution", "radius_scale", [0, 2], { label: "Times the radius", format: times, here: times }, (chart) => [chart("Worth under the worst law", (point) => point.value)]);
+  if (session.period >= session.horizon) return [caution];
+  const came = (value) => `${noise.name} ${plain(value)}`;
+  return [caution, drawn(`After each ${noise.name} that may come, in the period after this one`, "noise", [noise.low, noise.high], { label: noise.name, format: came, here: came }, () => [])];
 }
 
 /** What a report says, and what stands for its period, in words. */

@@ -8,13 +8,14 @@ import { pressed } from "./form.js";
 import { basisPoints, count, figures, moment, percent, percentTick, short } from "./format.js";
 import { labelled, titled } from "./naming.js";
 import { unitOf } from "./periods.js";
+import { policyMap } from "./policy_map.js";
 import { FRAMEWORKS, inPaperWords, inWords, isDeclared, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
 
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics, annualised, warnings } = policy;
-  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, await offers("/evaluate")));
+  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, await offers("/evaluate"), policyMap(id, specification.problem)));
   const { element, told } = answer(specification, diagnostics);
   const body = [
     h(
