@@ -26,11 +26,11 @@ export function declaredBody(id, { specification: { problem, design }, warnings 
       ["Caution", caution(problem)],
       ["States solved in each step", count(design.count)],
     ]),
+    h("p", {}, h("a", { class: "button quiet", href: `#/sessions/new?policy=${id}`, "data-needs": "operate" }, "Open a session")),
     section("What to do in a period", deciding(id, problem, answer)),
     answer,
     map,
     isCompared ? beside(id, problem) : "",
-    h("p", {}, h("a", { class: "button quiet", href: `#/sessions/new?policy=${id}`, "data-needs": "operate" }, "Open a session")),
     section("The problem", formulas(problem)),
     h("p", { class: "again", "data-needs": "train" }, h("a", { href: `#/declare?from=${id}` }, "Clone with one thing changed")),
   ];
