@@ -467,14 +467,68 @@ async fn a_state_that_leaves_its_range_must_be_reported() {
     app.open_with(json!({ "state": { "stock": 60.0 } })).await;
     let (status, problem) = app.action().await;
     assert!(status.is_client_error() && problem["field"] == "state", "{status} {problem}");
-    for report in [json!({ "noise": 1.0 }), json!({ "noise": 1.0, "executed": { "order": 20.0 } })] {
+    let moved = json!({ "noise": 1.0, "executed": { "order": 20.0 } });
+    for (report, field) in [(json!({ "noise": 1.0 }), "executed"), (moved.clone(), "state")] {
         let (status, problem) = app.report(1, report.clone()).await;
-        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("state")), "{report}: {problem}");
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{report}: {problem}");
     }
-    let counted = json!({ "noise": 21.0, "executed": { "order": 0.0 }, "state": { "stock": 30.0 } });
+    // What was earned is known even if the formula of the state leaves its range.
+    let mut counted = moved;
+    counted["state"] = json!({ "stock": 30.0 });
     let (status, observed) = app.report(1, counted).await;
     assert_eq!((status.as_u16(), &observed["advised"]), (200, &Value::Null), "{observed}");
+    assert_eq!((&observed["reward"], &observed["earned"]), (&json!(9.0 - 100.0 - 39.5), &json!(-130.5)), "{observed}");
     app.restart().await;
     assert_eq!(session(&app).await["states"]["stock"], 30.0);
     assert!(action(&app).await["actions"]["order"].is_number());
+}
+
+/// A correction replaces the whole report: without actions, those that were advised count.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_correction_without_actions_counts_the_advised_ones() {
+    let mut app = App::start().await;
+    app.train(&stock(3)).await;
+    app.open().await;
+    let advised = action(&app).await["actions"]["order"].clone();
+    assert_eq!(app.report(1, json!({ "noise": 18.0, "executed": { "order": 10.0 } })).await.0, 200);
+    for (number, executed, expected) in [(1, None, advised.clone()), (2, Some(12.0), json!(12.0)), (3, None, advised)] {
+        let mut correction =
+            json!({ "correction": number, "period": 1, "noise": 10.0, "reason": "it was counted again" });
+        if let Some(order) = executed {
+            correction["executed"] = json!({ "order": order });
+        }
+        let (status, corrected) = app.post(&format!("/sessions/{}/corrections", app.session), &correction).await;
+        assert_eq!(status, 200, "{corrected}");
+        let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
+        assert_eq!(history["observations"][0]["now"]["executed"]["order"], expected, "{number}");
+    }
+}
+
+/// Nothing is recorded that could not be read back, and nothing is advised that could not be done.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_no_number_is_not_recorded() {
+    let mut app = App::start().await;
+    let mut far = stock(4);
+    // No path from the start comes near these states.
+    far["problem"]["states"]["stock"] = json!({ "start": 4, "low": 0, "high": 400 });
+    far["problem"]["reward"] = json!("if(stock > 350, 1.7e308, price*min(stock + order, demand) - cost*order)");
+    far["problem"]["actions"]["order"] = json!({ "low": "if(stock > 300, 5, 0)", "high": "if(stock > 300, 1, 60)" });
+    app.train(&far).await;
+    app.open_with(json!({ "state": { "stock": 320.0 } })).await;
+    let (status, problem) = app.action().await;
+    assert!(status.is_client_error() && problem["rule"].to_string().contains("`low` at most `high`"), "{problem}");
+    app.open_with(json!({ "state": { "stock": 4.0 } })).await;
+    assert_eq!(app.report(1, json!({ "noise": 18.0, "state": { "stock": 360.0 } })).await.0, 200);
+    let enormous = json!({ "missing": true, "executed": { "order": 3.0 }, "state": { "stock": 360.0 } });
+    let (status, problem) = app.report(2, enormous).await;
+    // No action is allowed there.
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("executed.order")), "{problem}");
+    far["problem"]["actions"]["order"] = json!({ "low": "0", "high": "60" });
+    app.train(&far).await;
+    app.open_with(json!({ "state": { "stock": 360.0 } })).await;
+    let report = json!({ "noise": 18.0, "executed": { "order": 0.0 }, "state": { "stock": 360.0 } });
+    assert_eq!(app.report(1, report.clone()).await.0, 200);
+    let (status, problem) = app.report(2, report).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("noise")), "{problem}");
+    assert_eq!(app.get(&format!("/sessions/{}/history", app.session)).await.0, 200);
 }

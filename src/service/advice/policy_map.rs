@@ -62,7 +62,7 @@ pub struct MapPoint {
     pub value: Option<f64>,
     /// Share of the worst law's outcomes whose worth is a guess, as in a decision at a state.
     pub untrained_share: Option<f64>,
-    /// The reason why nothing can be decided here: every action may lead a state out of its range.
+    /// The reason why nothing can be decided here: an action that the solver tries may lead a state out of its range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
 }

@@ -77,10 +77,11 @@ impl Acknowledged {
                     report.executed_allocations.get_or_insert_with(|| assets.advised_allocations.clone());
                 }
             }
-            Acknowledged::Declared(problem) if report.executed.is_none() => {
-                report = report.with_acknowledged(&problem.executed);
+            Acknowledged::Declared(problem) => {
+                if let (None, Some(advised)) = (&report.executed, &problem.advised) {
+                    report = report.with_acknowledged(advised);
+                }
             }
-            Acknowledged::Declared(_) => {}
         }
         report
     }

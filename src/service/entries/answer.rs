@@ -53,12 +53,12 @@ pub struct DeclaredObserved {
     pub period: usize,
     /// Null if it is missing.
     pub noise: Option<f64>,
-    /// The actions advised for the period, by name. Null if none were: from the states before it every action may lead out
-    /// of a range.
+    /// The actions advised for the period, by name. Null if none were: from the states before it an action that the solver
+    /// tries may lead out of a range.
     pub advised: Option<BTreeMap<String, f64>>,
     /// The actions executed in it, by name.
     pub executed: BTreeMap<String, f64>,
-    /// The reward of the period by the problem's formula; null if the noise is missing.
+    /// The reward of the period by the problem's formula; null if the noise is missing or the formula gives no number.
     pub reward: Option<f64>,
     /// Rewards since the start of the session, discounted to it.
     pub earned: f64,

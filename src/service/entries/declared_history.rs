@@ -63,7 +63,7 @@ pub struct DeclaredNow {
     pub noise: Option<f64>,
     /// The actions executed, by name.
     pub executed: BTreeMap<String, f64>,
-    /// The reward of the period by the problem's formula; null if the noise is missing.
+    /// The reward of the period by the problem's formula; null if the noise is missing or the formula gives no number.
     pub reward: Option<f64>,
     /// Rewards since the start of the session, discounted to it.
     pub earned: f64,

@@ -210,10 +210,10 @@ impl Report {
         Report { is_recorded: true, ..Report::default() }
     }
 
-    /// Returns the report of the actions that an answer to it acknowledged, with no check of their bounds: they were
-    /// allowed in the state that was known then.
-    pub(super) fn with_acknowledged(self, executed: &BTreeMap<String, f64>) -> Self {
-        Report { executed: Some(executed.clone()), is_recorded: true, ..self }
+    /// Returns the report of the actions that were advised, with no check of their bounds: they were allowed in the state
+    /// that was known then.
+    pub(super) fn with_acknowledged(self, advised: &BTreeMap<String, f64>) -> Self {
+        Report { executed: Some(advised.clone()), is_recorded: true, ..self }
     }
 
     /// Returns true if its numbers come from the record.

@@ -168,10 +168,11 @@ impl LiveSession {
         (means, today): (&AdviceContext<'_>, Date),
     ) -> Result<(SessionState, ObservationAnswer), ServiceError> {
         self.check_meant(observe, report, today)?;
+        let is_account = self.standing.account().is_ok();
         let advice = match self.current_advice(means).await {
             Ok(advice) => Some(advice.clone()),
             // What was done is a fact even if nothing can be advised.
-            Err(ServiceError::Field(_)) if report.executed.is_some() => None,
+            Err(ServiceError::Field(_)) if !is_account => None,
             Err(error) => return Err(error),
         };
         let advised = match &advice {

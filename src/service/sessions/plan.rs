@@ -131,7 +131,8 @@ pub struct DeclaredRenewed {
     pub period: usize,
     /// The last period that the policy advises.
     pub horizon: usize,
-    /// The problem from here on, without its history.
+    /// The problem from here on as it was declared, but without its history.
+    #[schema(value_type = Object)]
     pub problem: DeclaredProblem,
     /// In the unit of the noise.
     #[serde(flatten)]
@@ -297,15 +298,18 @@ impl PolicyTenure {
     /// What the policy knows up to that period is its own history, whatever was reported.
     pub(in crate::service) fn follows(&self, period: usize, policy: &PreparedPolicy) -> Result<(), FieldError> {
         let known = match policy {
-            _ if period > self.after => return Ok(()),
+            _ if period > self.after || self.after == 0 => return Ok(()),
             PreparedPolicy::Investor(advisor) if !advisor.specification().problem.framework.is_frozen() => {
                 return Ok(());
             }
-            PreparedPolicy::Investor(_) => "the uncertainty set of the static policy is frozen at the returns",
-            PreparedPolicy::Declared(_) => "the policy has a history of its own instead of the noises",
+            PreparedPolicy::Investor(_) => {
+                "the uncertainty set of the static policy is frozen at the returns up to that period. Renew with another policy first"
+            }
+            PreparedPolicy::Declared(_) => {
+                "up to that period the policy knows its own history, which no correction changes"
+            }
         };
-        let rule =
-            format!("must be later than {}: {known} up to that period. Renew with another policy first", self.after);
+        let rule = format!("must be later than {}: {known}", self.after);
         Err(FieldError::new("period", period, rule))
     }
 

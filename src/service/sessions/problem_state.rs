@@ -181,23 +181,24 @@ impl ProblemState {
         let passed = seen.values[0].map(|scaled| self.problem.passed(step, &self.state, &actions, scaled));
         let reported = report.state.as_ref().map(|state| self.problem.state("state", state)).transpose()?;
         let (values, reward) = match (reported, passed) {
-            (None, Some(passed)) => {
-                let (values, reward) = passed.map_err(|fault| {
+            (None, Some((values, reward))) => {
+                let reported = |fault: FieldError| {
                     let rule = format!("must be reported: by the formulas, {} {}", fault.field, fault.rule);
                     FieldError::new("state", "null", rule)
-                })?;
-                (values, Some(reward))
+                };
+                (values.map_err(reported)?, Some(reward.map_err(reported)?))
             }
             (None, None) => {
-                return Err(FieldError::new(
-                    "state",
-                    "null",
-                    "must be given if the noise is missing: it moves the state",
-                ));
+                let rule = "must be given if the noise is missing: it moves the state";
+                return Err(FieldError::new("state", "null", rule));
             }
-            (Some(reported), passed) => (reported.values, passed.and_then(Result::ok).map(|(_, reward)| reward)),
+            (Some(reported), passed) => (reported.values, passed.and_then(|(_, reward)| reward.ok())),
         };
         let earned = self.state.earned + self.discounted * reward.unwrap_or(0.0);
+        if !earned.is_finite() {
+            let rule = "must lead to rewards whose sum is a number";
+            return Err(FieldError::new("noise", report.noise.unwrap_or(f64::NAN), rule));
+        }
         let discounted = self.discounted * self.problem.discounted(1);
         let mut standing = ProblemState { state: EarnedState { values, earned }, discounted, ..self.clone() };
         if let Some(scaled) = seen.values[0] {

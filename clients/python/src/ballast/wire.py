@@ -457,7 +457,7 @@ class DeclaredNow(TypedDict):
     executed: dict[str, float]
     """The actions executed, by name."""
     reward: NotRequired[float | None]
-    """The reward of the period by the problem's formula; null if the noise is missing."""
+    """The reward of the period by the problem's formula; null if the noise is missing or the formula gives no number."""
     earned: float
     """Rewards since the start of the session, discounted to it."""
     state: dict[str, float]
@@ -809,7 +809,7 @@ class MapPoint(TypedDict):
     untrained_share: NotRequired[float | None]
     """Share of the worst law's outcomes whose worth is a guess, as in a decision at a state."""
     fault: NotRequired[str | None]
-    """The reason why nothing can be decided here: every action may lead a state out of its range."""
+    """The reason why nothing can be decided here: an action that the solver tries may lead a state out of its range."""
 
 
 class MixtureComponent(TypedDict):
@@ -2028,8 +2028,8 @@ class DeclaredRenewed(Uncertainty):
     """The coming period, the first that the policy advises."""
     horizon: int
     """The last period that the policy advises."""
-    problem: DeclaredProblem
-    """The problem from here on, without its history."""
+    problem: dict[str, Any]
+    """The problem from here on as it was declared, but without its history."""
 
 
 class DesignSpecification(TypedDict):
@@ -3033,13 +3033,13 @@ class DeclaredObserved(Uncertainty):
     """Null if it is missing."""
     advised: NotRequired[dict[str, float]]
     """
-    The actions advised for the period, by name. Null if none were: from the states before it every action may lead out
-    of a range.
+    The actions advised for the period, by name. Null if none were: from the states before it an action that the solver
+    tries may lead out of a range.
     """
     executed: dict[str, float]
     """The actions executed in it, by name."""
     reward: NotRequired[float | None]
-    """The reward of the period by the problem's formula; null if the noise is missing."""
+    """The reward of the period by the problem's formula; null if the noise is missing or the formula gives no number."""
     earned: float
     """Rewards since the start of the session, discounted to it."""
     state: dict[str, float]

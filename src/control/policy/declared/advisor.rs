@@ -10,6 +10,8 @@ use crate::control::controlled_training::ControlledPolicy;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::prepared_step::{Factor, steps_bytes};
+use crate::control::problem::actions::{ActionInterval, ActionSet};
+use crate::control::problem::controlled::Controlled;
 use crate::control::problem::declared::{Declared, EarnedState};
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
@@ -153,7 +155,7 @@ impl DeclaredAdvisor {
             terms.sum::<f64>() / law.total_weight()
         };
         Uncertainty {
-            sample_size: law.sample_size(),
+            sample_size: self.specification.problem.history.len() + seen.len(),
             effective_size: law.effective_size(),
             moments: (1..=self.specification.surrogate.moment_count).map(moment).collect(),
             quantile,
@@ -193,6 +195,14 @@ impl DeclaredAdvisor {
         state: &EarnedState,
         (law, radius_scale): (&EmpiricalDistribution, f64),
     ) -> Result<Decided, FieldError> {
+        for (name, set) in problem.actions_named().iter().zip(problem.actions(step, state)) {
+            if let ActionSet::Interval(ActionInterval { lowest, highest }) = set
+                && (lowest > highest || lowest.is_nan() || highest.is_nan())
+            {
+                let rule = format!("must have `low` at most `high`; they are {lowest} and {highest}");
+                return Err(FieldError::new(format!("problem.actions.{name}"), problem.named(step, state), rule));
+            }
+        }
         let bellman = ControlledStep { radius_scale, ..self.controlled.step(problem, step) };
         let (found, worths) = bellman.solve_with_worths(state, law);
         let found = finite(found, problem, step, state)?;

@@ -44,28 +44,27 @@ impl Declared {
         Ok(actions)
     }
 
-    /// Returns the values of the states after a period with these actions and a noise in the unit of the solver, and
-    /// what the period earned.
-    ///
-    /// # Errors
-    /// A state leaves its range, or what is earned is no number.
+    /// Returns the values of the states after a period with these actions and a noise in the unit of the solver, unless
+    /// one leaves its range, and what the period earned, unless that is no number.
     pub fn passed(
         &self,
         step: usize,
         state: &EarnedState,
         actions: &[f64],
         scaled: f64,
-    ) -> Result<(Vec<f64>, f64), FieldError> {
+    ) -> (Result<Vec<f64>, FieldError>, Result<f64, FieldError>) {
         let problem = self.afresh();
         let moved = (actions, problem.noise(scaled));
         let (values, reward) = problem.period(step, state, moved);
-        let next = problem.after((step, state), moved, (values, reward));
-        if let Some(fault) = problem.fault() {
-            return Err(fault.clone());
-        }
-        match reward.is_finite() {
-            true => Ok((next.values, reward)),
-            false => Err(FieldError::new("problem.reward", reward, "must be a number")),
-        }
+        let next = problem.after((step, state), moved, (values, reward)).values;
+        let earned = match reward.is_finite() {
+            true => Ok(reward),
+            false => {
+                let rule =
+                    format!("must be a number; it is not at {}", problem.point(step, &state.values, Some(moved)));
+                Err(FieldError::new("problem.reward", reward, rule))
+            }
+        };
+        (problem.fault().map_or(Ok(next), |fault| Err(fault.clone())), earned)
     }
 }
