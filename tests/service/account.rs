@@ -333,3 +333,22 @@ async fn nobody_puts_right_what_is_not_his() {
         assert_eq!(correct(&app, 1, apply_correction.clone()).await.0.as_u16(), status);
     }
 }
+
+/// A report whose answer was lost may be sent again after another client removed a period. It must not count twice.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_report_sent_again_after_a_removal_is_doubted() {
+    let app = opened().await;
+    let reports = [json!({ "log_return": 0.01 }), json!({ "log_return": 0.02 })];
+    report_all(&app, &reports).await;
+    assert_eq!(correct(&app, 1, json!({ "period": 1, "change": "remove" })).await.0, 200);
+    let (status, problem) = app.report(2, reports[1].clone()).await;
+    assert_eq!((status.as_u16(), &problem["doubts"][0]["reason"]), (409, &json!("repeated")), "{problem}");
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    assert_eq!(session["period"], 2);
+    // It may be meant, and another report is a new one.
+    assert_eq!(app.report(2, json!({ "log_return": 0.02, "confirm": true })).await.0, 200);
+    assert_eq!(app.report(3, json!({ "log_return": 0.02 })).await.0, 200);
+    assert_eq!(correct(&app, 2, json!({ "period": 3, "change": "remove" })).await.0, 200);
+    // What was removed itself is new again.
+    assert_eq!(app.report(3, json!({ "log_return": 0.02 })).await.0, 200);
+}

@@ -58,6 +58,8 @@ pub enum DoubtReason {
     UnusualNoise,
     /// Its return is -100 %.
     TotalLoss,
+    /// It was recorded under this number, and counts under another one since a period was removed.
+    Repeated,
     /// Most reports in the list for the same policy and day have another return.
     DiffersFromPeers,
 }
@@ -153,6 +155,15 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
     };
     let missing = if missing.len() > LISTED { Vec::new() } else { missing };
     Some(Doubt { missing, ..Doubt::new(DoubtReason::MissingPeriods, "date", day.to_string(), sentence) })
+}
+
+/// Doubts a report that was recorded as `period` and counts as another one since a period was removed.
+/// Checked by: `tests/service/account.rs::a_report_sent_again_after_a_removal_is_doubted`.
+pub(in crate::service) fn of_repeat(period: usize, counted: usize) -> Doubt {
+    let sentence = format!(
+        "the same report was recorded as period {period}, and counts as period {counted} since one was removed"
+    );
+    Doubt::new(DoubtReason::Repeated, "period", period, sentence)
 }
 
 /// Doubts the noise of a declared problem as [`of_return`] doubts a return.

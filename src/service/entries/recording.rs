@@ -13,9 +13,10 @@ use crate::service::callers::allowance::HeavyPermit;
 use crate::service::callers::keys::Caller;
 use crate::service::entries::answer::{Corrected, CorrectionAnswer, Observed};
 use crate::service::entries::corrections::AppliedCorrection;
+use crate::service::entries::doubts::{self, Doubts};
 use crate::service::entries::drift::{self, DriftLevel};
 use crate::service::entries::periods::{Periods, ReplayedPeriod};
-use crate::service::entries::report::{Correct, Observe};
+use crate::service::entries::report::{Correct, Observe, Report};
 use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::process::spans;
@@ -52,6 +53,9 @@ impl Sessions {
                 return self.repeat(session, (EntryKind::Observation, period), &report, &names).await;
             }
             live.check_next_period(period)?;
+            if live.corrections > 0 && !observe.confirm {
+                self.check_new(tenant, (session, period), &report, &live.names).await?;
+            }
             let means = self.means(tenant, live, turn).await?;
             let (standing, answer) = live.after(observe, &report, (&means, self.clock.today())).await?;
             let Packed { content_json, answer_json, numbers, sent } =
@@ -85,6 +89,31 @@ impl Sessions {
             if self.append(&self.store, &mut held, new, next, levels).await? {
                 return Ok(sent);
             }
+        }
+    }
+
+    /// Checks that a report is not one that was recorded under this number before a correction removed a period, and
+    /// that still counts under another number.
+    ///
+    /// # Errors
+    /// It is such a report, which may be sent again because its answer was lost.
+    async fn check_new(
+        &self,
+        tenant: &Tenant,
+        (session, period): (&str, usize),
+        report: &Report,
+        names: &AssetNames,
+    ) -> Result<(), ServiceError> {
+        let row = self.store.entry(session, EntryKind::Observation, period).await?;
+        let Some(row) = row else { return Ok(()) };
+        if !content::records(&row, report, names.at(row.entry))? {
+            return Ok(());
+        }
+        let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
+        let periods = Periods::of(&facts)?;
+        match periods.all.iter().position(|counted| counted.entry + 1 == row.entry) {
+            Some(index) => Err(ServiceError::Unconfirmed(Doubts(vec![doubts::of_repeat(period, index + 1)]))),
+            None => Ok(()),
         }
     }
 

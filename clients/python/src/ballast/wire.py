@@ -509,7 +509,7 @@ DeclaredUtility: TypeAlias = DeclaredUtility1 | DeclaredUtility2 | DeclaredUtili
 """A utility of the amount that a formula of the states gives at the end."""
 
 
-DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "unusual_noise", "total_loss", "differs_from_peers"]
+DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "unusual_noise", "total_loss", "repeated", "differs_from_peers"]
 """Why a report is doubted."""
 
 
