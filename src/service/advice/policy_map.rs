@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use crate::control::error::FieldError;
 use crate::control::policy::declared::DeclaredAdvisor;
 use crate::control::request::rules;
+use crate::service::advice::sweep::evenly;
 use crate::service::error::ServiceError;
 use crate::service::sessions::Sessions;
 use crate::store::Tenant;
@@ -123,11 +124,7 @@ impl MapQuestion {
         }
         let start = || advisor.state("state", None);
         let state = state.map_or_else(start, |state| advisor.state("state", Some(&state)))?;
-        let values = |range: InputRange| {
-            let last = (range.points - 1) as f64;
-            let at = |index: usize| range.from + (range.to - range.from) * (index as f64 / last);
-            InputValues { values: (0..range.points).map(at).collect(), input: range.input }
-        };
+        let values = |InputRange { input, from, to, points }| InputValues { input, values: evenly(from, to, points) };
         let across = across.into_iter().map(values).collect();
         Ok(MapQuestion { advisor, period, state, noises, across })
     }

@@ -45,11 +45,13 @@ impl SweepRange {
             let rule = format!("must lie in [{}, {}]", POINTS.start(), POINTS.end());
             return Err(FieldError::new(format!("sweep.{field}.points"), self.points, rule));
         }
-        let last = self.points - 1;
-        // Both ends are exact.
-        let at = |index| {
-            if index == last { self.to } else { self.from + (self.to - self.from) * index as f64 / last as f64 }
-        };
-        Ok((0..self.points).map(at).collect())
+        Ok(evenly(self.from, self.to, self.points))
     }
+}
+
+/// Returns `points` evenly spaced values, at least two, with exact ends.
+pub(super) fn evenly(from: f64, to: f64, points: usize) -> Vec<f64> {
+    let last = points - 1;
+    let at = |index| if index == last { to } else { from + (to - from) * index as f64 / last as f64 };
+    (0..points).map(at).collect()
 }

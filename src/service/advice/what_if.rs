@@ -145,13 +145,11 @@ impl Sessions {
             SessionState::Account(account) => account,
             SessionState::Declared(state) => {
                 let question = (request.state.as_ref(), request.of_problem()?);
-                let Large { value: mut points, room } = self.what_if_problem(tenant, &live, state, question).await?;
+                let Large { value: points, room } = self.what_if_problem(tenant, &live, state, question).await?;
                 let session = request.session;
-                let value = match (request.sweep, points.pop()) {
-                    (None, Some(point)) => WhatIfAnswer::OneOfProblem { session, point: Box::new(point) },
-                    (_, last) => {
-                        WhatIfAnswer::SweepOfProblem { session, points: points.into_iter().chain(last).collect() }
-                    }
+                let value = match only_point(request.sweep, points) {
+                    Ok(point) => WhatIfAnswer::OneOfProblem { session, point },
+                    Err(points) => WhatIfAnswer::SweepOfProblem { session, points },
                 };
                 return Ok(Large { value, room });
             }
@@ -164,11 +162,11 @@ impl Sessions {
         let several = account.assets.is_some();
         request.fits(several)?;
         if several {
-            let mut points = self.suppose_of_assets(tenant, &request, &live, hypotheses).await?;
+            let points = self.suppose_of_assets(tenant, &request, &live, hypotheses).await?;
             let session = request.session;
-            let value = match (request.sweep, points.pop()) {
-                (None, Some(point)) => WhatIfAnswer::OneOfAssets { session, point: Box::new(point) },
-                (_, last) => WhatIfAnswer::SweepOfAssets { session, points: points.into_iter().chain(last).collect() },
+            let value = match only_point(request.sweep, points) {
+                Ok(point) => WhatIfAnswer::OneOfAssets { session, point },
+                Err(points) => WhatIfAnswer::SweepOfAssets { session, points },
             };
             return Ok(Large { value, room });
         }
@@ -187,9 +185,9 @@ impl Sessions {
             points.push(WhatIfPoint::new(period, &hypothesis, supposed, request.explain));
         }
         let session = request.session;
-        let value = match (request.sweep, points.pop()) {
-            (None, Some(point)) => WhatIfAnswer::One { session, point: Box::new(point) },
-            (_, last) => WhatIfAnswer::Sweep { session, points: points.into_iter().chain(last).collect() },
+        let value = match only_point(request.sweep, points) {
+            Ok(point) => WhatIfAnswer::One { session, point },
+            Err(points) => WhatIfAnswer::Sweep { session, points },
         };
         Ok(Large { value, room })
     }
@@ -215,6 +213,14 @@ impl Sessions {
             points.push(point);
         }
         Ok(points)
+    }
+}
+
+/// Returns the point of a question without a sweep, or all points of a sweep.
+fn only_point<P>(sweep: Option<Sweep>, mut points: Vec<P>) -> Result<Box<P>, Vec<P>> {
+    match (sweep, points.pop()) {
+        (None, Some(point)) => Ok(Box::new(point)),
+        (_, last) => Err(points.into_iter().chain(last).collect()),
     }
 }
 

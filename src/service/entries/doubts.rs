@@ -166,15 +166,21 @@ pub(in crate::service) fn of_repeat(period: usize, counted: usize) -> Doubt {
     Doubt::new(DoubtReason::Repeated, "period", period, sentence)
 }
 
-/// Doubts the noise of a declared problem as [`of_return`] doubts a return.
-pub(in crate::service) fn of_noise(noise: f64, (mean, deviation): (f64, f64)) -> Option<Doubt> {
-    let distance = (noise - mean).abs();
-    // Rounding apart, a record whose noises are all equal has no deviation.
-    if distance <= (UNUSUAL_DEVIATIONS * deviation).max(ROUNDING * mean.abs()) {
+/// Returns how many standard deviations `value` lies from the mean of a record, if they are more than 4 and the distance
+/// exceeds `rounding`. They are infinite for a record whose values are all equal.
+fn unusual(value: f64, (mean, deviation): (f64, f64), rounding: f64) -> Option<f64> {
+    let distance = (value - mean).abs();
+    if distance <= (UNUSUAL_DEVIATIONS * deviation).max(rounding) {
         return None;
     }
-    let sentence = match (distance / deviation).is_finite() {
-        true => format!("{noise} lies {:.1} standard deviations from the noises known", distance / deviation),
+    Some(distance / deviation)
+}
+
+/// Doubts the noise of a declared problem as [`of_return`] doubts a return.
+pub(in crate::service) fn of_noise(noise: f64, (mean, deviation): (f64, f64)) -> Option<Doubt> {
+    let deviations = unusual(noise, (mean, deviation), ROUNDING * mean.abs())?;
+    let sentence = match deviations.is_finite() {
+        true => format!("{noise} lies {deviations:.1} standard deviations from the noises known"),
         false => format!("{noise} differs from the noises known, which are all {mean}"),
     };
     Some(Doubt::new(DoubtReason::UnusualNoise, "noise", noise, sentence))
@@ -192,11 +198,7 @@ pub(in crate::service) fn of_return(
         let sentence = "a return of -100 % is a total loss: a total loss is always doubted".to_owned();
         return Some(Doubt::new(DoubtReason::TotalLoss, field, value, sentence));
     }
-    let distance = (log_return - mean).abs();
-    if distance <= (UNUSUAL_DEVIATIONS * deviation).max(ROUNDING) {
-        return None;
-    }
-    let deviations = distance / deviation;
+    let deviations = unusual(log_return, (mean, deviation), ROUNDING)?;
     let percent = 100.0 * log_return.exp_m1();
     let sentence = match deviations.is_finite() {
         true => format!("a return of {percent:.2} % lies {deviations:.1} standard deviations from the record"),

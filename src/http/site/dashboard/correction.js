@@ -7,7 +7,20 @@ import { input, refusal, select } from "./form.js";
 import { reportFields, sendReports } from "./report_fields.js";
 import { severalFields } from "./several_fields.js";
 
-const CHANGES = { replace: "The report is wrong", insert: "A period before it was skipped", remove: "The period should be removed" };
+/** What a correction does to its period, in words. */
+export const CHANGES = { replace: "The report is wrong", insert: "A period before it was skipped", remove: "The period should be removed" };
+
+/** Returns the form of a correction: its first fields, the rest, and the button that sends it. */
+export function correctionFrame(fields, rest, button) {
+  return h(
+    "form",
+    { class: "observe", novalidate: true },
+    h("p", { class: "note" }, "The fields show the current values. The original report stays on record."),
+    h("div", { class: "fields" }, fields.map(({ element }) => element)),
+    rest,
+    h("p", { class: "send" }, button),
+  );
+}
 
 /** Returns the form for a session with observed periods. */
 export function correctionForm({ id, session, history, policy, calendar, refresh }) {
@@ -55,16 +68,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   });
   const message = refusal();
   const button = h("button", { type: "submit" }, "Correct it");
-  const form = h(
-    "form",
-    { class: "observe", novalidate: true },
-    h("p", { class: "note" }, "The fields show the current values. The original report stays on record."),
-    h("div", { class: "fields" }, period.element, change.element, reason.element),
-    skipped,
-    place,
-    message,
-    h("p", { class: "send" }, button),
-  );
+  const form = correctionFrame([period, change, reason], [skipped, place, message], button);
   const compose = () => {
     const about = { correction: session.corrections + 1, period: Number(period.control.value), reason: reason.control.value };
     if (isReplaced()) return { ...about, ...fields.report() };

@@ -2,6 +2,7 @@
 
 import { get, post } from "./api.js";
 import { lineChart } from "./chart.js";
+import { CHANGES, correctionFrame } from "./correction.js";
 import { csvText } from "./csv.js";
 import { decided, plain, statesWords } from "./declared_policy.js";
 import { announce, disclosure, facts, h, section, table } from "./dom.js";
@@ -13,8 +14,6 @@ import { calendar, day } from "./periods.js";
 import { save } from "./picture.js";
 import { due } from "./renewal_due.js";
 import { sendReports } from "./report_fields.js";
-
-const CHANGES = { replace: "The report is wrong", insert: "A period before it was skipped", remove: "The period should be removed" };
 
 /** Returns the body of the page of session `id` under `policy`. */
 export async function declaredSession(id, session, policy, leaving) {
@@ -162,15 +161,7 @@ function correcting(shown) {
   fill(history.observations.length);
   const message = refusal();
   const button = h("button", { type: "submit" }, "Correct it");
-  const form = h(
-    "form",
-    { class: "observe", novalidate: true },
-    h("p", { class: "note" }, "The fields show the current values. The original report stays on record."),
-    h("div", { class: "fields" }, [period, change, reason].map(({ element }) => element)),
-    place,
-    message,
-    h("p", { class: "send" }, button),
-  );
+  const form = correctionFrame([period, change, reason], [place, message], button);
   const compose = () => ({
     correction: session.corrections + 1,
     period: Number(period.control.value),
