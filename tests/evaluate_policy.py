@@ -3,7 +3,8 @@
 Reads {"policy": .., "questions": [{"step", "wealth", "holding", "returns"}, ..]} from standard input, where a question may give the
 "radius" and the "radius_ahead" of a bridge rule, whose random numbers nobody else has. Answers one object a question.
 Returns are in the order in which they came. With the argument "bridge" it reads {"learning", "returns", "alpha", "paths"} and answers
-the quantiles Q and Q' of its own bridges.
+the quantiles Q and Q' of its own bridges. With "declared" the policy is of a declared problem, a question has "step", "state" and
+"noises", and an answer is a number.
 """
 
 import json
@@ -264,6 +265,42 @@ def evaluate(policy, question):
     }
 
 
+def worth_of(formula, specification, state):
+    """A formula of the states, whose operators and functions are those of Python but for three."""
+    text = formula.replace("^", "**").replace("if(", "choose(").replace("ln(", "log(")
+    choose = lambda condition, yes, no: yes if condition else no
+    known = {"choose": choose, "log": math.log, "exp": math.exp, "sqrt": math.sqrt, "min": min, "max": max, "abs": abs}
+    known |= specification["problem"]["parameters"] | state | {"T": specification["problem"]["horizon"]}
+    return eval(text, {"__builtins__": {}}, known)
+
+
+def declared_value(policy, question):
+    """What the periods from a step on, 1 at least, are worth at a state."""
+    specification, step, solution = policy["specification"], question["step"], policy["steps"][question["step"] - 1]["solution"]
+    problem, state = specification["problem"], question["state"]
+    low, high = problem["noise"]["low"], problem["noise"]["high"]
+    radius = dict(problem["radius"])
+    for name in ("radius", "kappa"):
+        if name in radius:
+            radius[name] /= high - low
+    seen = problem["history"] + (question["noises"] if problem["framework"] != "static" else [])
+    law = {
+        "framework": problem["framework"], "learning": problem["learning"], "radius": radius, "horizon": problem["horizon"],
+        "utility": {"kind": "log"}, "rate_per_step": 0.0, "contributions": 0.0, "support": {"rule": "between", "min": -0.5, "max": 0.5},
+    }
+    asked = question | {"returns": [(noise - low) / (high - low) - 0.5 for noise in seen], "wealth": 1.0}
+    found = [state[name] for name in sorted(state)] + features({"problem": law, "surrogate": specification["surrogate"]}, asked)
+    scaling = solution["scaling"]
+    x = [(found[i] - centre) / spread for i, centre, spread in zip(scaling["active"], scaling["centre"], scaling["spread"])]
+    near = [nearest(coordinate, column) for coordinate, column in zip(x, solution["inputs"])]
+    gain = predictions(solution["value"], list(zip(*solution["inputs"])), near)[0]
+    if not policy["baselines"]:
+        return worth_of(problem["utility"]["of"], specification, state) * math.exp(gain)
+    baseline = policy["baselines"][step - 1]
+    level = baseline["constant"] + sum(slope * state[name] for slope, name in zip(baseline["slopes"], sorted(state)))
+    return (level + policy["unit"] * gain) / problem["discount"] ** step
+
+
 def bridge(times):
     """|B| at ascending times: a random walk, tied down at 1."""
     walk, before, path = 0.0, 0.0, []
@@ -302,5 +339,7 @@ if __name__ == "__main__":
     asked = json.load(sys.stdin)
     if sys.argv[1:] == ["bridge"]:
         json.dump(quantiles(**asked), sys.stdout)
+    elif sys.argv[1:] == ["declared"]:
+        json.dump([declared_value(asked["policy"], question) for question in asked["questions"]], sys.stdout)
     else:
         json.dump([evaluate(asked["policy"], question) for question in asked["questions"]], sys.stdout)

@@ -55,7 +55,14 @@ fn describe(declared: &DeclaredSpecification, first: &Decided) -> String {
     let noise = &problem.noise.name;
     let mut lines: Vec<String> =
         first.actions.iter().map(|(name, value)| format!("{name}: {}", number(*value))).collect();
-    lines.push(format!("worth over {} periods: {}", problem.horizon, number(first.value)));
+    let about = match first.value_error {
+        Some(error) if error > 0.0 => {
+            let digits = 10_f64.powi(1 - error.log10().floor() as i32);
+            format!(", to about {} in the root mean square", number((error * digits).round() / digits))
+        }
+        _ => String::new(),
+    };
+    lines.push(format!("worth over {} periods: {}{about}", problem.horizon, number(first.value)));
     lines.push(match first.radius > 0.0 {
         true => format!(
             "against every law of {noise} within {} of the {} seen",

@@ -24,7 +24,7 @@ use crate::control::surrogate::counts::LEAPING;
 use crate::control::surrogate::design::Design;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{Candidates, DesignFitting, diagnostics};
+use crate::control::surrogate::learning::{Candidates, DesignFitting, SETS, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::laws::LawSummary;
 use crate::control::uncertainty::shared_summaries::SharedSummaries;
@@ -108,8 +108,18 @@ impl Training {
         let design = Some(&self.problem.specification.design).filter(|_| counts.chosen);
         let aim = design.and_then(|design| Aim::of(design, step, erring, after.map(|after| &after.diagnostics)));
         let (specification, names) = (&self.problem.specification, &self.problem.selection.names());
-        DesignFitting { specification, names, step, counts, aim, watch }
-            .run(&solver, after.map(|after| &after.solution))
+        let fitting = DesignFitting {
+            specification,
+            names,
+            step,
+            counts,
+            aim,
+            least_gain: 0.0,
+            sets: SETS,
+            is_guarded: true,
+            watch,
+        };
+        fitting.run(&solver, after.map(|after| &after.solution))
     }
 
     /// Builds the policy from all steps, in ascending order of step.

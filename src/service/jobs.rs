@@ -19,6 +19,7 @@ use super::error::ServiceError;
 use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::backtest::Backtest;
+use crate::control::evaluation::declared_walk::DeclaredWalk;
 use crate::control::policy::content_hash;
 use crate::control::posed::{Completed, Posed};
 use crate::control::request::backtest_assets::BacktestQuestion;
@@ -178,6 +179,12 @@ impl Jobs {
                 let estimate = estimate::backtest_of_assets(&backtest, request.returns().0, self.threads);
                 let (steps, warnings) = (backtest.step_count(), backtest.warnings(&request));
                 (BacktestQuestion::Assets(request), estimate, steps, warnings)
+            }
+            BacktestQuestion::Declared(request) => {
+                // Formulas are tried at many points.
+                let walk = self.reading.run(&caller.tenant, move || DeclaredWalk::new(request)).await??;
+                let estimate = estimate::declared::walk(&walk, self.threads);
+                (BacktestQuestion::Declared(walk.request().clone()), estimate, walk.step_count(), walk.warnings())
             }
         };
         self.memory.admits(&estimate)?;

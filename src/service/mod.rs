@@ -156,7 +156,7 @@ impl Service {
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
         // Before any policy is read there are as few of them as may be.
-        request.check()?;
+        let request = request.completed()?;
         let mut advisors = Vec::with_capacity(request.policies.len());
         for (name, policy) in &request.policies {
             let advisor = self.policies.decider(&caller.tenant, policy).await;

@@ -12,6 +12,7 @@ const STOCK = JSON.parse(await readFile(new URL("../../examples/problems/stock.j
 const visit = (hash) => visited(page, `${ballast.url}/${hash}`);
 const main = async () => plain(await page.locator("main").innerText());
 const refused = async () => plain(await page.locator("[role=alert]:visible").innerText());
+const form = (button) => page.locator("form").filter({ has: page.getByRole("button", { name: button, exact: true }) });
 const press = (name) => page.getByRole("button", { name, exact: true }).click();
 const wrong = [];
 page.on("pageerror", (error) => wrong.push(String(error)));
@@ -154,7 +155,7 @@ test("it is drawn as a map, of one input and of two", async () => {
 
 test("it is compared with a rule, whose formula is refused with its column", async () => {
   await visit(`#/policies/${policy}`);
-  const rule = page.getByLabel("order", { exact: true });
+  const rule = form("Compare").getByLabel("order", { exact: true });
   await rule.fill("max(25 - stok, 0)");
   await press("Compare");
   await page.getByText("column 10").waitFor();
@@ -196,12 +197,62 @@ test("it is compared with a rule, whose formula is refused with its column", asy
   assert.equal(last, `Period 3: policy ${first}, rule ${second}`);
 });
 
+test("it is compared with other frameworks, which are trained for it", async () => {
+  await visit(`#/policies/${policy}`);
+  await form("Compare").getByLabel("Trusts the record, learns nothing more").check();
+  await form("Compare").getByLabel("Paths").fill("100");
+  await press("Compare");
+  await page.getByRole("heading", { level: 1, name: "Evaluation of The shop", exact: true }).waitFor();
+  const { request, strategies } = await call(ballast.url, `/jobs/${page.url().split("/").pop()}/report`);
+  assert.deepEqual([request.frameworks, request.design.count, request.rules], [["known_law"], 30, {}]);
+  assert.deepEqual(strategies.map(({ strategy }) => strategy), ["policy", "known_law"]);
+  const shown = await main();
+  assert.ok(shown.includes("\u201cknown_law\u201d takes the record as the truth, and learns nothing more."), shown);
+  assert.match(shown, /.known_law. is worth [\d.]+ \([-\d.]+ to [\d.]+\) (more|less) than .policy.\./);
+});
+
+test("it walks through its record", async () => {
+  await visit(`#/policies/${policy}`);
+  const walk = form("Walk");
+  await walk.getByLabel("Window").fill("7");
+  await press("Walk");
+  await page.getByText(/Window is 7/).waitFor();
+  await walk.getByLabel("Window").fill("4");
+  await walk.getByLabel("Train every").fill("2");
+  await walk.getByLabel("Learns, and trusts what it learned").check();
+  await walk.getByLabel("order", { exact: true }).fill("max(12 - stock, 0)");
+  await press("Walk");
+  await page.getByRole("heading", { level: 1, name: "Backtest of order, 3 periods", exact: true }).waitFor();
+  const { request, strategies } = await call(ballast.url, `/jobs/${page.url().split("/").pop()}/report`);
+  assert.deepEqual([request.window, request.every, request.frameworks], [4, 2, ["adaptive", "plug_in"]]);
+  const shown = await main();
+  assert.ok(shown.includes("3 strategies lived the last 3 periods of the record of demand, one after another."), shown);
+  assert.doesNotMatch(shown, /undefined|NaN|null/);
+  const rows = await page.getByRole("table", { name: "Gain of each strategy" }).locator("tbody tr").allInnerTexts();
+  const cells = rows.map((row) => plain(row).split(/\s*\t\s*/));
+  assert.deepEqual(cells.map(([name]) => name), ["adaptive", "plug_in", "rule"]);
+  strategies.forEach(({ earned, left }, index) =>
+    [earned, left].forEach((number, column) => {
+      const text = cells[index][3 + column].replaceAll(",", "");
+      assert.ok(Math.abs(Number(text) - number) <= 1e-4 * Math.abs(number), `${text} for ${number}`);
+    }),
+  );
+  for (const title of ["Order", "Stock at the start of a period", "Rewards so far", "The record of demand"]) await page.getByRole("slider", { name: title, exact: true }).waitFor();
+  const [download] = await Promise.all([page.waitForEvent("download"), press("Save as CSV")]);
+  const lines = (await readFile(await download.path(), "utf8")).trim().split("\r\n");
+  assert.equal(lines[0], "strategy,period,demand,reward,radius,state stock,action order");
+  assert.equal(lines.length, 10);
+  const third = strategies[2].periods[2];
+  assert.deepEqual(lines[9].split(",").slice(0, 2), ["rule", "3"]);
+  assert.ok(Math.abs(Number(lines[9].split(",")[6]) - third.actions.order) < 1e-9);
+});
+
 test("a comparison of a policy without a name is called by its actions, in the lists too", async () => {
   const named = (name) => fetch(`${ballast.url}/policies/${policy}`, { method: "PATCH", headers: { "content-type": "application/json" }, body: JSON.stringify({ name }) });
   await named("");
   for (const hash of ["#/evaluations", "#/jobs"]) {
     await visit(hash);
-    await page.getByRole("heading", { level: 2, name: "Evaluation of order, 3 periods ahead", exact: true }).waitFor();
+    await page.getByRole("heading", { level: 2, name: "Evaluation of order, 3 periods ahead", exact: true }).first().waitFor();
     assert.doesNotMatch(await main(), /undefined|NaN/);
   }
   await named("The shop");

@@ -18,11 +18,12 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 37] = [
+const DOCUMENTS: [&str; 39] = [
     "control/assets/advice.rs",
     "control/evaluation/assets/report.rs",
     "control/evaluation/backtest_report.rs",
     "control/evaluation/declared_comparison.rs",
+    "control/evaluation/declared_walk.rs",
     "control/evaluation/frontier/report.rs",
     "control/evaluation/names.rs",
     "control/evaluation/report.rs",
@@ -43,6 +44,7 @@ const DOCUMENTS: [&str; 37] = [
     "control/request/centre.rs",
     "control/request/contributions.rs",
     "control/request/declared.rs",
+    "control/request/declared_backtest.rs",
     "control/request/declared_comparison.rs",
     "control/request/evaluation.rs",
     "control/request/framework.rs",

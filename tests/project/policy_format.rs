@@ -1,6 +1,7 @@
 //! `docs/policy-format.md` says all there is to say of an exported policy: a program in another language that follows it
 //! (`tests/evaluate_policy.py`, the standard library alone) answers what the service answers.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
@@ -8,7 +9,11 @@ use crate::support::policies::advisor;
 use ballast::control::cache::Cache;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::policy::declared::DeclaredPolicy;
 use ballast::control::problem::state::{PeriodOutcome, State};
+use ballast::control::progress::Watch;
+use ballast::control::request::caution::CautionLevel;
+use ballast::control::request::specification::UtilitySpecification;
 use serde_json::{Value, json};
 
 const HISTORY: [f64; 8] = [0.021, -0.034, 0.052, 0.043, -0.008, 0.017, 0.029, -0.011];
@@ -192,6 +197,61 @@ fn another_program_that_follows_the_page_answers_what_the_service_answers() {
     }
     println!("{from_surrogates} advices from surrogates, {singles} single states");
     assert!(from_surrogates > 24 && singles > 8, "the test must reach both kinds of step");
+}
+
+/// Policies of declared problems: every kind of worth, with and without a utility, a discount and a law that is learned.
+#[test]
+fn another_program_values_the_states_of_declared_problems() {
+    let (mut asked, mut learning) = (0, 0);
+    for name in ["stock", "store", "goal", "hedge", "spending", "regulator", "investor"] {
+        let path = format!("{}/examples/problems/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        let mut request: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        request["problem"]["horizon"] = json!(3);
+        request["design"]["count"] = json!(25);
+        let declared = serde_json::from_value(request.clone()).unwrap();
+        let policy = DeclaredPolicy::train(&declared, &Watch::unwatched()).unwrap();
+        let advisor = policy.prepared(Cache::default()).unwrap();
+        let document = json!(advisor.policy());
+        let mut specification = advisor.specification().clone();
+        specification.problem.utility = UtilitySpecification::Log {};
+        specification.problem.caution = Some(CautionLevel::Paper);
+        let specification = specification.completed().unwrap();
+        let laws = ballast::control::bellman::problem::Problem::new(&specification).laws;
+        let history: Vec<f64> = serde_json::from_value(request["problem"]["history"].clone()).unwrap();
+        let [low, high] = ["low", "high"].map(|end| request["problem"]["noise"][end].as_f64().unwrap());
+        let states = request["problem"]["states"].as_object().unwrap();
+        let (mut questions, mut expected) = (Vec::new(), Vec::new());
+        for step in [1, 2] {
+            for away in [0.0, 0.02, -0.015] {
+                let number = |state: &Value, end: &str| state[end].as_f64().unwrap();
+                let near =
+                    |state: &Value| number(state, "start") + away * (number(state, "high") - number(state, "low"));
+                let state: BTreeMap<String, f64> = states.iter().map(|(name, own)| (name.clone(), near(own))).collect();
+                let noises = &history[..step];
+                let mut question = json!({ "step": step, "state": state, "noises": noises });
+                if declared.problem.framework.learns() {
+                    let scaled = |noise: &f64| (noise - low) / (high - low) - 0.5;
+                    let mut law = specification.problem.learning.law(&specification.problem.history);
+                    law.extend(&noises.iter().map(scaled).collect::<Vec<f64>>());
+                    let radii = laws.radii.radii(&law, laws.measure(&law).radius);
+                    (question["radius"], question["radius_ahead"]) = (json!(radii.radius), json!(radii.radius_ahead));
+                    learning += 1;
+                }
+                expected.push(advisor.predicted(step + 1, &state, noises).unwrap());
+                questions.push(question);
+            }
+        }
+        let answers = python(&["declared"], &json!({ "policy": document, "questions": questions }));
+        let unit = document["unit"].as_f64().unwrap();
+        for ((question, found), answer) in questions.iter().zip(&expected).zip(answers.as_array().unwrap()) {
+            let answer = answer.as_f64().unwrap();
+            // A sum of 25 weights that cancel, of a quadratic value all but one part in 1e9: so many times the rounding of the result.
+            assert!((answer - found).abs() < 1e-7 * (unit + found.abs()), "{name}, {question}: {answer} and {found}");
+            asked += 1;
+        }
+        assert_eq!(document["baselines"].as_array().unwrap().len(), if name == "investor" { 0 } else { 2 }, "{name}");
+    }
+    assert!(asked == 42 && learning >= 18, "{asked} {learning}");
 }
 
 #[test]

@@ -228,11 +228,13 @@ async fn a_changed_document_is_refused_by_its_field() {
     app.train(&stock(3)).await;
     let (_, document) = app.get(&format!("/policies/{}/export", app.policy)).await;
     for (pointer, value, field) in [
-        ("/format", json!("ballast-policy-1"), "specification.problem.actions"),
+        ("/format", json!("ballast-policy-1"), "baselines"),
         ("/specification/problem/horizon", json!(5), "steps"),
         ("/specification/problem/reward", json!("stok"), "problem.reward"),
         ("/specification/design/count", json!(null), "specification"),
         ("/steps/0/step", json!(2), "steps[0].step"),
+        ("/unit", json!(2.0), "unit"),
+        ("/baselines/1/constant", json!(0.0), "baselines"),
         ("/steps/1/solution/inputs/0/0", json!(1e40), "steps[1].solution"),
         ("/steps/1/solution/policy/weights", json!([]), "steps[1].solution.policy.weights"),
         ("/steps/0/solution/value/weights/0", json!([1.0]), "steps[0].solution.weights"),
@@ -296,4 +298,16 @@ async fn policies_and_rules_are_compared_by_a_job() {
         .map(|found| found["actions"]["order"].as_f64().unwrap_or_else(|| panic!("{found}")));
     assert!((mean - order).abs() < 1e-9 * order, "a mean of equal numbers: {mean} and {order}");
     assert_eq!(report["strategies"][0]["robust_value"], first["value"]);
+    // A policy that is trained inside the comparison is the same.
+    let declared = stock(2);
+    let inside = json!({ "problem": declared["problem"], "design": declared["design"],
+        "frameworks": ["adaptive", "static"], "policies": { "robust": robust }, "paths": 300 });
+    let (status, accepted) = app.post("/evaluate", &inside).await;
+    assert_eq!(status, StatusCode::ACCEPTED, "{accepted}");
+    let ended = app.until(accepted["job"].as_str().unwrap(), |job| job["finished_ms"].is_number()).await;
+    assert_eq!(ended["progress"]["steps_done"], 3, "{ended}");
+    let (_, inside) = app.get(ended["report"].as_str().unwrap_or_else(|| panic!("{ended}"))).await;
+    let [before, adaptive, fixed] = [0, 1, 2].map(|place| inside["strategies"][place].clone());
+    assert_eq!([&before["strategy"], &adaptive["strategy"], &fixed["strategy"]], ["robust", "adaptive", "static"]);
+    assert_eq!([&before["value"], &before["periods"]], [&adaptive["value"], &adaptive["periods"]]);
 }

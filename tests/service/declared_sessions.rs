@@ -368,6 +368,55 @@ async fn a_session_renews_itself() {
     assert_eq!(history["observations"][3]["now"]["noise"], 21.3);
 }
 
+/// The walk-forward is what a session lives that renews itself and follows its advice, bit for bit.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_walk_forward_is_the_life_of_a_session_that_renews_itself() {
+    let record = [9.1, 27.3, 11.6, 19.0, 22.3, 21.1, 18.7, 18.3, 19.3, 20.3, 14.9, 24.6];
+    let mut app = App::start().await;
+    let mut request = stock(3);
+    request["problem"]["history"] = json!(record[..7]);
+    app.train(&request).await;
+    app.open_with(json!({ "renew": { "every": 2, "window": 7 } })).await;
+    let mut lived = Vec::new();
+    for (index, noise) in record[7..].iter().enumerate() {
+        let mut now = action(&app).await;
+        assert_eq!(app.report(index + 1, json!({ "noise": noise })).await.0, 200);
+        if index % 2 == 1 {
+            let renewals = index.div_ceil(2);
+            until("the renewal", async || Some(session(&app).await).filter(|now| now["renewals"] == renewals)).await;
+        }
+        lived.push((now["state"].take(), now["actions"].take(), now["radius"].take()));
+    }
+    let stands = session(&app).await;
+    request["problem"]["history"] = json!(record);
+    request["window"] = json!(7);
+    request["every"] = json!(2);
+    request["rules"] = json!({ "base": { "order": "max(25 - stock, 0)" } });
+    let (status, accepted) = app.post("/backtest", &request).await;
+    assert_eq!(status, StatusCode::ACCEPTED, "{accepted}");
+    let ended = app.until(accepted["job"].as_str().unwrap(), |job| job["finished_ms"].is_number()).await;
+    let (_, report) = app.get(ended["report"].as_str().unwrap_or_else(|| panic!("{ended}"))).await;
+    assert_eq!(report["format"], "ballast-declared-walk-1");
+    let own = &report["strategies"][0];
+    for (period, (state, actions, radius)) in own["periods"].as_array().unwrap().iter().zip(&lived) {
+        assert_eq!((&period["states"], &period["actions"], &period["radius"]), (state, actions, radius));
+    }
+    assert_eq!((own["periods"].as_array().unwrap().len(), &own["earned"]), (lived.len(), &stands["earned"]));
+    assert_eq!(own["left"], 3.0 * number(&stands["states"]["stock"]));
+    // What is wrong is named, before anything is queued.
+    for (field, value, named) in [
+        ("window", json!(12), "window"),
+        ("frameworks", json!(["known_law"]), "frameworks[0]"),
+        ("rules", json!({ "base": { "order": "max(25 - stok, 0)" } }), "rules.base.order"),
+        ("windows", json!([7]), "windows"),
+    ] {
+        let mut wrong = request.clone();
+        wrong[field] = value;
+        let (status, problem) = app.post("/backtest", &wrong).await;
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(named)), "{problem}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_wrong_is_named() {
     let mut app = App::start().await;

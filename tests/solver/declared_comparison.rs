@@ -28,7 +28,12 @@ fn advisor(request: &Value) -> Arc<DeclaredAdvisor> {
 
 fn compared(policies: &[Arc<DeclaredAdvisor>], request: &Value) -> Result<ComparisonReport, TrainError> {
     let request = serde_json::from_value(request.clone()).unwrap();
-    Comparison::new(request, policies.to_vec())?.run(&Watch::unwatched())
+    let comparison = Comparison::new(request, policies.to_vec())?;
+    let trained = comparison.trainings().map(|training| {
+        let policy = DeclaredPolicy::new(training, training.run(&Watch::unwatched())?);
+        Ok(Arc::new(policy.prepared(Cache::default())?))
+    });
+    comparison.run(trained.collect::<Result<_, TrainError>>()?, &Watch::unwatched())
 }
 
 fn history() -> Vec<f64> {
@@ -143,6 +148,61 @@ fn a_utility_is_counted_in_certainty_equivalents() {
     }
 }
 
+/// Several frameworks inside one comparison are the policies that a training of each would give. Whoever knows the law of the
+/// record orders as the enumeration of all orders does.
+#[test]
+fn frameworks_are_trained_inside_a_comparison() {
+    let request = stock();
+    let shared = json!({ "paths": 2000, "rules": { "base": { "order": "max(25 - stock, 0)" } } });
+    let mut inside = shared.clone();
+    inside["problem"] = request["problem"].clone();
+    inside["design"] = request["design"].clone();
+    inside["frameworks"] = json!(["static", "adaptive", "plug_in", "known_law"]);
+    let inside = compared(&[], &inside).unwrap();
+    let names: Vec<&str> = inside.strategies.iter().map(|own| own.strategy.as_str()).collect();
+    assert_eq!(names, ["static", "adaptive", "plug_in", "known_law", "base"]);
+    let trained = ["adaptive", "plug_in", "static"].map(|framework| {
+        let mut own = request.clone();
+        own["problem"]["framework"] = json!(framework);
+        advisor(&own)
+    });
+    let mut before = shared;
+    before["policies"] = json!({ "adaptive": "1", "plug_in": "2", "static": "3" });
+    let before = compared(&trained, &before).unwrap();
+    let find = |report: &ComparisonReport, name: &str| {
+        report.strategies.iter().find(|own| own.strategy == name).unwrap().clone()
+    };
+    for name in ["adaptive", "plug_in", "static"] {
+        let (inside, before) = (find(&inside, name), find(&before, name));
+        assert_eq!((inside.value, inside.periods), (before.value, before.periods), "{name}, bit for bit");
+        assert_eq!(inside.robust_value, before.robust_value, "{name}");
+    }
+    let best = (0..=560).map(|order| 0.1 * f64::from(order));
+    let best = best.max_by(|one, other| known(*one).0.total_cmp(&known(*other).0)).unwrap();
+    let found = find(&inside, "known_law");
+    assert!((found.periods[0].actions["order"] - best).abs() < 0.1, "{:?} and {best}", found.periods[0]);
+    // The surrogate of 40 states rounds the kinks of the second period, and 2,000 paths have their own mean.
+    let reach = found.value.high - found.value.low;
+    assert!((found.value.value - known(best).0).abs() < reach, "{:?} and {:?}", found.value, known(best));
+    assert!((found.robust_value.unwrap() - known(best).0).abs() < 0.005 * known(best).0, "{found:?}");
+}
+
+/// The worth of a first order under the law of the record, if the second is the best of even ones, and the mean second stock.
+fn known(first: f64) -> (f64, f64) {
+    let second = |stock: f64| {
+        let worth = |order: f64| {
+            let of = |demand: &f64| {
+                let (left, earned) = period(stock, order, *demand);
+                earned + 3.0 * left
+            };
+            history().iter().map(of).sum::<f64>()
+        };
+        let orders = (0..=600).map(|order| 0.1 * f64::from(order)).filter(|order| stock + order <= 60.0);
+        orders.max_by(|one, other| worth(*one).total_cmp(&worth(*other))).unwrap_or(0.0)
+    };
+    enumerated(|step, stock, _| if step == 0 { first } else { second(stock) })
+}
+
 #[test]
 fn wrong_comparisons_are_refused() {
     let policy = advisor(&stock());
@@ -152,6 +212,7 @@ fn wrong_comparisons_are_refused() {
     let mut less_cautious = stock();
     less_cautious["problem"]["radius"]["scale"] = json!(0.1);
     let less_cautious = advisor(&less_cautious);
+    let problem = stock()["problem"].clone();
     let two = json!({ "policies": { "a": "x", "b": "y" }, "paths": 100 });
     assert!(compared(&[policy.clone(), less_cautious], &two).is_ok());
     for (policies, change, field) in [
@@ -166,10 +227,25 @@ fn wrong_comparisons_are_refused() {
         (vec![policy.clone()], json!({ "paths": 99 }), "paths"),
         (vec![policy.clone()], json!({ "paths": 100_000, "level": 0.4 }), "level"),
         (vec![], json!({ "policies": {} }), "policies"),
+        (vec![policy.clone()], json!({ "frameworks": ["static"] }), "frameworks"),
+        (vec![policy.clone()], json!({ "design": { "count": 40 } }), "design"),
+        (vec![policy.clone()], json!({ "problem": problem, "frameworks": ["static", "static"] }), "frameworks[1]"),
+        (vec![policy.clone()], json!({ "problem": problem, "frameworks": ["parametric_static"] }), "frameworks[0]"),
+        (
+            vec![policy.clone()],
+            json!({ "problem": problem, "rules": { "adaptive": { "order": "1" } } }),
+            "rules.adaptive",
+        ),
+        (vec![policy.clone()], json!({ "problem": problem, "policies": { "adaptive": "x" } }), "policies.adaptive"),
+        (vec![policy.clone()], json!({ "problem": { "price": 10 } }), "policies.a"),
     ] {
         let mut request = json!({ "policies": { "a": "x" }, "paths": 100 });
         for (name, value) in change.as_object().unwrap() {
             request[name] = value.clone();
+        }
+        if request["problem"] == json!({ "price": 10 }) {
+            request["problem"] = problem.clone();
+            request["problem"]["parameters"]["price"] = json!(10);
         }
         match compared(&policies, &request) {
             Err(TrainError::Specification(fault)) => assert_eq!(fault.field, field, "{request}: {fault}"),

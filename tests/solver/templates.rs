@@ -74,8 +74,8 @@ fn a_hedge_costs_its_premium() {
     let (with, without) = (worth(1.0), worth(0.0));
     let premium = (without.value - with.value) / 1.002_f64.powi(3);
     println!("{premium} for {enumerated}, {} for {held}", action(&with));
-    // The surrogate learns what the worth has over the payoff as if it were due, which is kinked at the strike.
-    assert!((premium / enumerated - 1.0).abs() < 1e-3, "{premium} for {enumerated}");
+    // The value is kinked where a return of the record ends at the strike, and the surrogate rounds the kinks.
+    assert!((premium / enumerated - 1.0).abs() < 3e-4, "{premium} for {enumerated}");
     assert!((action(&with) - held).abs() < 0.01, "{} for {held}", action(&with));
 }
 

@@ -52,7 +52,7 @@ class AsyncNetwork(httpx.AsyncBaseTransport):
 
 
 def test_the_twins_have_the_same_names_and_arguments() -> None:
-    walked = {"WalkForward", "AssetsWalkForward"}
+    walked = {"WalkForward", "AssetsWalkForward", "DeclaredWalkForward"}
     others = {"Ballast", "Comparison", "Evaluation", "Frontier", "Job", "Policy", "Session", "Training"}
     assert set(TWINS) == walked | others
     for waits, awaited in TWINS.values():

@@ -92,6 +92,30 @@ def test_a_declared_problem(ballast: Ballast) -> None:
     assert ballast.comparison(compared.id).report()["problem"]["horizon"] == 2
 
 
+def test_frameworks_and_rules_of_a_declared_problem(ballast: Ballast) -> None:
+    declared = cast(wire.DeclaredSpecification, json.loads((REPOSITORY / "examples/problems/stock.json").read_text()))
+    declared["problem"]["horizon"], declared["design"] = 2, {"count": 20}
+    rules = {"base": {"order": "max(25 - stock, 0)"}}
+    compared = ballast.compare(
+        specification=declared, frameworks=["adaptive", "known_law"], rules=rules, paths=200, seed=3
+    )
+    frame = compared.frame()
+    assert list(frame.index) == ["adaptive", "known_law", "base"]
+    assert frame.loc["known_law", "robust_value"] > frame.loc["adaptive", "robust_value"]
+    declared["problem"]["history"] = [9.1, 27.3, 11.6, 19.0, 22.3, 21.1, 18.7, 14.0]
+    walk = ballast.backtest_declared(declared, window=5, frameworks=["adaptive", "plug_in"], rules=rules)
+    frame = walk.frame()
+    assert list(frame.index) == ["adaptive", "plug_in", "base"] and math.isnan(frame.loc["adaptive", "difference"])
+    base = ballast.declared_walk_forward(walk.id).periods("base")
+    assert list(base.columns) == ["noise", "reward", "radius", "state.stock", "action.order"]
+    assert list(base["noise"]) == [21.1, 18.7, 14.0] and base["radius"].isna().all()
+    assert list(base["action.order"]) == [25 - stock for stock in base["state.stock"]]
+    assert frame.loc["base", "earned"] == pytest.approx(base["reward"].sum())
+    assert walk.periods()["radius"].iloc[0] > 0.0
+    with pytest.raises(ValueError, match="no strategy 'bass': adaptive, plug_in, base"):
+        walk.periods("bass")
+
+
 def test_a_session_of_a_declared_problem(ballast: Ballast) -> None:
     declared = json.loads((REPOSITORY / "examples/problems/stock.json").read_text())
     declared["problem"]["horizon"], declared["design"] = 3, {"count": 20}

@@ -112,7 +112,7 @@ impl NextValue {
             NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
                 for (prediction, (total, largest)) in predictions.iter_mut().zip(totals) {
-                    *prediction = surrogate.clamped_gain(*prediction, total, largest);
+                    *prediction = surrogate.clamped_gain(*prediction, total, [0.0, largest]);
                 }
             }
             NextValue::Exact(..) => predictions.iter_mut().for_each(|gain| *gain = gain.max(0.0)),

@@ -2,10 +2,10 @@
 
 use super::{Footprint, LEAST, Sizes, advising_of, footprint, product};
 use crate::control::declared_training::DeclaredTraining;
+use crate::control::evaluation::declared_walk::DeclaredWalk;
 use crate::control::policy::declared::DeclaredPolicy;
 use crate::control::policy::prepared_step::{largest_design, steps_bytes};
 use crate::control::request::completion::DEFAULT_COUNT;
-use crate::control::request::declared_comparison::DeclaredComparison;
 
 /// Bytes of a path for each strategy and each period: its state, its noises, its actions and its worth.
 const PATH_BYTES: usize = 512;
@@ -14,24 +14,37 @@ const TABLE_BYTES: usize = 4 << 20;
 
 /// Returns the footprint of the training of a declared problem on so many threads, and of advice by its policy.
 pub fn training(training: &DeclaredTraining, threads: usize) -> (Footprint, [Footprint; 3]) {
+    let sizes = sizes(training);
+    let solving = sizes.solving(threads).saturating_add(product(&[threads, TABLE_BYTES])).saturating_add(LEAST);
+    (footprint(&sizes, solving, threads), advising_of(&sizes))
+}
+
+fn sizes(training: &DeclaredTraining) -> Sizes {
     let problem = &training.declared().problem;
     let mut sizes = Sizes::of(training.specification());
     sizes.count = training.declared().design.count.unwrap_or(DEFAULT_COUNT);
     sizes.inputs += problem.states.len();
     sizes.functions = 1 + problem.actions.len();
-    let solving = sizes.solving(threads).saturating_add(product(&[threads, TABLE_BYTES])).saturating_add(LEAST);
-    (footprint(&sizes, solving, threads), advising_of(&sizes))
+    sizes
 }
 
-/// Returns the footprint of a comparison on so many paths of a horizon, whose policies take `policies` bytes.
-pub fn comparison(request: &DeclaredComparison, horizon: usize, policies: usize) -> Footprint {
-    let strategies = request.policies.len() + request.rules.len();
+/// Returns the footprint of a comparison of strategies on so many paths of a horizon. The policies trained before take
+/// `policies` bytes, and those of `trainings` what they take when they advise.
+pub fn comparison(
+    paths: usize,
+    strategies: usize,
+    horizon: usize,
+    policies: usize,
+    trainings: &[&DeclaredTraining],
+) -> Footprint {
     let path = product(&[strategies + horizon, PATH_BYTES]);
-    Footprint::of("paths", request.paths, product(&[request.paths, path]).saturating_add(LEAST)).and(
-        "policies",
-        request.policies.len(),
-        policies,
-    )
+    let trained = trainings.iter().map(|training| {
+        let advising = advising_of(&sizes(training));
+        advising.iter().fold(0, |sum: usize, part| sum.saturating_add(part.bytes()))
+    });
+    let policies = trained.fold(policies, usize::saturating_add);
+    let simulated = product(&[paths, path]).saturating_add(LEAST);
+    Footprint::of("paths", paths, simulated).and("policies", strategies, policies)
 }
 
 /// Returns the memory that decisions by the policy of a declared problem take, including the policy itself. `read` is its
@@ -44,4 +57,12 @@ pub fn advising_by(policy: &DeclaredPolicy, read: &DeclaredTraining) -> [Footpri
         Footprint::of("specification.problem.radius.paths", sizes.paths, sizes.bridges),
         Footprint::of("specification.problem.horizon", sizes.horizon, steps_bytes(policy.steps())),
     ]
+}
+
+/// Returns the footprint of a walk-forward, whose trainings run side by side, on so many threads.
+pub fn walk(walk: &DeclaredWalk, threads: usize) -> Footprint {
+    let trainings = walk.trainings().iter().map(|first| training(first, threads).0.bytes());
+    let decisions = product(&[walk.decisions(), PATH_BYTES]).saturating_add(LEAST);
+    let trained = trainings.fold(0, usize::saturating_add);
+    Footprint::of("frameworks", walk.trainings().len(), trained).and("problem.history", walk.decisions(), decisions)
 }

@@ -8,6 +8,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::cache::Cache;
+use crate::control::declared_training::DeclaredTraining;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::estimate::{self, Footprint};
 use crate::control::policy::declared::DeclaredAdvisor;
@@ -26,14 +28,14 @@ const WORST: f64 = 0.05;
 /// Step of a mean, relative to its size, over which the slope of a certainty equivalent is taken.
 const SLOPE_STEP: f64 = 1e-6;
 
-/// Policies and rules compared, each in the order of its names, policies first.
+/// Policies trained before, policies trained here, and rules, in this order; each in that of its names or frameworks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ComparisonReport {
     /// `ballast-comparison-1`.
     pub format: String,
     /// The request.
     pub request: DeclaredComparison,
-    /// The declaration of the first policy.
+    /// The declaration, of the first policy if the request has none.
     pub problem: DeclaredProblem,
     /// One for each policy and each rule.
     pub strategies: Vec<ComparedStrategy>,
@@ -86,7 +88,11 @@ pub struct Comparison {
     request: DeclaredComparison,
     declared: DeclaredProblem,
     problem: Declared,
-    players: Vec<(String, Player)>,
+    /// Policies trained before.
+    policies: Vec<(String, Player)>,
+    /// The policies to train first, in the order of their frameworks.
+    trained: Vec<(String, DeclaredTraining)>,
+    rules: Vec<(String, Player)>,
 }
 
 /// A strategy on all paths.
@@ -97,29 +103,46 @@ struct Simulated {
 }
 
 impl Comparison {
-    /// Prepares a comparison of policies, which come in the order of their names.
+    /// Prepares a comparison with the policies of the request that were trained before, in the order of their names.
     ///
     /// # Errors
     /// A field that breaks its rule, a formula that cannot be read, policies of different problems.
     pub fn new(request: DeclaredComparison, policies: Vec<Arc<DeclaredAdvisor>>) -> Result<Self, FieldError> {
-        request.check()?;
-        let first = policies.first().ok_or_else(|| FieldError::new("policies", "{}", "must have one at least"))?;
-        let declared = first.policy().specification().problem.clone();
+        let request = request.completed()?;
+        let first = policies.first().map(|first| &first.policy().specification().problem);
+        let declared = request.problem.as_ref().or(first).cloned();
+        let declared = declared.ok_or_else(|| FieldError::new("policies", "{}", "must have one at least"))?;
         request.check_decisions(declared.horizon)?;
         let problem = Declared::new(&declared)?;
         for ((name, id), policy) in request.policies.iter().zip(&policies) {
             if !policy.policy().specification().problem.is_alike(&declared) {
-                let rule = "must be of the problem of the first policy, except for framework, radius and learning";
+                let of = if request.problem.is_some() { "`problem`" } else { "the problem of the first policy" };
+                let rule = format!("must be of {of}, except for framework, radius and learning");
                 return Err(FieldError::new(format!("policies.{name}"), id, rule));
             }
+        }
+        let mut trained = Vec::with_capacity(request.frameworks.len());
+        for (framework, declared) in request.frameworks.iter().zip(std::iter::repeat(request.specification())) {
+            let Some(declared) = declared else { break };
+            let training = DeclaredTraining::with(&declared.under(*framework), Cache::default())?;
+            trained.push((framework.name().to_owned(), training));
         }
         let rule = |(name, formulas): (&String, &BTreeMap<String, String>)| {
             Ok((name.clone(), Player::Rule(problem.rule(&format!("rules.{name}"), formulas)?)))
         };
         let rules: Vec<(String, Player)> = request.rules.iter().map(rule).collect::<Result<_, FieldError>>()?;
-        let named = request.policies.keys().cloned().zip(policies.into_iter().map(Player::Policy));
-        let players = named.chain(rules).collect();
-        Ok(Comparison { request, declared, problem, players })
+        let policies = request.policies.keys().cloned().zip(policies.into_iter().map(Player::Policy)).collect();
+        Ok(Comparison { request, declared, problem, policies, trained, rules })
+    }
+
+    /// Returns the trainings that come before the simulation, in the order of their frameworks.
+    pub fn trainings(&self) -> impl Iterator<Item = &DeclaredTraining> {
+        self.trained.iter().map(|(_, training)| training)
+    }
+
+    /// Returns the number of steps of all trainings, and one for the simulation.
+    pub fn step_count(&self) -> usize {
+        self.trained.len() * (self.declared.horizon - 1) + 1
     }
 
     /// Returns the request.
@@ -133,29 +156,40 @@ impl Comparison {
             Player::Policy(advisor) => advisor.bytes(),
             Player::Rule(_) => 0,
         };
-        let policies = self.players.iter().map(bytes).sum();
-        estimate::declared::comparison(&self.request, self.declared.horizon, policies)
+        let policies = self.policies.iter().map(bytes).sum();
+        let strategies = self.policies.len() + self.trained.len() + self.rules.len();
+        let trainings: Vec<&DeclaredTraining> = self.trainings().collect();
+        estimate::declared::comparison(self.request.paths, strategies, self.declared.horizon, policies, &trainings)
     }
 
-    /// Simulates every strategy on the current rayon pool. Noises are drawn from the history of the first policy, each
-    /// value as likely as any other. Streams: ("compared", step, path). Cost: a robust step for each policy at each
+    /// Simulates every strategy on the current rayon pool, given the policies of the trainings in their order. Noises are
+    /// drawn from the history, each value as likely as any other. Streams: ("compared", step, path). Cost: a robust step for each policy at each
     /// state that differs from all others. Checked by: `tests/solver/declared_comparison.rs`.
     ///
     /// # Errors
     /// A state that leaves its range, a formula without a value; [`TrainError::Stopped`] soon after the stop signal.
-    pub fn run(&self, watch: &Watch) -> Result<ComparisonReport, TrainError> {
+    pub fn run(&self, trained: Vec<Arc<DeclaredAdvisor>>, watch: &Watch) -> Result<ComparisonReport, TrainError> {
+        let trained: Vec<(String, Player)> =
+            self.trained.iter().map(|(name, _)| name.clone()).zip(trained.into_iter().map(Player::Policy)).collect();
+        let players: Vec<&(String, Player)> = self.policies.iter().chain(&trained).chain(&self.rules).collect();
         let (paths, horizon, history) = (self.request.paths, self.declared.horizon, &self.declared.history);
         let drawn = |step: usize, path: usize| {
             history[stream(self.request.seed, "compared", step, path).random_range(0..history.len())]
         };
         let noises = (0..horizon).map(|step| (0..paths).map(|path| drawn(step, path)).collect());
         let noises: Vec<Vec<f64>> = noises.collect();
-        let simulated = (0..self.players.len()).map(|place| self.simulated(place, &noises, watch));
+        let simulated = players.iter().enumerate().map(|(place, player)| {
+            let progress = |at: StepProgress| {
+                let (done, all) = (place * at.total + at.done, players.len() * at.total);
+                (watch.progress)(StepProgress { done, total: all, ..at });
+            };
+            self.simulated(player, &noises, &Watch { progress: &progress, ..*watch })
+        });
         let simulated = simulated.collect::<Result<Vec<Simulated>, TrainError>>()?;
         let statistics = Clustered::new(1, paths, self.request.level);
         let compared = |(place, own): (usize, &Simulated)| ComparedStrategy {
-            strategy: self.players[place].0.clone(),
-            is_rule: matches!(self.players[place].1, Player::Rule(_)),
+            strategy: players[place].0.clone(),
+            is_rule: matches!(players[place].1, Player::Rule(_)),
             value: self.value(statistics, &own.worths),
             difference: (place > 0).then(|| self.difference(statistics, &own.worths, &simulated[0].worths)),
             worst_twentieth: statistics.lowest(&own.worths, WORST),
@@ -171,8 +205,12 @@ impl Comparison {
     }
 
     /// Follows a strategy through all paths, period by period.
-    fn simulated(&self, place: usize, noises: &[Vec<f64>], watch: &Watch) -> Result<Simulated, TrainError> {
-        let (name, player) = &self.players[place];
+    fn simulated(
+        &self,
+        (name, player): &(String, Player),
+        noises: &[Vec<f64>],
+        watch: &Watch,
+    ) -> Result<Simulated, TrainError> {
         // A state that leaves its range is the fault of this strategy.
         let problem = self.problem.afresh();
         let start = Reached { state: problem.start(), seen: Vec::new() };
@@ -180,8 +218,7 @@ impl Comparison {
         let horizon = noises.len();
         let mut periods = Vec::with_capacity(horizon);
         for (step, noises) in noises.iter().enumerate() {
-            let (passed, all) = (place * horizon + step, self.players.len() * horizon);
-            let (done, total) = (self.request.paths * passed / all, self.request.paths);
+            let (done, total) = (step * self.request.paths, horizon * self.request.paths);
             (watch.progress)(StepProgress { step: 0, phase: Phase::Simulating, done, total });
             let actions = player.actions(&problem, step, &reached, watch)?;
             periods.push(self.means(&reached, &actions));
@@ -191,9 +228,7 @@ impl Comparison {
                 at.seen.push(scaled);
             }
             if let Some(fault) = problem.fault() {
-                let field = if matches!(player, Player::Rule(_)) { "rules" } else { "policies" };
-                let rule = format!("must not lead out of a range, but {fault}");
-                return Err(FieldError::new(format!("{field}.{name}"), name, rule).into());
+                return Err(leaving(name, matches!(player, Player::Rule(_)), fault).into());
             }
         }
         let worths = reached.iter().map(|at| problem.baseline(horizon, &at.state)).collect();
@@ -249,6 +284,12 @@ impl Comparison {
         let value = self.certain(mean) - self.certain(other_mean);
         Estimate { value, low: value + found.low - found.value, high: value + found.high - found.value }
     }
+}
+
+/// Returns the fault of a strategy that leads a state out of its range.
+pub(super) fn leaving(name: &str, is_rule: bool, fault: &FieldError) -> FieldError {
+    let field = if is_rule { "rules" } else { "policies" };
+    FieldError::new(format!("{field}.{name}"), name, format!("must not lead out of a range, but {fault}"))
 }
 
 impl Player {

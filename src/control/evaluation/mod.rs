@@ -7,6 +7,7 @@ pub mod backtest;
 pub mod backtest_report;
 pub mod deciding_paths;
 pub mod declared_comparison;
+pub mod declared_walk;
 pub mod frontier;
 pub mod names;
 pub mod paths;

@@ -302,8 +302,8 @@ impl Advisor {
                 let ends: Vec<f64> = ends.into_iter().map(|end| (end / unit).clamp(0.0, highest)).collect();
                 let prediction = holdings.at(&predictions, state.holding);
                 let total = dynamics.total(state.wealth, holdings.within(state.holding));
-                let gain =
-                    value.clamped_gain(prediction, total, largest) + holdings.beyond(dynamics, state.holding, in_hand);
+                let gain = value.clamped_gain(prediction, total, [0.0, largest])
+                    + holdings.beyond(dynamics, state.holding, in_hand);
                 let ruins = ends.iter().any(|end| self.problem.is_ruined(radius, *end));
                 let in_design = deviation <= stored.deviation_limit && is_finite && !ruins && self.pays(step, state);
                 let own = value.gain_spread(prediction, deviation * stored.value.scale, total);

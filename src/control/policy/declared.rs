@@ -12,6 +12,7 @@ use super::document::check_surrogates;
 use crate::control::cache::Cache;
 use crate::control::declared_training::DeclaredTraining;
 use crate::control::error::{FieldError, TrainError};
+use crate::control::problem::declared::Baseline;
 use crate::control::progress::Watch;
 use crate::control::request::declared::DeclaredSpecification;
 use crate::control::request::rules;
@@ -27,6 +28,10 @@ pub const FORMAT: &str = "ballast-declared-1";
 pub struct DeclaredPolicy {
     format: String,
     specification: DeclaredSpecification,
+    /// The amount that a gain of 1 is worth; 1 if a utility counts ratios.
+    unit: f64,
+    /// Worths from which surrogates count gains, for the step of each; none if a utility counts ratios.
+    baselines: Vec<Baseline>,
     steps: Vec<StepSolution>,
 }
 
@@ -48,6 +53,9 @@ pub struct Decided {
     pub worst_law: Vec<NoiseMove>,
     /// Value less its lower bound by duality, both of this step.
     pub duality_gap: f64,
+    /// Root mean square error of the value, as of this period, over the states of the step after. Null if the policy was
+    /// not trained to an accuracy.
+    pub value_error: Option<f64>,
     /// Share of the worst law's outcomes after which the next state is unlike those that the next step was trained at.
     /// What they are worth is then a guess.
     pub untrained_share: f64,
@@ -75,9 +83,11 @@ impl Decided {
 }
 
 impl DeclaredPolicy {
-    /// Builds the policy of a completed declaration from the solutions of its steps, ascending from the second.
-    pub fn new(specification: DeclaredSpecification, steps: Vec<StepSolution>) -> Self {
-        DeclaredPolicy { format: FORMAT.to_owned(), specification, steps }
+    /// Builds the policy of a training from the solutions of its steps, ascending from the second.
+    pub fn new(training: &DeclaredTraining, steps: Vec<StepSolution>) -> Self {
+        let (unit, baselines) = training.problem().gains();
+        let (format, specification) = (FORMAT.to_owned(), training.declared().clone());
+        DeclaredPolicy { format, specification, unit, baselines, steps }
     }
 
     /// Trains a declared problem on the current rayon pool.
@@ -87,7 +97,7 @@ impl DeclaredPolicy {
     pub fn train(declared: &DeclaredSpecification, watch: &Watch) -> Result<Self, TrainError> {
         let training = DeclaredTraining::with(declared, Cache::default())?;
         let steps = training.run(watch)?;
-        Ok(DeclaredPolicy::new(training.declared().clone(), steps))
+        Ok(DeclaredPolicy::new(&training, steps))
     }
 
     /// Returns the completed declaration.
@@ -121,6 +131,13 @@ impl DeclaredPolicy {
         if self.steps.len() + 1 != horizon {
             let rule = format!("must hold all steps but the first: {}", horizon - 1);
             return Err(FieldError::new("steps", self.steps.len(), rule));
+        }
+        let (unit, baselines) = training.problem().gains();
+        if unit != self.unit {
+            return Err(FieldError::new("unit", self.unit, format!("must be {unit}, by the declaration")));
+        }
+        if baselines != self.baselines {
+            return Err(FieldError::new("baselines", "other baselines", "must be those of the declaration"));
         }
         for (index, step) in self.steps.iter().enumerate() {
             if step.step != index + 1 {

@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use super::assets::{ASSETS, DATES, NAMES, check_names};
 use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, frequency, same_length};
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
+use super::declared_backtest::DeclaredBacktest;
 use super::frequency::Frequency;
 use super::radius_rules::ALPHA;
 use super::rules::{
@@ -102,7 +103,8 @@ fn one_step() -> Vec<StrategyFamily> {
     vec![StrategyFamily::OneStep]
 }
 
-/// A walk-forward of one asset, or of several assets if the request has the field `assets`.
+/// A walk-forward of one asset, of several assets if the request has the field `assets`, or of a declared problem if it has
+/// the field `problem`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 #[allow(clippy::large_enum_variant)]
@@ -111,14 +113,17 @@ pub enum BacktestQuestion {
     Asset(BacktestRequest),
     /// Several assets.
     Assets(AssetsBacktestRequest),
+    /// A problem declared in formulas.
+    Declared(DeclaredBacktest),
 }
 
 impl<'de> Deserialize<'de> for BacktestQuestion {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = Value::deserialize(deserializer)?;
-        let read = match value.get("assets") {
-            Some(_) => serde_json::from_value(value).map(BacktestQuestion::Assets),
-            None => serde_json::from_value(value).map(BacktestQuestion::Asset),
+        let read = match ["assets", "problem"].map(|field| value.get(field).is_some()) {
+            [true, _] => serde_json::from_value(value).map(BacktestQuestion::Assets),
+            [_, true] => serde_json::from_value(value).map(BacktestQuestion::Declared),
+            _ => serde_json::from_value(value).map(BacktestQuestion::Asset),
         };
         read.map_err(D::Error::custom)
     }

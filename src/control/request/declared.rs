@@ -31,10 +31,15 @@ pub struct DeclaredSpecification {
 }
 
 /// The states that the surrogates of a declared problem are trained on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DeclaredDesign {
-    /// Number of design points per step, 10 to 10,000. Default 1000.
+    /// Target accuracy of the worth, in its own unit as of the start: the root mean square error over the states of a step,
+    /// including the errors of later steps. Design points are added until fresh states show that it is reached, or until
+    /// there are `count`. Default: none, and `count` decides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
+    /// Number of design points per step, 10 to 10,000; with an `accuracy`, the largest number. Default 1000.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
 }
@@ -147,6 +152,34 @@ pub enum DeclaredUtility {
         /// Formula of the amount.
         of: String,
     },
+}
+
+impl DeclaredSpecification {
+    /// Returns the same problem under another framework. `known_law` takes the law of the history as true.
+    #[must_use]
+    pub fn under(&self, framework: Framework) -> Self {
+        let mut own = self.clone();
+        own.problem.framework = framework;
+        if framework == Framework::KnownLaw {
+            own.problem.framework = Framework::Static;
+            own.problem.radius = Some(RadiusRule::Fixed { radius: 0.0 });
+        }
+        own
+    }
+
+    /// Returns the problem of the next policy of one who lives this problem: of the last `window` noises of those known,
+    /// from the present states.
+    #[must_use]
+    pub fn next(&self, known: impl Iterator<Item = f64>, window: Option<usize>, states: BTreeMap<String, f64>) -> Self {
+        let mut next = self.clone();
+        next.problem.history = known.collect();
+        let most = window.unwrap_or(usize::MAX).min(*HISTORY_LENGTH.end());
+        next.problem.history.drain(..next.problem.history.len().saturating_sub(most));
+        for (name, value) in states {
+            next.problem.states.entry(name).and_modify(|state| state.start = value);
+        }
+        next
+    }
 }
 
 impl DeclaredProblem {

@@ -14,6 +14,7 @@ pub mod completion;
 pub mod contributions;
 pub mod dates;
 pub mod declared;
+pub mod declared_backtest;
 pub mod declared_comparison;
 pub mod evaluation;
 pub mod framework;

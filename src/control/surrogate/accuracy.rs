@@ -136,12 +136,11 @@ impl Checks {
     }
 
     /// Returns the root mean square error of `served`, in basis points, from the states solved in the order of the
-    /// checks, at their holdings and halfway between.
+    /// checks, at their holdings and halfway between. No gain is below `least`.
     pub fn error<'a>(
         &self,
         served: &ValueSurrogate,
-        specification: &Specification,
-        step: usize,
+        (specification, step, least): (&Specification, usize, f64),
         solved: impl Iterator<Item = &'a DesignPoint>,
     ) -> f64 {
         let dynamics = Dynamics::of(&specification.problem)[step];
@@ -152,7 +151,7 @@ impl Checks {
             let error = |(holding, gain): (f64, &f64)| {
                 let total = dynamics.total(point.wealth, holding);
                 let largest = point.largest_gain + (unsold / total).ln();
-                served.clamped_gain(holdings.at(&predictions, holding), total, largest) - gain
+                served.clamped_gain(holdings.at(&predictions, holding), total, [least, largest]) - gain
             };
             let between = holdings.halved().nodes().skip(1).step_by(2).zip(&point.between);
             let errors: Vec<f64> = holdings.nodes().zip(&point.floor_gains).chain(between).map(error).collect();

@@ -30,7 +30,7 @@ pub const LAW_BYTES: usize = 40;
 /// Sets of fresh states that must each confirm that a design is accurate enough; the larger error is reported. A design
 /// that stopped at the first favourable set reported too small an error, by a factor of 1.3 in the geometric mean. A
 /// design that has all the points it may have stops in any case, and reports the root mean square of both.
-const SETS: usize = 2;
+pub const SETS: usize = 2;
 /// Progress is reported about this often in a step.
 const REPORTS_PER_STEP: usize = 100;
 
@@ -72,6 +72,12 @@ pub struct DesignFitting<'a> {
     pub counts: Counts,
     /// The error allowed; `None` if all design points are solved.
     pub aim: Option<Aim>,
+    /// The least gain that there can be: 0 if there is a floor.
+    pub least_gain: f64,
+    /// Sets of fresh states that judge a design.
+    pub sets: usize,
+    /// True if states beyond the limit of the deviations are served without the surrogate.
+    pub is_guarded: bool,
     /// The stop signal and the callback for progress.
     pub watch: &'a Watch<'a>,
 }
@@ -121,7 +127,8 @@ impl DesignFitting<'_> {
                 StepDiagnostics { value: Some(value), policy: Some(policy), ..diagnostics(step, &known.solved) };
             if let Some(aim) = &self.aim {
                 let served = ValueSurrogate::new(self.specification, step, &stored);
-                let found = JudgedFit { served, deviations, limit: stored.deviation_limit, before: known.solved.len() };
+                let limit = if self.is_guarded { stored.deviation_limit } else { f64::INFINITY };
+                let found = JudgedFit { served, deviations, limit, before: known.solved.len() };
                 let (own, checked) = self.judge(states, aim, &found, (fresh, &guards), round)?;
                 if !aim.is_met_by(own) && known.solved.len() < most {
                     wanted = aim.next(known.solved.len(), own).min(most);
@@ -149,8 +156,8 @@ impl DesignFitting<'_> {
         let (mut errors, mut numbers, mut solved) = (Vec::with_capacity(SETS), Vec::new(), Vec::new());
         let mut leaping = Vec::new();
         let last = *before >= self.counts.design;
-        for set in 0..SETS {
-            let checks = Checks::of(deviations, *limit, self.specification.seed, self.step, SETS * round + set);
+        for set in 0..self.sets {
+            let checks = Checks::of(deviations, *limit, self.specification.seed, self.step, self.sets * round + set);
             let drawn: Vec<usize> = checks.weighted.iter().map(|&(state, _)| state).collect();
             // A state that an earlier set holds is solved already.
             let new: Vec<usize> = drawn.iter().copied().filter(|state| !numbers.contains(state)).collect();
@@ -160,8 +167,8 @@ impl DesignFitting<'_> {
             numbers.extend(new);
             let place = |state: &usize| numbers.iter().position(|number| number == state);
             let points = drawn.iter().filter_map(place).map(|place| &solved[place]);
-            let error = checks.error(served, self.specification, self.step, points);
-            let error = self.with_leaps(states, served, error, SETS * round + set, &mut leaping)?;
+            let error = checks.error(served, self.judging(), points);
+            let error = self.with_leaps(states, served, error, self.sets * round + set, &mut leaping)?;
             errors.push(error);
             if !last && !aim.is_met_by(error) {
                 break;
@@ -171,6 +178,11 @@ impl DesignFitting<'_> {
         let own = if last { mean_square().sqrt() } else { errors.iter().copied().fold(0.0, f64::max) };
         solved.extend(leaping);
         Ok((own, solved))
+    }
+
+    /// Returns what errors are judged by.
+    fn judging(&self) -> (&Specification, usize, f64) {
+        (self.specification, self.step, self.least_gain)
     }
 
     /// Returns the error over all states, given that over those that do not leap: one state in [`LEAPS`] does. Solves
@@ -188,7 +200,7 @@ impl DesignFitting<'_> {
         }
         let some = self.numbered(states, self.counts.leaping_checks(set))?;
         let points = self.judges(states, some, 0)?;
-        let leaping = Checks::evenly(LEAPING_CHECKS).error(served, self.specification, self.step, points.iter());
+        let leaping = Checks::evenly(LEAPING_CHECKS).error(served, self.judging(), points.iter());
         solved.extend(points);
         let share = 1.0 / LEAPS as f64;
         Ok(((1.0 - share) * error * error + share * leaping * leaping).sqrt())

@@ -110,10 +110,10 @@ impl ValueSurrogate {
         if spread.is_nan() { f64::INFINITY } else { spread }
     }
 
-    /// Returns the floor gain of a predicted target at total wealth, between its lower bound 0 and the upper bound
-    /// `largest`.
-    pub fn clamped_gain(&self, prediction: f64, total: f64, largest: f64) -> f64 {
-        self.target.gain(prediction, total).clamp(0.0, largest.max(0.0))
+    /// Returns the gain of a predicted target at total wealth, between its lower bound, 0 if there is a floor, and the upper
+    /// bound `largest`.
+    pub fn clamped_gain(&self, prediction: f64, total: f64, [least, largest]: [f64; 2]) -> f64 {
+        self.target.gain(prediction, total).clamp(least, largest.max(least))
     }
 }
 

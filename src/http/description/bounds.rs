@@ -17,6 +17,7 @@ use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::declared::{DeclaredDesign, DeclaredProblem};
+use crate::control::request::declared_backtest::DeclaredBacktest;
 use crate::control::request::declared_comparison::DeclaredComparison;
 use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::frontier::FrontierRequest;
@@ -88,6 +89,7 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<DeclaredProblem>(),
         of::<DeclaredDesign>(),
         of::<DeclaredComparison>(),
+        of::<DeclaredBacktest>(),
         of::<Decide>(),
         of::<InputRange>(),
         of::<WhatIf>(),

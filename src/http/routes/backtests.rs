@@ -1,4 +1,4 @@
-//! Walk-forward backtests through histories of returns.
+//! Walk-forward backtests through histories of returns, or of the noises of a declared problem.
 
 use std::sync::Arc;
 
@@ -16,7 +16,8 @@ use crate::http::problem::ProblemDocument;
 use crate::http::routes::jobs::{Queueing, accepted, idempotency_key};
 use crate::service::Service;
 
-/// Queues a walk-forward backtest through a history of returns, of one asset or of several.
+/// Queues a walk-forward backtest through a history of returns, of one asset or of several, or through the noises of a
+/// declared problem.
 #[utoipa::path(post, path = "/backtest", tag = "jobs",
     request_body(content = BacktestQuestion, example = json!({
         "simple_returns": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.017, -0.009, 0.024, 0.011, -0.03, 0.019],
@@ -37,16 +38,18 @@ pub async fn backtest(
     Ok(accepted(service.jobs.backtest(&caller, request, idempotency_key(&headers)?).await?))
 }
 
-/// The part of a request that shows if it names assets.
+/// The part of a request that shows what walks.
 #[derive(Deserialize)]
 struct BacktestShape {
     assets: Option<IgnoredAny>,
+    problem: Option<IgnoredAny>,
 }
 
 /// Decodes the request by its shape, so that an error names the right field.
 fn question(bytes: &[u8]) -> Result<BacktestQuestion, ProblemDocument> {
     match decode::object(bytes) {
-        Ok(BacktestShape { assets: Some(_) }) => decode::object(bytes).map(BacktestQuestion::Assets),
+        Ok(BacktestShape { assets: Some(_), .. }) => decode::object(bytes).map(BacktestQuestion::Assets),
+        Ok(BacktestShape { problem: Some(_), .. }) => decode::object(bytes).map(BacktestQuestion::Declared),
         _ => decode::object(bytes).map(BacktestQuestion::Asset),
     }
 }

@@ -49,11 +49,17 @@ pub async fn evaluate(
 fn question(bytes: &[u8]) -> Result<EvaluationQuestion, ProblemDocument> {
     #[derive(Deserialize)]
     struct Shape {
-        problem: Option<IgnoredAny>,
+        problem: Option<Declaring>,
         policies: Option<IgnoredAny>,
     }
+    #[derive(Deserialize)]
+    struct Declaring {
+        states: Option<IgnoredAny>,
+    }
     match decode::object(bytes) {
-        Ok(Shape { problem: None, policies: Some(_) }) => decode::object(bytes).map(EvaluationQuestion::Declared),
+        Ok(Shape { problem: Some(Declaring { states: Some(_) }), .. } | Shape { problem: None, policies: Some(_) }) => {
+            decode::object(bytes).map(EvaluationQuestion::Declared)
+        }
         _ => decode::object(bytes).map(EvaluationQuestion::Investor),
     }
 }

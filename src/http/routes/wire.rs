@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::backtest_report::BacktestReport;
 use crate::control::evaluation::declared_comparison::ComparisonReport;
+use crate::control::evaluation::declared_walk::DeclaredWalkReport;
 use crate::control::evaluation::frontier::report::FrontierReport;
 use crate::control::evaluation::report::EvaluationReport;
 use crate::control::posed::Posed;
@@ -114,6 +115,7 @@ pub enum JobReport {
     Comparison(Box<ComparisonReport>),
     Backtest(Box<BacktestReport>),
     BacktestOfAssets(Box<AssetsBacktestReport>),
+    BacktestOfDeclared(Box<DeclaredWalkReport>),
     Frontier(Box<FrontierReport>),
 }
 

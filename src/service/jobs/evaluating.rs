@@ -1,6 +1,7 @@
 //! Queueing of evaluations.
 
 use super::{Accepted, Jobs, QueuedRequest};
+use crate::control::declared_training::DeclaredTraining;
 use crate::control::estimate;
 use crate::control::evaluation::declared_comparison::Comparison;
 use crate::control::request::evaluation::EvaluationRequest;
@@ -42,8 +43,12 @@ impl Jobs {
         let request = comparison.request();
         let sent = serde_json::to_vec(request).map_err(ServiceError::internal)?;
         self.memory.admits(&comparison.footprint())?;
-        let queued = QueuedRequest::of(JobKind::Evaluate, &sent, request, 1);
+        for training in comparison.trainings() {
+            self.memory.admits(&estimate::declared::training(training, self.threads).0)?;
+        }
+        let queued = QueuedRequest::of(JobKind::Evaluate, &sent, request, comparison.step_count());
         let job = self.queue((&caller.tenant, caller.actor()), queued, key).await?;
-        Ok(Accepted { job, warnings: Vec::new() })
+        let warnings = comparison.trainings().next().map(DeclaredTraining::warnings);
+        Ok(Accepted { job, warnings: warnings.unwrap_or_default() })
     }
 }

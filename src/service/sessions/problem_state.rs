@@ -106,12 +106,12 @@ impl ProblemState {
 
     /// Returns the states by name.
     pub fn named(&self) -> BTreeMap<String, f64> {
-        named(self.problem.states_named(), &self.state.values)
+        self.problem.states_by_name(&self.state)
     }
 
     /// Returns actions by name.
     pub(in crate::service) fn actions_named(&self, actions: &[f64]) -> BTreeMap<String, f64> {
-        named(self.problem.actions_named(), actions)
+        self.problem.actions_by_name(actions)
     }
 
     /// Reads the noise of the coming period from `report`.
@@ -209,8 +209,4 @@ impl ProblemState {
         standing.days = self.days.after(report.date, None);
         Ok(Transition { seen, moved: ProblemPeriod { noise: report.noise, actions, reward }, standing })
     }
-}
-
-fn named(names: &[String], values: &[f64]) -> BTreeMap<String, f64> {
-    names.iter().cloned().zip(values.iter().copied()).collect()
 }

@@ -18,11 +18,13 @@ from .jobs import (
     AssetsWalkForward,
     AsyncAssetsWalkForward,
     AsyncComparison,
+    AsyncDeclaredWalkForward,
     AsyncEvaluation,
     AsyncFrontier,
     AsyncTraining,
     AsyncWalkForward,
     Comparison,
+    DeclaredWalkForward,
     Evaluation,
     Frontier,
     Training,
@@ -272,8 +274,10 @@ class _Ballast:
 
     async def _compare(
         self,
-        policies: Mapping[str, str | Policy | AsyncPolicy],
+        policies: Mapping[str, str | Policy | AsyncPolicy] | None = None,
         *,
+        specification: wire.DeclaredSpecification | None = None,
+        frameworks: Sequence[wire.Framework] | None = None,
         rules: Mapping[str, Mapping[str, str]] | None = None,
         paths: int | None = None,
         seed: int | None = None,
@@ -282,13 +286,49 @@ class _Ballast:
     ) -> wire.Job:
         """Queues a comparison of policies of one declared problem, and of rules, on noises drawn from its record.
 
-        ``policies`` are policies or their names, each under a name of your own. ``rules`` have a formula for each
-        action, as in ``{"base stock": {"order": "max(25 - stock, 0)"}}``. Does not wait for the comparison.
+        ``policies`` are policies or their names, each under a name of your own. Of ``specification``, as ``submit``
+        takes it, a policy is trained for each of the ``frameworks``. ``rules`` have a formula for each action, as in
+        ``{"base stock": {"order": "max(25 - stock, 0)"}}``. Does not wait for the comparison.
         """
-        named = {name: policy if isinstance(policy, str) else policy.id for name, policy in policies.items()}
-        ruled = None if rules is None else {name: dict(rule) for name, rule in rules.items()}
-        request = _given({"policies": named, "rules": ruled, "paths": paths, "seed": seed, "level": level})
-        return await self._queued("/evaluate", request, idempotency_key)
+        named = {name: policy if isinstance(policy, str) else policy.id for name, policy in (policies or {}).items()}
+        request = {
+            **(specification or {}),
+            "policies": named or None,
+            "frameworks": None if frameworks is None else list(frameworks),
+            "rules": _ruled(rules),
+            "paths": paths,
+            "level": level,
+        }
+        if seed is not None:
+            request["seed"] = seed
+        return await self._queued("/evaluate", _given(request), idempotency_key)
+
+    async def _backtest_declared(
+        self,
+        specification: wire.DeclaredSpecification,
+        *,
+        window: int | None = None,
+        every: int | None = None,
+        frameworks: Sequence[wire.Framework] | None = None,
+        rules: Mapping[str, Mapping[str, str]] | None = None,
+        level: float | None = None,
+        idempotency_key: str | None = None,
+    ) -> wire.Job:
+        """Queues a walk-forward of a declared problem through its own record, and does not wait for it.
+
+        ``specification`` is as ``submit`` takes it; its ``history`` is the whole record. Every ``every`` periods a
+        policy is trained on the ``window`` noises before, for each of the ``frameworks``. ``rules`` are as in
+        ``compare``.
+        """
+        request = {
+            **specification,
+            "window": window,
+            "every": every,
+            "frameworks": None if frameworks is None else list(frameworks),
+            "rules": _ruled(rules),
+            "level": level,
+        }
+        return await self._queued("/backtest", _given(request), idempotency_key)
 
     async def _backtest(
         self,
@@ -564,6 +604,8 @@ class Ballast(_Ballast):
     walk_forward = blocking_into(_Ballast._job, WalkForward)
     backtest_assets = blocking_into(_Ballast._backtest_assets, AssetsWalkForward)
     assets_walk_forward = blocking_into(_Ballast._job, AssetsWalkForward)
+    backtest_declared = blocking_into(_Ballast._backtest_declared, DeclaredWalkForward)
+    declared_walk_forward = blocking_into(_Ballast._job, DeclaredWalkForward)
     frontier = blocking_into(_Ballast._frontier, Frontier)
     frontier_of = blocking_into(_Ballast._job, Frontier)
     import_policy = blocking_into(_Ballast._import_policy, Policy)
@@ -626,6 +668,8 @@ class AsyncBallast(_Ballast):
     walk_forward = awaiting_into(_Ballast._job, AsyncWalkForward)
     backtest_assets = awaiting_into(_Ballast._backtest_assets, AsyncAssetsWalkForward)
     assets_walk_forward = awaiting_into(_Ballast._job, AsyncAssetsWalkForward)
+    backtest_declared = awaiting_into(_Ballast._backtest_declared, AsyncDeclaredWalkForward)
+    declared_walk_forward = awaiting_into(_Ballast._job, AsyncDeclaredWalkForward)
     frontier = awaiting_into(_Ballast._frontier, AsyncFrontier)
     frontier_of = awaiting_into(_Ballast._job, AsyncFrontier)
     import_policy = awaiting_into(_Ballast._import_policy, AsyncPolicy)
@@ -701,6 +745,10 @@ def _amounts(contributions: float | Sequence[float] | None) -> float | list[floa
 
 def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in fields.items() if value is not None}
+
+
+def _ruled(rules: Mapping[str, Mapping[str, str]] | None) -> dict[str, dict[str, str]] | None:
+    return None if rules is None else {name: dict(rule) for name, rule in rules.items()}
 
 
 def _headers(key: str | None, more: Mapping[str, str] | None) -> dict[str, str]:

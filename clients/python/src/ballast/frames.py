@@ -358,6 +358,42 @@ def comparison(report: wire.ComparisonReport) -> pd.DataFrame:
     return require_pandas().DataFrame(rows).set_index("strategy")
 
 
+def declared_walk(report: wire.DeclaredWalkReport) -> pd.DataFrame:
+    """Returns policies and rules that walked through the record of a declared problem, indexed by ``strategy``.
+
+    ``gain`` is the mean gain of a period, ``difference`` the gain less that of the first strategy, each with its
+    interval in the columns with ``_low`` and ``_high``. ``earned`` is the sum of the rewards and ``left`` what the last
+    states are worth. Raises ``ImportError`` without pandas.
+    """
+    rows = []
+    for strategy in report["strategies"]:
+        row: dict[str, Any] = {"strategy": strategy["strategy"], "is_rule": strategy["is_rule"]}
+        row |= _estimate("gain", strategy["gain"]) | _estimate("difference", strategy.get("difference"))
+        rows.append(row | {"earned": strategy["earned"], "left": strategy["left"]})
+    return require_pandas().DataFrame(rows).set_index("strategy")
+
+
+def declared_periods(report: wire.DeclaredWalkReport, strategy: str | None = None) -> pd.DataFrame:
+    """Returns the periods that a strategy walked through, by default the first, indexed by ``period`` from 1.
+
+    The columns are ``noise``, ``reward``, ``radius``, which is NaN for rules, ``state.<name>`` for each state before the
+    noise, and ``action.<name>``. Raises ``ValueError`` for an unknown strategy and ``ImportError`` without
+    pandas.
+    """
+    walked = {own["strategy"]: own for own in report["strategies"]}
+    name = next(iter(walked)) if strategy is None else strategy
+    if name not in walked:
+        raise ValueError(f"there is no strategy {name!r}: {', '.join(walked)}")
+    rows = []
+    for number, period in enumerate(walked[name]["periods"], start=1):
+        radius = period.get("radius")
+        row: dict[str, Any] = {"period": number, "noise": period["noise"], "reward": period["reward"]}
+        row |= {"radius": math.nan if radius is None else radius}
+        row |= {f"state.{name}": value for name, value in period["states"].items()}
+        rows.append(row | {f"action.{name}": value for name, value in period["actions"].items()})
+    return require_pandas().DataFrame(rows).set_index("period")
+
+
 def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
     """Returns a figure and the ends of its interval, which is a list in reports of walk-forwards."""
     ends = (name, f"{name}_low", f"{name}_high")

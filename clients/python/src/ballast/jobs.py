@@ -230,6 +230,32 @@ class _AssetsWalkForward(_Walk):
         return frames.held(await self._report(watch), strategy)
 
 
+class _DeclaredWalkForward(_Job):
+    """A job that produces a report on a declared problem; ``Ballast.declared_walk_forward(id)`` looks it up."""
+
+    async def _report(self, watch: Watch | None = None) -> wire.DeclaredWalkReport:
+        """Waits for the end of the walk-forward, and calls ``watch`` at each change.
+
+        Raises :class:`JobEnded` if the job fails or is cancelled.
+        """
+        return cast(wire.DeclaredWalkReport, await self._ended(watch))
+
+    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
+        """Returns policies and rules, one per row (:func:`ballast.frames.declared_walk`).
+
+        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas.
+        """
+        return frames.declared_walk(await self._report(watch))
+
+    async def _periods(self, strategy: str | None = None, watch: Watch | None = None) -> pd.DataFrame:
+        """Returns the periods of a strategy, by default of the first (:func:`ballast.frames.declared_periods`).
+
+        Waits and raises as ``report`` does, and raises ``ValueError`` for an unknown strategy and ``ImportError``
+        without pandas.
+        """
+        return frames.declared_periods(await self._report(watch), strategy)
+
+
 class _Frontier(_Job):
     """A job that produces a report; ``Ballast.frontier_of(id)`` looks it up."""
 
@@ -305,6 +331,14 @@ class AssetsWalkForward(_WaitedWalk, _AssetsWalkForward):
     held = blocking(_AssetsWalkForward._held)
 
 
+class DeclaredWalkForward(Job, _DeclaredWalkForward):
+    __doc__ = _DeclaredWalkForward.__doc__
+
+    report = Answering(wire.DeclaredWalkReport).blocking(_DeclaredWalkForward._report)
+    frame = blocking(_DeclaredWalkForward._frame)
+    periods = blocking(_DeclaredWalkForward._periods)
+
+
 class Frontier(Job, _Frontier):
     __doc__ = _Frontier.__doc__
 
@@ -361,6 +395,14 @@ class AsyncAssetsWalkForward(_AwaitedWalk, _AssetsWalkForward):
 
     report = _AssetsWalkForward._report
     held = _AssetsWalkForward._held
+
+
+class AsyncDeclaredWalkForward(AsyncJob, _DeclaredWalkForward):
+    """A :class:`DeclaredWalkForward` whose calls are awaited."""
+
+    report = _DeclaredWalkForward._report
+    frame = _DeclaredWalkForward._frame
+    periods = _DeclaredWalkForward._periods
 
 
 class AsyncFrontier(AsyncJob, _Frontier):

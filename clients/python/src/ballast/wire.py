@@ -421,32 +421,17 @@ class DeclaredAction(TypedDict):
     """The actions that there are, instead of bounds."""
 
 
-class DeclaredComparison(TypedDict):
-    """A comparison of trained policies of one declared problem, and of rules, on common noises drawn from the record."""
-
-    policies: dict[str, str]
-    """
-    Policies by names of your own, 1 to 8. Their declarations may differ in `framework`, `radius` and `learning`. The
-    first by name is the one that others are compared with.
-    """
-    rules: NotRequired[dict[str, dict[str, str]]]
-    """
-    Rules by names of your own, at most 20: for each action a formula of the states, the parameters, `t` and `T`. An action
-    is moved into its bounds, or to the nearest of its values.
-    """
-    paths: NotRequired[int]
-    """Number of simulated paths, 100 to 100,000. Default 1000."""
-    seed: NotRequired[int]
-    """Seed of all random draws. Default 1."""
-    level: NotRequired[float]
-    """Confidence of the intervals, 0.5 to 0.999. Default 0.95."""
-
-
 class DeclaredDesign(TypedDict):
     """The states that the surrogates of a declared problem are trained on."""
 
+    accuracy: NotRequired[float | None]
+    """
+    Target accuracy of the worth, in its own unit as of the start: the root mean square error over the states of a step,
+    including the errors of later steps. Design points are added until fresh states show that it is reached, or until
+    there are `count`. Default: none, and `count` decides.
+    """
     count: NotRequired[int | None]
-    """Number of design points per step, 10 to 10,000. Default 1000."""
+    """Number of design points per step, 10 to 10,000; with an `accuracy`, the largest number. Default 1000."""
 
 
 class DeclaredNow(TypedDict):
@@ -533,7 +518,8 @@ ConstantMix: TypeAlias = float
 
 class ExpectedError(TypedDict):
     """
-    Root mean square errors of the value of a step, in basis points of the certainty equivalent, at any holding. They
+    Root mean square errors of the value of a step, in basis points of the certainty equivalent, at any holding; for a
+    declared problem in ten-thousandths of the size of its amounts. They
     are over the design's own law of its states, of which one in eight leaps beyond the record: one or more of the returns
     on the way to it may be anything within the support.
     """
@@ -1504,6 +1490,42 @@ UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 
 """Utility of terminal wealth, always maximised."""
 
 
+class WalkedPeriod(TypedDict):
+    """A period that a strategy lived."""
+
+    states: dict[str, float]
+    """States before the noise, by name."""
+    actions: dict[str, float]
+    """Actions by name."""
+    noise: float
+    """The noise of the record."""
+    reward: float
+    """Earnings of the period by `reward`."""
+    radius: NotRequired[float | None]
+    """Radius of the ball of the decision, in the unit of the noise. Null for rules."""
+
+
+class WalkedStrategy(TypedDict):
+    """A policy, trained again and again, or a rule, on the record."""
+
+    strategy: str
+    """Name of the framework, or of the rule in the request."""
+    is_rule: bool
+    """True for a rule."""
+    earned: float
+    """Sum of the rewards, discounted to the first period lived."""
+    left: float
+    """Worth of the last states by `end`, or their amount by the utility, not discounted."""
+    gain: Estimate
+    """
+    Mean gain of a period: its reward, and how much more the states are worth after it, by `end` or as the amount of the
+    utility. The interval is of resamples of the periods in blocks of `every`.
+    """
+    difference: NotRequired[Estimate | None]
+    periods: list[WalkedPeriod]
+    """Period by period."""
+
+
 WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "jumps"]
 """Kind of a warning."""
 
@@ -1967,6 +1989,11 @@ class Decided(TypedDict):
     """The worst law of the period: where the mass of the noises seen goes, ascending. Shares add up to 1."""
     duality_gap: float
     """Value less its lower bound by duality, both of this step."""
+    value_error: NotRequired[float | None]
+    """
+    Root mean square error of the value, as of this period, over the states of the step after. Null if the policy was
+    not trained to an accuracy.
+    """
     untrained_share: float
     """
     Share of the worst law's outcomes after which the next state is unlike those that the next step was trained at.
@@ -2917,19 +2944,6 @@ class BacktestRequest(TypedDict):
     """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
 
 
-class ComparisonReport(TypedDict):
-    """Policies and rules compared, each in the order of its names, policies first."""
-
-    format: str
-    """`ballast-comparison-1`."""
-    request: DeclaredComparison
-    """The request."""
-    problem: DeclaredProblem
-    """The declaration of the first policy."""
-    strategies: list[ComparedStrategy]
-    """One for each policy and each rule."""
-
-
 class Composition(TypedDict):
     """Several assets before the coming period, by their names."""
 
@@ -2993,6 +3007,70 @@ class DecideAnswer(Decided):
 
 DecideReply: TypeAlias = DecideAnswer | PolicyMap
 """The answer to a decision: at a state, or over ranges of inputs."""
+
+
+class DeclaredBacktest(TypedDict):
+    """
+    A walk-forward of a declared problem through a record of noises. At regular intervals a policy is trained on the noises
+    before, from the states that it led to, and followed until the next training, as a session that renews itself does.
+    """
+
+    problem: DeclaredProblem
+    """The declaration. Its `history` is the whole record, oldest first; after the first window it is lived period by period."""
+    design: NotRequired[DeclaredDesign]
+    """States that the surrogates are trained on."""
+    surrogate: NotRequired[SurrogateSpecification]
+    """Settings of the surrogates."""
+    seed: NotRequired[int]
+    """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
+    window: NotRequired[int | None]
+    """Number of noises that each policy is trained on, at least 2. Default: half of the record."""
+    every: NotRequired[int | None]
+    """Number of periods from one training to the next, at most the horizon. Default: the horizon."""
+    frameworks: NotRequired[list[Framework]]
+    """
+    Frameworks whose policies are followed: `adaptive`, `static` and `plug_in`. The first is the one that others are
+    compared with. Default: the framework of `problem`.
+    """
+    rules: NotRequired[dict[str, dict[str, str]]]
+    """
+    Rules by names of your own, at most 20: for each action a formula of the states, the parameters, `t`, which begins anew
+    with each training, and `T`. An action is moved into its bounds, or to the nearest of its values.
+    """
+    level: NotRequired[float]
+    """Confidence of the intervals, 0.5 to 0.999. Default 0.95."""
+
+
+class DeclaredComparison(TypedDict):
+    """
+    A comparison of policies of one declared problem, and of rules, on common noises drawn from the record. Policies are
+    trained here, or were trained before.
+    """
+
+    problem: NotRequired[DeclaredProblem | None]
+    frameworks: NotRequired[list[Framework]]
+    """
+    Frameworks for which a policy of `problem` is trained: `adaptive`, `static`, `plug_in` and `known_law`, which takes the
+    law of the record as true. Default: the framework of `problem`.
+    """
+    design: NotRequired[DeclaredDesign | None]
+    surrogate: NotRequired[SurrogateSpecification | None]
+    policies: NotRequired[dict[str, str]]
+    """
+    Trained policies by names of your own; with the frameworks 1 to 8. Their declarations may differ in `framework`, `radius`
+    and `learning`. Others are compared with the first by name, or without policies with the first framework.
+    """
+    rules: NotRequired[dict[str, dict[str, str]]]
+    """
+    Rules by names of your own, at most 20: for each action a formula of the states, the parameters, `t` and `T`. An action
+    is moved into its bounds, or to the nearest of its values.
+    """
+    paths: NotRequired[int]
+    """Number of simulated paths, 100 to 100,000. Default 1000."""
+    seed: NotRequired[int]
+    """Seed of all random draws. Default 1."""
+    level: NotRequired[float]
+    """Confidence of the intervals, 0.5 to 0.999. Default 0.95."""
 
 
 class DeclaredCorrected(Uncertainty):
@@ -3072,6 +3150,17 @@ class DeclaredSpecification(TypedDict):
     """Settings of the surrogates."""
     seed: NotRequired[int]
     """Seed of all random draws."""
+
+
+class DeclaredWalkReport(TypedDict):
+    """Policies and rules that lived the same record, policies first."""
+
+    format: str
+    """`ballast-declared-walk-1`."""
+    request: DeclaredBacktest
+    """The request, with every default filled in."""
+    strategies: list[WalkedStrategy]
+    """One for each framework and each rule."""
 
 
 class EvaluationRequest(TypedDict):
@@ -3429,8 +3518,24 @@ class AssetsWhatIfPoint(FundAdvice):
     worst_case: NotRequired[WorstCase | None]
 
 
-BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
-"""A walk-forward of one asset, or of several assets if the request has the field `assets`."""
+BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest | DeclaredBacktest
+"""
+A walk-forward of one asset, of several assets if the request has the field `assets`, or of a declared problem if it has
+the field `problem`.
+"""
+
+
+class ComparisonReport(TypedDict):
+    """Policies trained before, policies trained here, and rules, in this order; each in that of its names or frameworks."""
+
+    format: str
+    """`ballast-comparison-1`."""
+    request: DeclaredComparison
+    """The request."""
+    problem: DeclaredProblem
+    """The declaration, of the first policy if the request has none."""
+    strategies: list[ComparedStrategy]
+    """One for each policy and each rule."""
 
 
 CorrectionAnswer: TypeAlias = Corrected | DeclaredCorrected
@@ -3453,7 +3558,7 @@ class DeclaredObservation(TypedDict):
 
 
 EvaluationQuestion: TypeAlias = EvaluationRequest | DeclaredComparison
-"""A comparison of an investor's strategies, or of policies and rules of a declared problem, which has no `problem` of its own."""
+"""A comparison of an investor's strategies, or of policies and rules of a declared problem."""
 
 
 class EvaluationReport(TypedDict):
@@ -3513,7 +3618,7 @@ class FrontierReport(TypedDict):
     """Sentences on what the figures show, and what they cannot show."""
 
 
-JobReport: TypeAlias = EvaluationReport | ComparisonReport | BacktestReport | AssetsBacktestReport | FrontierReport
+JobReport: TypeAlias = EvaluationReport | ComparisonReport | BacktestReport | AssetsBacktestReport | DeclaredWalkReport | FrontierReport
 """The report of a job: of an evaluation, of a walk-forward backtest or of a frontier."""
 
 

@@ -106,6 +106,17 @@ impl DeclaredAdvisor {
         state: Option<&BTreeMap<String, f64>>,
         noises: &[f64],
     ) -> Result<Decided, FieldError> {
+        let (step, state, seen) = self.situation(period, state, noises)?;
+        self.advise(step, &state, &seen, 1.0)
+    }
+
+    /// Reads a period, its state and the noises seen before it, in the unit of the solver.
+    fn situation(
+        &self,
+        period: usize,
+        state: Option<&BTreeMap<String, f64>>,
+        noises: &[f64],
+    ) -> Result<(usize, EarnedState, Vec<f64>), FieldError> {
         let horizon = self.policy.specification.problem.horizon;
         rules::whole("period", period, &(1..=horizon))?;
         let step = period - 1;
@@ -120,8 +131,7 @@ impl DeclaredAdvisor {
         }
         let seen =
             noises.iter().enumerate().map(|(index, noise)| problem.checked_noise(&format!("noises[{index}]"), *noise));
-        let seen: Vec<f64> = seen.collect::<Result<_, _>>()?;
-        self.advise(step, &state, &seen, 1.0)
+        Ok((step, state, seen.collect::<Result<_, _>>()?))
     }
 
     /// Solves the robust step after `step` periods at a state, with the noises seen since the start in the unit of the
@@ -142,6 +152,22 @@ impl DeclaredAdvisor {
         let state = EarnedState { earned: 0.0, ..state.clone() };
         let decision = self.decided(&problem, step, &state, (&self.law(seen), radius_scale));
         problem.fault().map_or(decision, |fault| Err(fault.clone()))
+    }
+
+    /// Returns what the periods from this one on are worth by the surrogate of its own step, against the worst laws, as of
+    /// the period. That step is never solved for it, so the document alone says it: `docs/policy-format.md`. Cost: one
+    /// prediction. Checked by: `tests/project/policy_format.rs`.
+    ///
+    /// # Errors
+    /// The first period, whose step has no surrogate, and those of [`Self::decide`].
+    pub fn predicted(&self, period: usize, state: &BTreeMap<String, f64>, noises: &[f64]) -> Result<f64, FieldError> {
+        let (step, state, seen) = self.situation(period, Some(state), noises)?;
+        let features = self.controlled.step(&self.problem, step).features(&state, &self.law(&seen));
+        let gain = self.controlled.gain(step, &features).ok_or_else(|| {
+            FieldError::new("period", period, "must be after the first, whose step is solved where it is asked for")
+        })?;
+        let worth = self.problem.worth(gain, self.problem.baseline(step, &state));
+        Ok(worth / self.problem.discounted(step))
     }
 
     /// Returns the uncertainty set once these noises, in the unit of the solver, were seen. Its radius and its moments are
@@ -217,8 +243,17 @@ impl DeclaredAdvisor {
             radius: radius_scale * self.controlled.radius(law) * problem.noise_width(),
             worst_law: moves(&found.adversary, problem),
             duality_gap: found.duality_gap / earned_later,
+            value_error: self.value_error(step).map(|error| error / earned_later),
             untrained_share: self.untrained_share(&bellman, (state, law), &found.actions, &found.adversary),
         })
+    }
+
+    /// Returns the error of the value of the step after, as of the start: 0 after the last step, which is exact.
+    fn value_error(&self, step: usize) -> Option<f64> {
+        self.specification.design.accuracy?;
+        let after =
+            self.policy.steps.get(step).map_or(Some(0.0), |after| Some(after.diagnostics.expected_error?.total));
+        after.map(|error| self.problem.error_amount(error))
     }
 
     /// Returns the share of the outcomes under the worst law that lead out of the design of the step after.

@@ -22,6 +22,21 @@ impl Declared {
         Ok(EarnedState { values, earned: 0.0 })
     }
 
+    /// Returns the values of the states by name.
+    pub fn states_by_name(&self, state: &EarnedState) -> BTreeMap<String, f64> {
+        self.states_named().iter().cloned().zip(state.values.iter().copied()).collect()
+    }
+
+    /// Returns actions by name, of which all are given in the order of their names.
+    pub fn actions_by_name(&self, actions: &[f64]) -> BTreeMap<String, f64> {
+        self.actions_named().iter().cloned().zip(actions.iter().copied()).collect()
+    }
+
+    /// Returns what a state is worth at the end, or with a utility its amount.
+    pub fn end_worth(&self, state: &EarnedState) -> f64 {
+        self.at(self.horizon, &state.values, None, |value| value(&self.end))
+    }
+
     /// Reads executed actions by name, in the order of the names.
     ///
     /// # Errors

@@ -7,6 +7,7 @@
 //! and V at a state is the worth still to come. The state is described without what is carried, on which nothing
 //! depends.
 
+mod baseline;
 mod formula;
 mod jumps;
 mod lived;
@@ -17,6 +18,7 @@ mod sampling;
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
+pub use self::baseline::Baseline;
 use self::formula::Formula;
 pub use self::rules::FormulaRule;
 use super::actions::{ActionInterval, ActionSet};
@@ -26,6 +28,8 @@ use crate::control::error::FieldError;
 use crate::control::request::bounds::within;
 use crate::control::request::specification::UtilitySpecification;
 
+/// Errors of gains are counted in parts of this many.
+const TEN_THOUSAND: f64 = 1e4;
 /// Rounding of a state at the edge of its range, as a share of the range.
 const EDGE: f64 = 1e-9;
 /// Least amount of which a power or a logarithm is computed.
@@ -50,8 +54,8 @@ pub struct Declared {
     noise: [f64; 2],
     /// Size of the amounts, which makes payoffs numbers around 1.
     unit: f64,
-    /// Mean earnings of random paths from each step on.
-    to_come: Vec<f64>,
+    /// Earnings of random paths from each step on, or with an exponential utility the amount at their end.
+    baselines: Vec<Baseline>,
     /// The first state that left its range.
     left: OnceLock<FieldError>,
 }
@@ -93,6 +97,21 @@ impl Declared {
     /// Names the numbers of a state in words.
     pub fn named(&self, step: usize, state: &EarnedState) -> String {
         self.point(step, &state.values, None)
+    }
+
+    /// Returns the amount that a gain of 1 is worth, and what gains count from at each step after the first. If a utility
+    /// counts ratios they are 1 and none: a gain is then the logarithm of a ratio.
+    pub fn gains(&self) -> (f64, Vec<Baseline>) {
+        match self.of_ratio(1.0) {
+            Some(_) => (1.0, Vec::new()),
+            None => (self.unit, self.baselines[1..].to_vec()),
+        }
+    }
+
+    /// Returns the amount, as of the start, of an error of gains in ten-thousandths.
+    pub fn error_amount(&self, of_gains: f64) -> f64 {
+        let start = self.start();
+        of_gains / TEN_THOUSAND * self.of_ratio(1.0).map_or(self.unit, |_| self.baseline(0, &start))
     }
 
     /// Returns what an amount of a step is worth at the start; never 0, by which one would divide.
@@ -266,11 +285,11 @@ impl Controlled for Declared {
         state.values.clone()
     }
 
-    /// Returns the worth itself at the horizon. Before it, what was earned and what random paths earn from there; with a
-    /// utility, the amount as if this were the end.
+    /// Returns the worth itself at the horizon. Before it, what was earned and about what random paths earn from there. If a
+    /// utility counts ratios, the amount as if this were the end, which is positive.
     fn baseline(&self, step: usize, state: &EarnedState) -> f64 {
-        match self.to_come.get(step) {
-            Some(to_come) if self.utility.is_none() => state.earned + to_come,
+        match self.baselines.get(step) {
+            Some(to_come) if self.of_ratio(1.0).is_none() => state.earned + to_come.at(&state.values),
             _ => self.ended(step, state),
         }
     }

@@ -9,11 +9,14 @@ use super::{Action, Declared};
 use crate::control::error::FieldError;
 use crate::control::request::bounds::{whole, within};
 use crate::control::request::centre::CentreSpecification;
-use crate::control::request::declared::{DeclaredAction, DeclaredProblem, DeclaredSpecification, DeclaredUtility};
+use crate::control::request::completion::DEFAULT_COUNT;
+use crate::control::request::declared::{
+    DeclaredAction, DeclaredDesign, DeclaredProblem, DeclaredSpecification, DeclaredUtility,
+};
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::radius_rules::{FIXED_RADIUS, KAPPA};
-use crate::control::request::rules::HORIZON;
+use crate::control::request::rules::{ACCURACY, HORIZON};
 use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, UtilitySpecification,
 };
@@ -39,7 +42,7 @@ impl Declared {
     pub fn new(problem: &DeclaredProblem) -> Result<Declared, FieldError> {
         let mut declared = Declared::parsed(problem)?;
         history(problem)?;
-        (declared.unit, declared.to_come) = declared.sampled(problem)?;
+        (declared.unit, declared.baselines) = declared.sampled(problem)?;
         Ok(declared)
     }
 
@@ -93,10 +96,25 @@ impl Declared {
             horizon: problem.horizon,
             noise: [problem.noise.low, problem.noise.high],
             unit: 1.0,
-            to_come: Vec::new(),
+            baselines: Vec::new(),
             left: OnceLock::new(),
             names: names.clone(),
         })
+    }
+
+    /// Returns an accuracy of the worth as one of gains, in ten-thousandths.
+    fn accuracy(&self, accuracy: f64) -> Result<f64, FieldError> {
+        let of_gains = accuracy / self.error_amount(1.0);
+        let (least, most) = ACCURACY;
+        if (least..=most).contains(&of_gains) {
+            return Ok(of_gains);
+        }
+        let [least, most] = [least, most].map(|end| self.error_amount(end));
+        Err(FieldError::new(
+            "design.accuracy",
+            accuracy,
+            format!("must be from {least} to {most}, by the size of the amounts"),
+        ))
     }
 
     /// Returns what the solver of controlled problems needs to know: the noise in its unit, and the settings.
@@ -123,7 +141,10 @@ impl Declared {
         investor.centre = CentreSpecification::default();
         investor.radius = radius;
         investor.support = Some(Support::Between { min: -0.5, max: 0.5 });
-        let design = DesignSpecification { count: declared.design.count, ..DesignSpecification::default() };
+        let DeclaredDesign { accuracy, count } = declared.design;
+        let accuracy = accuracy.map(|accuracy| self.accuracy(accuracy)).transpose()?;
+        let count = Some(count.unwrap_or(DEFAULT_COUNT));
+        let design = DesignSpecification { accuracy, count, ..DesignSpecification::default() };
         let surrogate = declared.surrogate.clone();
         Ok(Specification { design, surrogate, ..Specification::of(investor, declared.seed) })
     }

@@ -3,7 +3,7 @@
 
 use rand::RngExt;
 
-use super::{Controlled, Declared, EarnedState};
+use super::{Baseline, Controlled, Declared, EarnedState};
 use crate::control::error::FieldError;
 use crate::control::problem::actions::{ActionInterval, ActionSet};
 use crate::control::request::declared::DeclaredProblem;
@@ -18,12 +18,13 @@ const LARGEST: f64 = 1e15;
 
 impl Declared {
     /// Tries the formulas on random paths from the start, some of which go as far as they can. Returns the size of the
-    /// amounts, and what paths earn from each step on, on average. Streams: ("declared", 0, path).
+    /// amounts, and about what paths earn from each step on. Streams: ("declared", 0, path).
     ///
     /// # Errors
     /// The field of the formula, and the point.
-    pub(super) fn sampled(&self, problem: &DeclaredProblem) -> Result<(f64, Vec<f64>), FieldError> {
-        let (mut largest, mut to_come): (f64, Vec<f64>) = (0.0, vec![0.0; self.horizon]);
+    pub(super) fn sampled(&self, problem: &DeclaredProblem) -> Result<(f64, Vec<Baseline>), FieldError> {
+        let mut largest: f64 = 0.0;
+        let (mut reached, mut to_come) = (vec![Vec::new(); self.horizon], vec![Vec::new(); self.horizon]);
         let paths = TRIED.div_ceil(self.horizon);
         for path in 0..paths {
             let mut generator = stream(1, "declared", 0, path);
@@ -35,12 +36,13 @@ impl Declared {
                 always.as_ref().map_or(even.clamp(0.0, 1.0), |always| always[index])
             };
             let (mut state, mut earned) = (self.start(), Vec::with_capacity(self.horizon));
-            for step in 0..self.horizon {
+            for (step, reached) in reached.iter_mut().enumerate() {
                 let sets = self.checked_actions(problem, step, &state)?;
                 let actions: Vec<f64> = sets.iter().enumerate().map(|(index, set)| set.at(place(index))).collect();
                 let moved = (actions.as_slice(), self.noise(place(actions.len()) - 0.5));
                 let (next, reward) = self.checked_period(problem, step, &state, moved)?;
                 earned.push(state.earned);
+                reached.push(state.values.clone());
                 state = self.after((step, &state), moved, (next, reward));
                 if let Some(fault) = self.left.get() {
                     return Err(fault.clone());
@@ -48,9 +50,10 @@ impl Declared {
                 largest = largest.max(reward.abs()).max(self.checked_end(problem, step + 1, &state)?);
             }
             let ended = self.ended(self.horizon, &state);
-            to_come.iter_mut().zip(earned).for_each(|(sum, earned)| *sum += (ended - earned) / paths as f64);
+            to_come.iter_mut().zip(earned).for_each(|(worths, earned)| worths.push(ended - earned));
         }
-        Ok((if largest > 0.0 { largest } else { 1.0 }, to_come))
+        let baselines = reached.iter().zip(&to_come).map(|(states, worths)| Baseline::fitted(states, worths));
+        Ok((if largest > 0.0 { largest } else { 1.0 }, baselines.collect()))
     }
 
     fn checked_actions(

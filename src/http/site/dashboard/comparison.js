@@ -1,4 +1,4 @@
-// The report of a comparison: policies of a declared problem and rules, through the same noises.
+// The report of a comparison: policies of a declared problem and rules, through the same noises, drawn or recorded.
 
 import { lineChart } from "./chart.js";
 import { h, section, table } from "./dom.js";
@@ -9,10 +9,10 @@ import { interval } from "./verdict.js";
 const DRAWN = 10;
 
 /** Formats a number whose unit is not known. */
-const plain = (value) => significant(value, 5);
+export const plain = (value) => significant(value, 5);
 
 /** Formats an estimate with its range, to two digits of the width of the range. An end near 0 keeps a digit, so that it does not look like 0. */
-function ranged(estimate) {
+export function ranged(estimate) {
   const { low, high } = estimate;
   if (!(high > low)) return interval(estimate, plain);
   const least = Math.min(...[high - low, 10 * Math.abs(low), 10 * Math.abs(high)].filter((size) => size > 0));
@@ -20,30 +20,45 @@ function ranged(estimate) {
   return interval(estimate, (value) => tick(value, step));
 }
 
-const quoted = (name) => `\u201c${name}\u201d`;
+const sentence = (words) => words[0].toUpperCase() + words.slice(1);
+
+export const quoted = (name) => `\u201c${name}\u201d`;
 
 /** Draws the report. `policyLink(id)` returns a link to a policy. */
-export const body = (report, policyLink) => [compared(report, policyLink), worths(report), courses(report)];
+export const body = (report, policyLink) => [compared(report, policyLink), worths(report), courses(report.strategies, "Average ")];
 
 /** Describes what was compared, and what the noises are. */
 function compared({ request, problem: { noise, horizon, history, framework }, strategies }, policyLink) {
-  const links = Object.entries(request.policies).map(([name, id]) => h("p", {}, `${quoted(name)} is `, policyLink(id), "."));
-  const rules = Object.entries(request.rules ?? {}).flatMap(([name, actions]) =>
-    Object.entries(actions).map(([action, formula]) => h("p", {}, `${quoted(name)} has ${action} = `, h("code", {}, formula), ".")),
-  );
+  const links = Object.entries(request.policies ?? {}).map(([name, id]) => h("p", {}, `${quoted(name)} is `, policyLink(id), "."));
   const drawn = `${counted(strategies.length, "strategy", "strategies")} through the same ${counted(request.paths, "path")} of ${counted(horizon, "period")}, with each ${noise.name} drawn from the record of ${counted(history.length, "number")}.`;
   const trusted = framework !== "plug_in" && "A cautious policy does not trust the record. Where it falls behind on these paths, that is the price of its caution.";
-  return h("div", { class: "words" }, h("p", {}, drawn), links, rules, trusted && h("p", {}, trusted));
+  return h("div", { class: "words" }, h("p", {}, drawn), links, trainedWords(request), ruleWords(request), trusted && h("p", {}, trusted));
 }
 
+const TRAINED = {
+  adaptive: "stays cautious, and learns each number it sees",
+  static: "stays cautious against laws near the record, and learns nothing more",
+  plug_in: "learns, and takes what it has learned as the truth",
+  known_law: "takes the record as the truth, and learns nothing more",
+};
+
+/** Says what each framework is whose policy was trained for a report. */
+export const trainedWords = ({ frameworks = [] }) => frameworks.map((name) => h("p", {}, `${quoted(name)} ${TRAINED[name]}.`));
+
+/** Lists the formulas of the rules of a report. */
+export const ruleWords = ({ rules = {} }) =>
+  Object.entries(rules).flatMap(([name, actions]) =>
+    Object.entries(actions).map(([action, formula]) => h("p", {}, `${quoted(name)} has ${action} = `, h("code", {}, formula), ".")),
+  );
+
 /** Says whether the worth of a strategy differs from that of the first. */
-export function verdict({ strategy, difference }, first) {
+export function verdict({ strategy, difference }, first, { is = "is worth", on = "these paths" } = {}) {
   const { value, low, high } = difference;
-  if (low === 0 && high === 0) return `${quoted(strategy)} is worth as much as ${quoted(first)} on these paths.`;
+  if (low === 0 && high === 0) return `${quoted(strategy)} ${is} as much as ${quoted(first)} on ${on}.`;
   const size = value < 0 ? { value: -value, low: -high, high: -low } : difference;
-  const said = `${quoted(strategy)} is worth ${ranged(size)} ${value < 0 ? "less" : "more"} than ${quoted(first)}`;
+  const said = `${quoted(strategy)} ${is} ${ranged(size)} ${value < 0 ? "less" : "more"} than ${quoted(first)}`;
   if (low > 0 || high < 0) return `${said}. The range does not contain 0: the two can be told apart.`;
-  return `${said}. The range contains 0: these paths cannot tell the two apart.`;
+  return `${said}. The range contains 0: ${on} cannot tell the two apart.`;
 }
 
 /** Shows what each strategy is worth, in sentences and as a table. */
@@ -63,8 +78,8 @@ function worths({ request: { level }, problem: { utility }, strategies }) {
   return section("What each is worth", h("div", { class: "words" }, said), table("Worth of each strategy", columns, strategies), h("p", { class: "note" }, note));
 }
 
-/** Draws the mean states and actions, period by period. */
-function courses({ strategies }) {
+/** Draws the states and actions of strategies, period by period; each title begins with `mean`. */
+export function courses(strategies, mean) {
   const shown = strategies.slice(0, DRAWN);
   const [{ periods }] = shown;
   const x = { values: periods.map((_, step) => step + 1), label: "Period", format: String, whole: true };
@@ -73,7 +88,7 @@ function courses({ strategies }) {
   return section(
     "What each did",
     strategies.length > DRAWN && h("p", { class: "note" }, `The charts show the first ${count(DRAWN)} strategies. The exported report has all.`),
-    charts("actions", (name) => `Average ${name}`),
-    charts("states", (name) => `Average ${name} at the start of a period`),
+    charts("actions", (name) => sentence(`${mean}${name}`)),
+    charts("states", (name) => sentence(`${mean}${name} at the start of a period`)),
   );
 }

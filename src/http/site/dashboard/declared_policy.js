@@ -1,6 +1,7 @@
 // A policy of a declared problem: its formulas, and what to do in a period, for the states and the noises that the user types.
 
 import { post } from "./api.js";
+import { beside, walking } from "./declared_asking.js";
 import { announce, facts, h, section, table } from "./dom.js";
 import { area, fieldset, input, refusal, sending } from "./form.js";
 import { count, percent, significant } from "./format.js";
@@ -14,7 +15,8 @@ export const plain = (value) => significant(value, 6);
 export const statesWords = (states) => Object.entries(states).map(([name, value]) => `${name}: ${plain(value)}`).join(", ");
 
 /** Returns the body of the page of policy `id`, with `map`, its map. `isCompared` tells whether the service can compare it. */
-export function declaredBody(id, { specification: { problem, design }, warnings }, isCompared, map) {
+export function declaredBody(id, { specification, warnings }, isCompared, map) {
+  const { problem, design } = specification;
   const { horizon, history } = problem;
   const answer = h("div", { id: "decision" });
   return [
@@ -24,13 +26,15 @@ export function declaredBody(id, { specification: { problem, design }, warnings 
       ["Periods", count(horizon)],
       ["Numbers in the record", count(history.length)],
       ["Caution", caution(problem)],
-      ["States solved in each step", count(design.count)],
+      [design.accuracy ? "Most states solved in each step" : "States solved in each step", count(design.count)],
+      design.accuracy && ["Accuracy asked for", significant(design.accuracy, 3), "of the worth"],
     ]),
     h("p", {}, h("a", { class: "button quiet", href: `#/sessions/new?policy=${id}`, "data-needs": "operate" }, "Open a session")),
     section("What to do in a period", deciding(id, problem, answer)),
     answer,
     map,
-    isCompared ? beside(id, problem) : "",
+    isCompared ? beside(id, specification) : "",
+    isCompared ? walking(specification) : "",
     section("The problem", formulas(problem)),
     h("p", { class: "again", "data-needs": "train" }, h("a", { href: `#/declare?from=${id}` }, "Clone with one thing changed")),
   ];
@@ -82,29 +86,6 @@ function deciding(id, problem, answer) {
   return form;
 }
 
-/** Returns the form that compares the policy with a rule, a formula for each action. */
-function beside(id, { states, parameters = {}, actions }) {
-  const bounds = ({ low, high, values }) => (values ? `The nearest of ${values.map(plain).join(", ")} is taken.` : `Moved into its bounds: ${low} to ${high}.`);
-  const formula = ([name, action], index) =>
-    input({ within: `${index}-`, name: `rules.rule.${name}`, label: name, note: bounds(action), inputmode: "text", spellcheck: "false" });
-  const fields = Object.entries(actions).map(formula);
-  fields.forEach(({ element }) => element.classList.add("broad"));
-  const paths = input({ within: "rule-", name: "paths", label: "Paths", note: "100 to 100,000.", value: "1000", inputmode: "numeric" });
-  const names = [...Object.keys(states), ...Object.keys(parameters)].join(", ");
-  const note = h("p", { class: "note" }, `Write a formula for ${Object.keys(actions).join(" and ")}. It may name ${names}, the period t (from 0) and the number of periods T.`);
-  const send = h("button", { type: "submit" }, "Compare");
-  const form = h("form", { novalidate: true }, note, fieldset("The rule", [...fields, paths]), refusal(), h("p", { class: "send" }, send, h("span", { class: "note" }, "Both go through the same paths, drawn from the record.")));
-  sending(form, send, async () => {
-    const rule = Object.fromEntries(Object.keys(actions).map((name, index) => [name, fields[index].control.value.trim()]));
-    const { job } = await post("/evaluate", { policies: { policy: id }, rules: { rule }, paths: pointed(paths.control.value) });
-    announce("The comparison is queued.");
-    location.hash = `#/evaluations/${job}`;
-  });
-  const element = section("Beside a rule of your own", form);
-  element.dataset.needs = "train";
-  return element;
-}
-
 /** Returns the numbers of a text. A comma between digits may be a decimal mark: it parts two numbers only if both have a point. */
 function numbers(text) {
   const parts = (word) => {
@@ -118,7 +99,7 @@ function numbers(text) {
 }
 
 /** Shows the actions of a period, an answer of `/decide` or `/action`, under a heading. `last` is the last period of the horizon. */
-export function decided({ period, actions, several_peaks, value, radius, worst_law, duality_gap, untrained_share }, { noise: { name: noise }, horizon, utility: ofWealth }, { heading = `Period ${period}`, last = horizon } = {}) {
+export function decided({ period, actions, several_peaks, value, value_error, radius, worst_law, duality_gap, untrained_share }, { noise: { name: noise }, horizon, utility: ofWealth }, { heading = `Period ${period}`, last = horizon } = {}) {
   const warning = (words) => h("p", { class: "note wrong" }, words);
   const share = untrained_share >= 0.01 ? percent(untrained_share, 0) : "Less than 1\u202f%";
   return section(
@@ -131,7 +112,7 @@ export function decided({ period, actions, several_peaks, value, radius, worst_l
       several_peaks.length > 0 && warning(`Quite another ${several_peaks.join(" and ")} may be nearly as good: the worth has several peaks.`),
     ),
     facts([
-      [`Worth of ${period === last ? "the last period" : `periods ${period} to ${last}`}`, plain(value), `${ofWealth ? "certainty equivalent, " : ""}under the worst law`],
+      [`Worth of ${period === last ? "the last period" : `periods ${period} to ${last}`}`, plain(value), `${ofWealth ? "certainty equivalent, " : ""}under the worst law${value_error > 0 ? `, to about ${significant(value_error, 2)}` : ""}`],
       ["Radius", significant(radius, 4), `in the unit of ${noise}`],
     ]),
     h("h3", {}, `The worst law of ${noise} in this period`),

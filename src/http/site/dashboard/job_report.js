@@ -3,6 +3,7 @@
 import { download, get } from "./api.js";
 import * as backtest from "./backtest.js";
 import * as comparison from "./comparison.js";
+import * as declaredWalk from "./declared_walk.js";
 import { h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
 import { pressed } from "./form.js";
@@ -32,6 +33,10 @@ const reported = (kind, [above, href], drawn) => async (id, leaving) => {
 /** Draws an evaluation: of an investor's strategies, or a comparison of policies of a declared problem with rules. */
 const compared = (report, link) => (report.format === "ballast-comparison-1" ? comparison : evaluation).body(report, link);
 
-export const ofBacktest = reported("backtest", EVALUATIONS, backtest);
+/** Returns the module of a walk-forward: of an investor's strategies, or of a declared problem. */
+const walkOf = ({ format }) => (format === "ballast-declared-walk-1" ? declaredWalk : backtest);
+const walked = { body: (report) => walkOf(report).body(report), csv: (report) => walkOf(report).csv(report) };
+
+export const ofBacktest = reported("backtest", EVALUATIONS, walked);
 export const ofEvaluation = reported("evaluate", EVALUATIONS, { body: compared });
 export const ofFrontier = reported("frontier", ["Jobs", "#/jobs"], frontier);

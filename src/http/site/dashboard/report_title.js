@@ -31,7 +31,9 @@ const ABOUT = {
     if (declared) return `${ofAssets(Object.keys(declared.actions))}, ${counted(declared.horizon, "period")} ahead`;
     return `${ofAssets(problem.assets)}${onRecord(problem)}, ${counted(problem.horizon, unitOf(problem.periods_per_year))} ahead`;
   },
-  backtest({ assets, dates, periods, periods_per_year }) {
+  backtest({ request, assets, dates, periods, periods_per_year }) {
+    // The walk-forward of a declared problem has one too.
+    if (request?.problem) return `${ofAssets(Object.keys(request.problem.actions))}, ${counted(request.problem.history.length - request.window, "period")}`;
     const length = periods[0].wealth.length;
     return `${ofAssets(assets)}, ${dates ? `${dated(dates[0])} to ${dated(dates[length - 1])}` : counted(length, unitOf(periods_per_year))}`;
   },

@@ -2,7 +2,6 @@
 
 use crate::control::policy_document::PreparedPolicy;
 use crate::control::posed::Posed;
-use crate::control::request::rules;
 use crate::service::entries::periods::Periods;
 use crate::service::error::ServiceError;
 use crate::service::sessions::plan::Renewing;
@@ -22,14 +21,9 @@ pub(super) fn next_problem(
     let periods = Periods::of(facts)?;
     match (policy, standing) {
         (PreparedPolicy::Declared(advisor), SessionState::Declared(state)) => {
-            let mut next = advisor.policy().specification().clone();
             let seen = periods.all.iter().filter_map(|period| period.report.noise);
-            next.problem.history = facts.row.initial_history.iter().copied().chain(seen).collect();
-            let most = renew.window.unwrap_or(usize::MAX).min(*rules::HISTORY_LENGTH.end());
-            next.problem.history.drain(..next.problem.history.len().saturating_sub(most));
-            for (name, value) in state.named() {
-                next.problem.states.entry(name).and_modify(|state| state.start = value);
-            }
+            let known = facts.row.initial_history.iter().copied().chain(seen);
+            let next = advisor.policy().specification().next(known, renew.window, state.named());
             Ok(Posed::Declared(next.into()))
         }
         (PreparedPolicy::Investor(advisor), SessionState::Account(account)) => {

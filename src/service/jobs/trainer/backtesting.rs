@@ -15,9 +15,11 @@ use crate::control::evaluation::assets::rules::AssetsStrategy;
 use crate::control::evaluation::assets::{AssetsBacktest, AssetsDecisions};
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
+use crate::control::evaluation::declared_walk::{DeclaredWalk, WalkedStretch};
 use crate::control::evaluation::walk_forward::{Decision, SharedWork};
 use crate::control::progress::Watch;
 use crate::control::request::backtest_assets::{AssetsBacktestRequest, BacktestQuestion};
+use crate::control::request::declared_backtest::DeclaredBacktest;
 use crate::control::{estimate, pool};
 use crate::store::{ClaimedJob, JobOutcome};
 
@@ -26,6 +28,7 @@ impl Worker {
         let request = match requested(claimed)? {
             BacktestQuestion::Asset(request) => request,
             BacktestQuestion::Assets(request) => return self.backtest_of_assets(claimed, &request, stop),
+            BacktestQuestion::Declared(request) => return self.walk_of_declared(claimed, request, stop),
         };
         let backtest = Backtest::new(request).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::backtest(&backtest, self.threads))?;
@@ -62,6 +65,25 @@ impl Worker {
             Ok::<_, JobEnd>(AssetsBacktestReport::new(&backtest.walked(&balls, decided)))
         })?;
         reported(&report)
+    }
+
+    /// Runs a walk-forward of a declared problem. A checkpoint holds the periods of a strategy from one training to the next.
+    fn walk_of_declared(
+        &self,
+        claimed: &ClaimedJob,
+        request: DeclaredBacktest,
+        stop: &AtomicBool,
+    ) -> Result<JobOutcome, JobEnd> {
+        let walk = DeclaredWalk::new(request).map_err(|error| failed(error.to_string()))?;
+        let _reserved = self.reserve(&estimate::declared::walk(&walk, self.threads))?;
+        let trainings = walk.trainings().iter().map(|first| estimate::kept_by_training(first.specification()));
+        let kept = Cache::new(trainings.fold(0, usize::saturating_add));
+        let checkpoints = self.checkpoints(claimed)?;
+        let watch = Watch { stop, progress: &|_| {} };
+        let stretch = |step: usize, live: &dyn Fn() -> Result<WalkedStretch, TrainError>| {
+            self.checkpointed(claimed, &checkpoints, Some(step), live)
+        };
+        reported(&self.pool.install(|| walk.run(&kept, &watch, stretch))?)
     }
 
     /// Returns the decisions of each strategy in every period. The trainings of a stretch run in parallel: policy

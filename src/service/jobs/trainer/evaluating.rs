@@ -39,7 +39,7 @@ impl Worker {
         self.pool.install(|| self.report(claimed, &evaluation, &followers, training_seconds, stop))
     }
 
-    /// Compares policies and rules of a declared problem.
+    /// Compares policies and rules of a declared problem. Some of the policies are trained first.
     fn compare(
         &self,
         claimed: &ClaimedJob,
@@ -54,9 +54,16 @@ impl Worker {
             advisors.push(Arc::new(policy.prepared(kept).map_err(|error| failed(error.to_string()))?));
         }
         let comparison = Comparison::new(request, advisors).map_err(|error| failed(error.to_string()))?;
+        let mut trained = Vec::new();
+        let mut first = 0;
+        for training in comparison.trainings() {
+            let policy = self.trained_declared(claimed, training.declared(), first, stop)?;
+            first += training.horizon() - 1;
+            trained.push(Arc::new(policy.prepared(self.memory.kept()).map_err(|error| failed(error.to_string()))?));
+        }
         let _reserved = self.reserve(&comparison.footprint())?;
         let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };
-        reported(&self.pool.install(|| comparison.run(&watch))?)
+        reported(&self.pool.install(|| comparison.run(trained, &watch))?)
     }
 
     /// Returns the document of a policy that a job names.

@@ -30,7 +30,7 @@ impl Worker {
                 PolicyDocument::Investor(self.trained(claimed, &specification, 0, kept, stop)?.into())
             }
             Posed::Declared(declared) => {
-                PolicyDocument::Declared(self.trained_declared(claimed, &declared, stop)?.into())
+                PolicyDocument::Declared(self.trained_declared(claimed, &declared, 0, stop)?.into())
             }
         };
         let policy_json =
@@ -38,10 +38,12 @@ impl Worker {
         Ok(JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json })
     }
 
-    fn trained_declared(
+    /// Returns the policy of a declared problem, as [`Self::trained`] does.
+    pub(super) fn trained_declared(
         &self,
         claimed: &ClaimedJob,
         declared: &DeclaredSpecification,
+        first: usize,
         stop: &AtomicBool,
     ) -> Result<DeclaredPolicy, JobEnd> {
         let training = DeclaredTraining::with(declared, Cache::default()).map_err(TrainError::from)?;
@@ -49,8 +51,8 @@ impl Worker {
         let kept = Cache::new(estimate::kept_by_training(training.specification()));
         let training = training.keeping(kept);
         let solve = |step: usize, after: Option<&StepSolution>, watch: &Watch| training.solve_step(step, after, watch);
-        let steps = self.solved(claimed, 1..training.horizon(), 0, &solve, stop)?;
-        Ok(DeclaredPolicy::new(declared.clone(), steps))
+        let steps = self.solved(claimed, 1..training.horizon(), first, &solve, stop)?;
+        Ok(DeclaredPolicy::new(&training, steps))
     }
 
     /// Returns the policy of a specification, resumed from the checkpoints. Step s is checkpoint `first + s` of the
