@@ -58,6 +58,12 @@ pub fn run(bench: &DeclaredBench) -> Result<(), Box<dyn Error>> {
 fn beside_the_investor(bench: &DeclaredBench, pool: &TrainingPool) -> Result<(), Box<dyn Error>> {
     let mut text: Value = serde_json::from_str(INVESTOR)?;
     text["problem"]["horizon"] = json!(bench.horizon);
+    // As far as wealth can grow.
+    let best = text["problem"]["noise"]["high"].as_f64().unwrap_or_default();
+    let wealth = &mut text["problem"]["states"]["wealth"];
+    let start = wealth["start"].as_f64().unwrap_or_default();
+    wealth["low"] = json!(start * (-2.0 * best * bench.horizon as f64).exp());
+    wealth["high"] = json!(start * (2.0 * best * bench.horizon as f64).exp());
     text["design"]["count"] = json!(bench.count);
     let declared: DeclaredSpecification = serde_json::from_value(text.clone())?;
     let problem = &text["problem"];

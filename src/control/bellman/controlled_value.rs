@@ -14,7 +14,7 @@ use crate::numerics::statistics::summary::range;
 /// halfway between to this share of its range, or to this gain. After the doubling they err by an eighth of that or less.
 /// The value of a stock has kinks, and needs all of them.
 const TABLE_NODES: [usize; 2] = [9, 513];
-const NODE_ERROR: f64 = 5e-5;
+const NODE_ERROR: f64 = 3e-4;
 const LEAST_ERROR: f64 = 3e-7;
 /// Largest number of returns of a table. Between them others are put until cubics predict the gain halfway as well, which
 /// is judged at a few nodes.

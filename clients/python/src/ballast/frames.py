@@ -376,9 +376,8 @@ def declared_walk(report: wire.DeclaredWalkReport) -> pd.DataFrame:
 def declared_periods(report: wire.DeclaredWalkReport, strategy: str | None = None) -> pd.DataFrame:
     """Returns the periods that a strategy walked through, by default the first, indexed by ``period`` from 1.
 
-    The columns are ``noise``, ``reward``, ``radius``, which is NaN for rules, ``state.<name>`` for each state before the
-    noise, and ``action.<name>``. Raises ``ValueError`` for an unknown strategy and ``ImportError`` without
-    pandas.
+    The columns are ``noise``, ``reward``, ``radius``, which is NaN for rules, ``state.<name>`` for each state before
+    the noise, and ``action.<name>``. Raises ``ValueError`` for an unknown strategy and ``ImportError`` without pandas.
     """
     walked = {own["strategy"]: own for own in report["strategies"]}
     name = next(iter(walked)) if strategy is None else strategy
