@@ -213,6 +213,8 @@ fn wrong_comparisons_are_refused() {
     less_cautious["problem"]["radius"]["scale"] = json!(0.1);
     let less_cautious = advisor(&less_cautious);
     let problem = stock()["problem"].clone();
+    let mut no_horizon = problem.clone();
+    no_horizon["horizon"] = json!(0);
     let two = json!({ "policies": { "a": "x", "b": "y" }, "paths": 100 });
     assert!(compared(&[policy.clone(), less_cautious], &two).is_ok());
     for (policies, change, field) in [
@@ -238,6 +240,7 @@ fn wrong_comparisons_are_refused() {
         ),
         (vec![policy.clone()], json!({ "problem": problem, "policies": { "adaptive": "x" } }), "policies.adaptive"),
         (vec![policy.clone()], json!({ "problem": { "price": 10 } }), "policies.a"),
+        (vec![policy.clone()], json!({ "problem": no_horizon }), "problem.horizon"),
     ] {
         let mut request = json!({ "policies": { "a": "x" }, "paths": 100 });
         for (name, value) in change.as_object().unwrap() {

@@ -185,6 +185,8 @@ fn wrong_walks_are_refused() {
         (json!({ "window": 13 }), "window"),
         (json!({ "window": 1 }), "window"),
         (json!({ "every": 4 }), "every"),
+        (json!({ "horizon": 0 }), "problem.horizon"),
+        (json!({ "history": [] }), "problem.history"),
         (json!({ "every": 0 }), "every"),
         (json!({ "frameworks": ["known_law"] }), "frameworks[0]"),
         (json!({ "frameworks": ["adaptive", "adaptive"] }), "frameworks[1]"),
@@ -193,13 +195,13 @@ fn wrong_walks_are_refused() {
         (json!({ "rules": { "base": { "order": "1/(stock - 4)" } } }), "rules.base.order"),
         (json!({ "level": 1.0 }), "level"),
         (json!({ "history": equal }), "problem.history"),
-        (json!({ "history": [20.0, 21.0] }), "window"),
+        (json!({ "history": [20.0, 21.0] }), "problem.history"),
         (json!({ "stock": "stock + order - demand" }), "problem.next.stock"),
     ] {
         let mut request = stock();
         for (name, value) in change.as_object().unwrap() {
             match name.as_str() {
-                "history" => request["problem"][name] = value.clone(),
+                "history" | "horizon" => request["problem"][name] = value.clone(),
                 "stock" => request["problem"]["next"][name] = value.clone(),
                 _ => request[name] = value.clone(),
             }

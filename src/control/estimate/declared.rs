@@ -9,6 +9,8 @@ use crate::control::request::completion::DEFAULT_COUNT;
 
 /// Bytes of a path for each strategy and each period: its state, its noises, its actions and its worth.
 const PATH_BYTES: usize = 512;
+/// Bytes of a period that was walked, with the names of its states and actions, in memory and as JSON.
+const WALKED_BYTES: usize = 4096;
 /// Bytes of a table of gains over the states.
 const TABLE_BYTES: usize = 4 << 20;
 
@@ -62,7 +64,7 @@ pub fn advising_by(policy: &DeclaredPolicy, read: &DeclaredTraining) -> [Footpri
 /// Returns the footprint of a walk-forward, whose trainings run side by side, on so many threads.
 pub fn walk(walk: &DeclaredWalk, threads: usize) -> Footprint {
     let trainings = walk.trainings().iter().map(|first| training(first, threads).0.bytes());
-    let decisions = product(&[walk.decisions(), PATH_BYTES]).saturating_add(LEAST);
+    let decisions = product(&[walk.decisions(), WALKED_BYTES]).saturating_add(LEAST);
     let trained = trainings.fold(0, usize::saturating_add);
     Footprint::of("frameworks", walk.trainings().len(), trained).and("problem.history", walk.decisions(), decisions)
 }

@@ -112,8 +112,8 @@ impl Comparison {
         let first = policies.first().map(|first| &first.policy().specification().problem);
         let declared = request.problem.as_ref().or(first).cloned();
         let declared = declared.ok_or_else(|| FieldError::new("policies", "{}", "must have one at least"))?;
-        request.check_decisions(declared.horizon)?;
         let problem = Declared::new(&declared)?;
+        request.check_decisions(declared.horizon)?;
         for ((name, id), policy) in request.policies.iter().zip(&policies) {
             if !policy.policy().specification().problem.is_alike(&declared) {
                 let of = if request.problem.is_some() { "`problem`" } else { "the problem of the first policy" };
@@ -122,10 +122,11 @@ impl Comparison {
             }
         }
         let mut trained = Vec::with_capacity(request.frameworks.len());
-        for (framework, declared) in request.frameworks.iter().zip(std::iter::repeat(request.specification())) {
-            let Some(declared) = declared else { break };
-            let training = DeclaredTraining::with(&declared.under(*framework), Cache::default())?;
-            trained.push((framework.name().to_owned(), training));
+        if let Some(declared) = request.specification() {
+            for framework in &request.frameworks {
+                let training = DeclaredTraining::with(&declared.under(*framework), Cache::default())?;
+                trained.push((framework.name().to_owned(), training));
+            }
         }
         let rule = |(name, formulas): (&String, &BTreeMap<String, String>)| {
             Ok((name.clone(), Player::Rule(problem.rule(&format!("rules.{name}"), formulas)?)))
@@ -228,7 +229,12 @@ impl Comparison {
                 at.seen.push(scaled);
             }
             if let Some(fault) = problem.fault() {
-                return Err(leaving(name, matches!(player, Player::Rule(_)), fault).into());
+                let field = match player {
+                    Player::Rule(_) => format!("rules.{name}"),
+                    Player::Policy(_) if self.request.policies.contains_key(name) => format!("policies.{name}"),
+                    Player::Policy(_) => "frameworks".to_owned(),
+                };
+                return Err(leaving(&field, name, fault).into());
             }
         }
         let worths = reached.iter().map(|at| problem.baseline(horizon, &at.state)).collect();
@@ -286,10 +292,9 @@ impl Comparison {
     }
 }
 
-/// Returns the fault of a strategy that leads a state out of its range.
-pub(super) fn leaving(name: &str, is_rule: bool, fault: &FieldError) -> FieldError {
-    let field = if is_rule { "rules" } else { "policies" };
-    FieldError::new(format!("{field}.{name}"), name, format!("must not lead out of a range, but {fault}"))
+/// Returns the fault of a strategy, named in a field, that leads a state out of its range.
+pub(super) fn leaving(field: &str, name: &str, fault: &FieldError) -> FieldError {
+    FieldError::new(field, name, format!("must not lead out of a range, but {fault}"))
 }
 
 impl Player {

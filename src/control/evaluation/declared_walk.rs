@@ -118,7 +118,7 @@ impl DeclaredWalk {
         let (window, every) = (request.window.unwrap_or_default(), request.every.unwrap_or_default());
         let specification = request.specification();
         let record = &specification.problem.history;
-        // The whole record keeps the rules of a history, and so does every window of it.
+        // Every number of the record is one of the noise.
         Declared::new(&specification.problem)?;
         for start in (0..record.len() - window).step_by(every) {
             let known = &record[start..start + window];
@@ -226,6 +226,10 @@ impl DeclaredWalk {
                 Decider::Policy(Box::new(policy.prepared(kept.clone())?))
             }
         };
+        let field = match walker {
+            Walker::Rule(_) => format!("rules.{name}"),
+            Walker::Framework(_) => "frameworks".to_owned(),
+        };
         let (mut state, mut seen) = (self.problem.state("state", states)?, Vec::with_capacity(noises.len()));
         let mut periods = Vec::with_capacity(noises.len());
         for (step, noise) in noises.iter().enumerate() {
@@ -233,15 +237,17 @@ impl DeclaredWalk {
             let scaled = self.problem.scaled(*noise);
             let (actions, radius) = decider.decide(&self.problem, step, &state, &seen)?;
             let (values, reward) = self.problem.passed(step, &state, &actions, scaled);
-            let at_fault = |fault: FieldError| leaving(name, matches!(walker, Walker::Rule(_)), &fault);
+            let no_number = |fault: FieldError| {
+                FieldError::new(&field, name, format!("must have rewards that are numbers, but {fault}"))
+            };
             periods.push(WalkedPeriod {
                 states: self.problem.states_by_name(&state),
                 actions: self.problem.actions_by_name(&actions),
                 noise: *noise,
-                reward: reward.map_err(at_fault)?,
+                reward: reward.map_err(no_number)?,
                 radius,
             });
-            state = EarnedState { values: values.map_err(at_fault)?, earned: 0.0 };
+            state = EarnedState { values: values.map_err(|fault| leaving(&field, name, &fault))?, earned: 0.0 };
             seen.push(scaled);
         }
         Ok(WalkedStretch { periods, states: self.problem.states_by_name(&state) })
@@ -249,19 +255,19 @@ impl DeclaredWalk {
 
     fn report(&self, lived: Vec<(Vec<WalkedPeriod>, BTreeMap<String, f64>)>) -> Result<DeclaredWalkReport, FieldError> {
         let gains: Vec<Vec<f64>> = lived.iter().map(|lived| self.gains(lived)).collect::<Result<_, FieldError>>()?;
-        let resamples = self.resamples();
+        let apart = |own: &Vec<f64>| own.iter().zip(&gains[0]).map(|(own, first)| own - first).collect();
+        let differences: Vec<Vec<f64>> = gains.iter().map(apart).collect();
+        let [of_gains, of_differences] = [&gains, &differences].map(|series| self.means(series));
         let strategies = self.strategies.iter().zip(lived).enumerate().map(|(place, ((name, walker), lived))| {
             let (periods, states) = lived;
             let discounted = |(index, period): (usize, &WalkedPeriod)| self.problem.discounted(index) * period.reward;
-            let difference =
-                |own: &[f64]| own.iter().zip(&gains[0]).map(|(own, first)| own - first).collect::<Vec<_>>();
             Ok(WalkedStrategy {
                 strategy: name.clone(),
                 is_rule: matches!(walker, Walker::Rule(_)),
                 earned: periods.iter().enumerate().map(discounted).sum(),
                 left: self.problem.end_worth(&self.problem.state("state", &states)?),
-                gain: self.mean(&gains[place], &resamples),
-                difference: (place > 0).then(|| self.mean(&difference(&gains[place]), &resamples)),
+                gain: of_gains[place],
+                difference: (place > 0).then(|| of_differences[place]),
                 periods,
             })
         });
@@ -277,22 +283,25 @@ impl DeclaredWalk {
         Ok(periods.iter().zip(worths.windows(2)).map(|(period, worth)| period.reward + worth[1] - worth[0]).collect())
     }
 
-    /// Draws resamples of the periods, common to all strategies. Streams: ("walked", 0, draw).
-    fn resamples(&self) -> Vec<Vec<usize>> {
+    /// Returns the mean of each series with its interval: the mean less the quantiles of what resamples have more, which are
+    /// common to all series. Streams: ("walked", 0, draw).
+    fn means(&self, series: &[Vec<f64>]) -> Vec<Estimate> {
         let (periods, seed) = (self.lived().len(), self.request.seed);
-        let draw = |draw: usize| circular_blocks(periods, self.every, &mut stream(seed, "walked", 0, draw));
-        (0..RESAMPLES).map(draw).collect()
-    }
-
-    /// Returns the mean of some values with its interval: their mean less the quantiles of what resamples have more.
-    fn mean(&self, values: &[f64], resamples: &[Vec<usize>]) -> Estimate {
-        let mean = |of: &mut dyn Iterator<Item = f64>| of.sum::<f64>() / values.len() as f64;
-        let value = mean(&mut values.iter().copied());
-        let resampled = |drawn: &Vec<usize>| mean(&mut drawn.iter().map(|index| values[*index]));
-        let resampled: Vec<f64> = resamples.iter().map(resampled).collect();
+        let mean = |of: &mut dyn Iterator<Item = f64>| of.sum::<f64>() / periods as f64;
+        let mut resampled = vec![Vec::with_capacity(RESAMPLES); series.len()];
+        for draw in 0..RESAMPLES {
+            let drawn = circular_blocks(periods, self.every, &mut stream(seed, "walked", 0, draw));
+            for (means, values) in resampled.iter_mut().zip(series) {
+                means.push(mean(&mut drawn.iter().map(|index| values[*index])));
+            }
+        }
         let beyond = 0.5 * (1.0 - self.request.level);
-        let end = |share: f64| 2.0 * value - quantile(&resampled, share);
-        Estimate { value, low: end(1.0 - beyond), high: end(beyond) }
+        let estimate = |(values, resampled): (&Vec<f64>, &Vec<f64>)| {
+            let value = mean(&mut values.iter().copied());
+            let end = |share: f64| 2.0 * value - quantile(resampled, share);
+            Estimate { value, low: end(1.0 - beyond), high: end(beyond) }
+        };
+        series.iter().zip(&resampled).map(estimate).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
-use crate::control::request::backtest::{MOST_STEPS, MOST_TRAININGS};
+use crate::control::request::backtest::{MOST_STEPS, MOST_TRAININGS, PERIODS};
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds, whole, within};
 use crate::control::request::by_name::distinct_twice;
 use crate::control::request::declared::{DeclaredDesign, DeclaredProblem, DeclaredSpecification};
@@ -18,7 +18,7 @@ use crate::control::request::specification::{SurrogateSpecification, default_see
 
 /// Frameworks whose policies walk: the law of the whole record would be known before its time.
 const WALKED: [Framework; 3] = [Framework::Adaptive, Framework::Static, Framework::PlugIn];
-/// Largest number of decisions of all strategies: a report of some forty megabytes.
+/// Largest number of decisions of all strategies: a report of some hundred megabytes.
 const MOST_DECISIONS: usize = 200_000;
 
 /// A walk-forward of a declared problem through a record of noises. At regular intervals a policy is trained on the noises
@@ -74,11 +74,16 @@ impl DeclaredBacktest {
         let (record, horizon) = (self.problem.history.len(), self.problem.horizon);
         whole("problem.horizon", horizon, &HORIZON)?;
         let (window, every) = (self.window.unwrap_or(record / 2), self.every.unwrap_or(horizon));
-        if record < 3 || !(2..record).contains(&window) {
-            let rule = match record {
-                0..3 => "must follow a record of at least 3 noises".to_owned(),
-                _ => format!("must be from 2 to {}: the record has {record} noises, and one must follow", record - 1),
-            };
+        if record < 3 {
+            let rule = "must have 3 at least: two to learn from, and one to live";
+            return Err(FieldError::new("problem.history", format!("{record} noises"), rule));
+        }
+        if record > *PERIODS.end() {
+            let rule = format!("must have {} at most", PERIODS.end());
+            return Err(FieldError::new("problem.history", format!("{record} noises"), rule));
+        }
+        if !(2..record).contains(&window) {
+            let rule = format!("must be from 2 to {}: the record has {record} noises, and one must follow", record - 1);
             return Err(FieldError::new("window", window, rule));
         }
         if !(1..=horizon).contains(&every) {

@@ -519,7 +519,7 @@ ConstantMix: TypeAlias = float
 class ExpectedError(TypedDict):
     """
     Root mean square errors of the value of a step, in basis points of the certainty equivalent, at any holding; for a
-    declared problem in ten-thousandths of the size of its amounts. They
+    declared problem, unless its utility is power or log, in ten-thousandths of the size of its amounts. They
     are over the design's own law of its states, of which one in eight leaps beyond the record: one or more of the returns
     on the way to it may be anything within the support.
     """

@@ -243,17 +243,17 @@ impl DeclaredAdvisor {
             radius: radius_scale * self.controlled.radius(law) * problem.noise_width(),
             worst_law: moves(&found.adversary, problem),
             duality_gap: found.duality_gap / earned_later,
-            value_error: self.value_error(step).map(|error| error / earned_later),
+            value_error: self.value_error(step, found.certainty_equivalent).map(|error| error / earned_later),
             untrained_share: self.untrained_share(&bellman, (state, law), &found.actions, &found.adversary),
         })
     }
 
-    /// Returns the error of the value of the step after, as of the start: 0 after the last step, which is exact.
-    fn value_error(&self, step: usize) -> Option<f64> {
+    /// Returns the error of a worth by the values of the step after, as of the start: 0 after the last step, which is exact.
+    fn value_error(&self, step: usize, worth: f64) -> Option<f64> {
         self.specification.design.accuracy?;
         let after =
             self.policy.steps.get(step).map_or(Some(0.0), |after| Some(after.diagnostics.expected_error?.total));
-        after.map(|error| self.problem.error_amount(error))
+        after.map(|error| self.problem.error_amount(error, worth))
     }
 
     /// Returns the share of the outcomes under the worst law that lead out of the design of the step after.

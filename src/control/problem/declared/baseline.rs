@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Least number of paths for each coefficient. With fewer the worth is their mean.
 const PATHS_EACH: usize = 20;
+/// A state whose spread is less than this share of its size differs by rounding alone.
+const ROUNDING: f64 = 1e-12;
 /// Directions of the states in which paths differ by less than this share of the widest are left out.
 const NARROW: f64 = 1e-6;
 
@@ -34,8 +36,11 @@ impl Baseline {
             mean(&|path| worths[path]),
         );
         let flat = Baseline { constant: level, slopes: vec![0.0; count] };
-        let spread: Vec<f64> =
-            (0..count).map(|place| mean(&|path| (states[path][place] - centre[place]).powi(2)).sqrt()).collect();
+        let spread = |place: usize| {
+            let spread = mean(&|path| (states[path][place] - centre[place]).powi(2)).sqrt();
+            if spread > ROUNDING * centre[place].abs() { spread } else { 0.0 }
+        };
+        let spread: Vec<f64> = (0..count).map(spread).collect();
         if paths < PATHS_EACH * (count + 1) || spread.iter().all(|spread| *spread == 0.0) {
             return flat;
         }
@@ -66,7 +71,7 @@ mod tests {
     #[test]
     fn a_linear_worth_is_found_again() {
         let states: Vec<Vec<f64>> =
-            (0..100).map(|path| vec![f64::from(path % 7), 3.0, 1e4 + f64::from(path % 11)]).collect();
+            (0..100).map(|path| vec![f64::from(path % 7), 0.1, 1e4 + f64::from(path % 11)]).collect();
         let worths: Vec<f64> = states.iter().map(|state| 2.0 - 0.5 * state[0] + 3.0 * state[2]).collect();
         let baseline = Baseline::fitted(&states, &worths);
         assert_eq!(baseline.slopes[1], 0.0);

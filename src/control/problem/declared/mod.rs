@@ -108,10 +108,10 @@ impl Declared {
         }
     }
 
-    /// Returns the amount, as of the start, of an error of gains in ten-thousandths.
-    pub fn error_amount(&self, of_gains: f64) -> f64 {
-        let start = self.start();
-        of_gains / TEN_THOUSAND * self.of_ratio(1.0).map_or(self.unit, |_| self.baseline(0, &start))
+    /// Returns the amount of an error of gains in ten-thousandths around a worth. If a utility counts ratios it is a share of
+    /// the worth; otherwise it does not depend on it, and is an amount as of the start.
+    pub fn error_amount(&self, of_gains: f64, worth: f64) -> f64 {
+        of_gains / TEN_THOUSAND * self.of_ratio(1.0).map_or(self.unit, |_| worth.abs())
     }
 
     /// Returns what an amount of a step is worth at the start; never 0, by which one would divide.

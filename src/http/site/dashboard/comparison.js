@@ -52,11 +52,11 @@ export const ruleWords = ({ rules = {} }) =>
   );
 
 /** Says whether the worth of a strategy differs from that of the first. */
-export function verdict({ strategy, difference }, first, { is = "is worth", on = "these paths" } = {}) {
+export function verdict({ strategy, difference }, first, { is = "is worth", each = "", on = "these paths" } = {}) {
   const { value, low, high } = difference;
-  if (low === 0 && high === 0) return `${quoted(strategy)} ${is} as much as ${quoted(first)} on ${on}.`;
+  if (low === 0 && high === 0) return `${quoted(strategy)} ${is} as much${each} as ${quoted(first)} on ${on}.`;
   const size = value < 0 ? { value: -value, low: -high, high: -low } : difference;
-  const said = `${quoted(strategy)} ${is} ${ranged(size)} ${value < 0 ? "less" : "more"} than ${quoted(first)}`;
+  const said = `${quoted(strategy)} ${is} ${ranged(size)} ${value < 0 ? "less" : "more"}${each} than ${quoted(first)}`;
   if (low > 0 || high < 0) return `${said}. The range does not contain 0: the two can be told apart.`;
   return `${said}. The range contains 0: ${on} cannot tell the two apart.`;
 }

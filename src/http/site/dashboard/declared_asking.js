@@ -1,9 +1,9 @@
 // What may be asked of a declared problem's policy by a job: a comparison with other frameworks and a rule, and a walk through its record.
 
 import { post } from "./api.js";
+import { plain } from "./comparison.js";
 import { announce, h, section } from "./dom.js";
 import { fieldset, input, refusal, sending } from "./form.js";
-import { plain } from "./comparison.js";
 import { pointed } from "./number_text.js";
 
 const FRAMEWORKS = { adaptive: "Cautious, and learns", static: "Cautious, learns nothing more", plug_in: "Learns, and trusts what it learned", known_law: "Trusts the record, learns nothing more" };
@@ -11,8 +11,8 @@ const FRAMEWORKS = { adaptive: "Cautious, and learns", static: "Cautious, learns
 /** Returns checkboxes for frameworks, and a function that returns the ticked ones. */
 function frameworksField(names, ticked) {
   const boxes = names.map((name) => [name, h("input", { type: "checkbox", name: "frameworks", value: name, checked: name === ticked })]);
-  const element = h("fieldset", {}, h("legend", {}, "Frameworks"), boxes.map(([name, box]) => h("label", {}, box, FRAMEWORKS[name])));
-  return [element, () => boxes.filter(([, { checked }]) => checked).map(([name]) => name)];
+  const element = h("div", { class: "field checks" }, boxes.map(([name, box]) => h("label", {}, box, FRAMEWORKS[name])));
+  return [fieldset("Frameworks", [element]), () => boxes.filter(([, { checked }]) => checked).map(([name]) => name)];
 }
 
 /** Returns fields for a rule, a formula for each action, and a function that returns the rules: none if all are blank. */

@@ -41,7 +41,7 @@ function gains({ request: { problem: { utility }, level, every }, strategies }) 
     ? "The gain of a period is what the amount grew by, on average."
     : "The gain of a period is its reward, and how much more the states are worth after it by the formula for the end, on average.";
   const note = `${meaning} Ranges hold with about ${percent(level, 0)} confidence, each by itself. They resample the record in blocks of ${counted(every, "period")}, and are too narrow if it has few of them.`;
-  const said = others.map((other) => h("p", {}, verdict(other, first.strategy, { is: "gained a period", on: "this record" })));
+  const said = others.map((other) => h("p", {}, verdict(other, first.strategy, { is: "gained", each: " a period", on: "this record" })));
   return section("What each gained", h("div", { class: "words" }, said), table("Gain of each strategy", columns, strategies), h("p", { class: "note" }, note));
 }
 
@@ -50,7 +50,10 @@ function course({ request: { problem: { reward, noise } }, strategies }) {
   const [{ periods }] = strategies;
   const x = { values: periods.map((_, index) => index + 1), label: "Period", format: String, whole: true };
   const chart = (title, series) => lineChart({ title, x, y: { format: plain, tick }, start: 0, series });
-  const sums = (periods) => periods.reduce((all, one) => [...all, one.reward + (all.at(-1) ?? 0)], []);
+  const sums = (periods) => {
+    let sum = 0;
+    return periods.map(({ reward }) => (sum += reward));
+  };
   const earned = strategies.slice(0, 10).map(({ strategy, periods }) => ({ name: strategy, kind: "line", values: sums(periods) }));
   return section(
     "What happened",
