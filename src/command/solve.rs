@@ -58,7 +58,7 @@ fn describe(declared: &DeclaredSpecification, first: &Decided) -> String {
     let about = match first.value_error {
         Some(error) if error > 0.0 => {
             let digits = 10_f64.powi(1 - error.log10().floor() as i32);
-            format!(", to about {} in the root mean square", number((error * digits).round() / digits))
+            format!(", to about {} in the root mean square", (error * digits).round() / digits)
         }
         _ => String::new(),
     };

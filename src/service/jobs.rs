@@ -183,7 +183,7 @@ impl Jobs {
             BacktestQuestion::Declared(request) => {
                 // Formulas are tried at many points.
                 let walk = self.reading.run(&caller.tenant, move || DeclaredWalk::new(request)).await??;
-                let estimate = estimate::declared::walk(&walk, self.threads);
+                let estimate = walk.footprint(self.threads);
                 (BacktestQuestion::Declared(walk.request().clone()), estimate, walk.step_count(), walk.warnings())
             }
         };

@@ -2,7 +2,6 @@
 
 use super::{Footprint, LEAST, Sizes, advising_of, footprint, product};
 use crate::control::declared_training::DeclaredTraining;
-use crate::control::evaluation::declared_walk::DeclaredWalk;
 use crate::control::policy::declared::DeclaredPolicy;
 use crate::control::policy::prepared_step::{largest_design, steps_bytes};
 use crate::control::request::completion::DEFAULT_COUNT;
@@ -61,10 +60,9 @@ pub fn advising_by(policy: &DeclaredPolicy, read: &DeclaredTraining) -> [Footpri
     ]
 }
 
-/// Returns the footprint of a walk-forward, whose trainings run side by side, on so many threads.
-pub fn walk(walk: &DeclaredWalk, threads: usize) -> Footprint {
-    let trainings = walk.trainings().iter().map(|first| training(first, threads).0.bytes());
-    let decisions = product(&[walk.decisions(), WALKED_BYTES]).saturating_add(LEAST);
-    let trained = trainings.fold(0, usize::saturating_add);
-    Footprint::of("frameworks", walk.trainings().len(), trained).and("problem.history", walk.decisions(), decisions)
+/// Returns the footprint of a walk-forward of so many decisions, whose `trainings` run side by side, on so many threads.
+pub fn walk(trainings: &[DeclaredTraining], decisions: usize, threads: usize) -> Footprint {
+    let trained = trainings.iter().map(|first| training(first, threads).0.bytes()).fold(0, usize::saturating_add);
+    let walked = product(&[decisions, WALKED_BYTES]).saturating_add(LEAST);
+    Footprint::of("frameworks", trainings.len(), trained).and("problem.history", decisions, walked)
 }

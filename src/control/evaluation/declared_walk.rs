@@ -12,6 +12,7 @@ use super::declared_comparison::leaving;
 use crate::control::cache::Cache;
 use crate::control::declared_training::DeclaredTraining;
 use crate::control::error::{FieldError, TrainError};
+use crate::control::estimate::{self, Footprint};
 use crate::control::policy::declared::{DeclaredAdvisor, DeclaredPolicy};
 use crate::control::pool;
 use crate::control::problem::declared::{Declared, EarnedState, FormulaRule};
@@ -87,7 +88,7 @@ pub struct WalkedStretch {
 pub struct DeclaredWalk {
     request: DeclaredBacktest,
     specification: DeclaredSpecification,
-    /// Moves states; its history is the first window.
+    /// Moves states.
     problem: Declared,
     /// The training of each framework on the first window.
     first: Vec<DeclaredTraining>,
@@ -118,8 +119,7 @@ impl DeclaredWalk {
         let (window, every) = (request.window.unwrap_or_default(), request.every.unwrap_or_default());
         let specification = request.specification();
         let record = &specification.problem.history;
-        // Every number of the record is one of the noise.
-        Declared::new(&specification.problem)?;
+        let problem = Declared::new(&specification.problem)?;
         for start in (0..record.len() - window).step_by(every) {
             let known = &record[start..start + window];
             if known.iter().all(|noise| *noise == known[0]) {
@@ -129,7 +129,6 @@ impl DeclaredWalk {
             }
         }
         let first = specification.next(record[..window].iter().copied(), None, BTreeMap::new());
-        let problem = Declared::new(&first.problem)?;
         let frameworks = request.frameworks.iter();
         let trainings = frameworks.clone().map(|of| DeclaredTraining::with(&first.under(*of), Cache::default()));
         let trainings = trainings.collect::<Result<Vec<_>, FieldError>>()?;
@@ -161,9 +160,9 @@ impl DeclaredWalk {
         self.strategies.len() * self.stretches()
     }
 
-    /// Returns the number of periods of all strategies together.
-    pub fn decisions(&self) -> usize {
-        self.strategies.len() * self.lived().len()
+    /// Returns the memory that it takes on so many threads.
+    pub fn footprint(&self, threads: usize) -> Footprint {
+        estimate::declared::walk(&self.first, self.strategies.len() * self.lived().len(), threads)
     }
 
     fn stretches(&self) -> usize {

@@ -75,7 +75,7 @@ impl Worker {
         stop: &AtomicBool,
     ) -> Result<JobOutcome, JobEnd> {
         let walk = DeclaredWalk::new(request).map_err(|error| failed(error.to_string()))?;
-        let _reserved = self.reserve(&estimate::declared::walk(&walk, self.threads))?;
+        let _reserved = self.reserve(&walk.footprint(self.threads))?;
         let trainings = walk.trainings().iter().map(|first| estimate::kept_by_training(first.specification()));
         let kept = Cache::new(trainings.fold(0, usize::saturating_add));
         let checkpoints = self.checkpoints(claimed)?;
