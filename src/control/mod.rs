@@ -26,6 +26,8 @@
 //! | min over C | `worst_expectation` | (3.3) | `numerics/transport/wasserstein.rs` | `tests/solver/transport.rs::worst_expectation_agrees_with_the_transport_programme` |
 //! | V^gamma | `envelope` | (3.4) | `numerics/transport/wasserstein.rs` | `src/numerics/transport/wasserstein.rs::primal_and_dual_meet_on_any_payoff` |
 //! | psi* | `WorstCase` | 2.2, (3.2) | `control/policy/worst_case.rs` | `tests/solver/parametric.rs::the_multiplier_is_the_utility_lost_per_unit_of_radius` |
+//! | Q^(phi*, psi*) | `World` | 2.2 | `control/policy/futures/mod.rs` | `tests/solver/futures.rs::the_laws_of_another_ball_break_the_identity` |
+//! | V_0 under it | `Futures` | 2.3 | `control/policy/futures/report.rs` | `tests/solver/futures.rs::an_investor_is_worth_what_playing_the_worst_laws_brings` |
 //! | y^i_t, N | `Design` | 3.1 | `control/surrogate/design.rs` | `tests/solver/control.rs::the_same_seed_gives_the_same_bytes_on_any_number_of_threads_and_through_json` |
 //! | y-check | `FeatureSelection` | 3.1 | `control/surrogate/features.rs` | `tests/project/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
 //! | k | `weighted_sum` | 3.1 | `numerics/gp/matern.rs` | `src/numerics/gp/matern.rs::the_fast_sum_equals_the_plain_formula` |

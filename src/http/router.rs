@@ -24,8 +24,8 @@ use crate::http::gate::bodies::{self, Bodies};
 use crate::http::gate::hosts::Hosts;
 use crate::http::gate::telemetry;
 use crate::http::routes::{
-    advise, audit, backtests, decide, evaluations, events, frontiers, holder, jobs, labels, operations, overview,
-    policies, reports, returns, sessions, what_if, wire,
+    advise, audit, backtests, decide, evaluations, events, frontiers, futures, holder, jobs, labels, operations,
+    overview, policies, reports, returns, sessions, what_if, wire,
 };
 use crate::http::site::{dashboard, guide};
 use crate::service::Service;
@@ -67,10 +67,12 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(policies::get, policies::delete, labels::of_policy))
         .routes(routes!(policies::export))
         .routes(routes!(policies::surface))
+        .routes(routes!(futures::of_policy))
         .routes(routes!(policies::import))
         .routes(routes!(sessions::open, overview::list))
         .routes(routes!(sessions::get, sessions::delete, labels::of_session))
         .routes(routes!(sessions::history))
+        .routes(routes!(futures::of_session))
         .routes(routes!(reports::observe))
         .routes(routes!(sessions::correct))
         .routes(routes!(sessions::renew))

@@ -18,7 +18,7 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 39] = [
+const DOCUMENTS: [&str; 40] = [
     "control/assets/advice.rs",
     "control/evaluation/assets/report.rs",
     "control/evaluation/backtest_report.rs",
@@ -30,6 +30,7 @@ const DOCUMENTS: [&str; 39] = [
     "control/policy/advice.rs",
     "control/policy/caution.rs",
     "control/policy/declared.rs",
+    "control/policy/futures/report.rs",
     "control/policy/levels.rs",
     "control/policy/sensitivity/mod.rs",
     "control/policy/surface.rs",

@@ -21,6 +21,7 @@ mod files;
 mod frontier;
 mod fund_renewal;
 mod funds;
+mod futures;
 mod keys;
 mod labels;
 mod lives;

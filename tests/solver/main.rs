@@ -21,6 +21,7 @@ mod declared_walk;
 mod design;
 mod evaluate;
 mod exchangeability;
+mod futures;
 mod gp;
 mod hostile_declarations;
 mod learning;

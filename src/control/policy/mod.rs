@@ -5,6 +5,7 @@ pub mod advisor;
 pub mod caution;
 pub mod declared;
 mod document;
+pub mod futures;
 pub mod levels;
 pub mod one_period;
 pub mod prepared_step;

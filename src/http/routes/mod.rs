@@ -8,6 +8,7 @@ pub(super) mod decide;
 pub(super) mod evaluations;
 pub(super) mod events;
 pub(super) mod frontiers;
+pub(super) mod futures;
 pub(super) mod holder;
 pub(super) mod jobs;
 pub(super) mod labels;

@@ -70,6 +70,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "flows.js": SCRIPT,
         "form.js": SCRIPT,
         "frontier.js": SCRIPT,
+        "futures.js": SCRIPT,
         "format.js": SCRIPT,
         "heatmap.js": SCRIPT,
         "histogram.js": SCRIPT,

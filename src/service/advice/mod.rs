@@ -6,6 +6,7 @@ pub mod advise;
 pub mod advise_assets;
 pub mod decide;
 pub mod explain;
+pub mod futures;
 pub(super) mod hypotheses;
 pub mod policy_map;
 pub mod returns;

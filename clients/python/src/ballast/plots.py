@@ -114,6 +114,30 @@ def frontier(report: wire.FrontierReport, ax: Axes | None = None) -> Axes:
     return axes
 
 
+def futures(futures: wire.Futures, name: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draws the course of a figure in both worlds of some futures: the median, and the range of eight paths in ten.
+
+    By default it draws the first course, which is wealth for an investor. Raises ``ValueError`` for an unknown name.
+    """
+    courses = {course["name"]: course for course in futures["courses"]}
+    name = next(iter(courses)) if name is None else name
+    if name not in courses:
+        raise ValueError(f"name is {name!r}: must be one of {'; '.join(courses)}")
+    axes = _axes(ax)
+    for course, label, colour in (
+        (courses[name]["worst"], "the worst law every period", "C3"),
+        (courses[name]["record"], "periods like the record's", "C0"),
+    ):
+        periods = [futures["period"] - 1 + place for place in range(len(course))]
+        axes.plot(periods, [point["median"] for point in course], color=colour, label=label)
+        lows, highs = [point["low"] for point in course], [point["high"] for point in course]
+        axes.fill_between(periods, lows, highs, color=colour, alpha=0.15, linewidth=0)
+    axes.set_xlabel("period")
+    axes.set_ylabel(name)
+    axes.legend(frameon=False)
+    return axes
+
+
 def worst_case(advice: frames.Explained, ax: Axes | None = None) -> Axes:
     """Draws the probability of each log-return, under the learned law upwards and under the worst law downwards.
 

@@ -69,6 +69,15 @@ class _Policy(Labelled):
         path, params = f"{self._path}/surface", {"step": step, "across": across}
         return cast(wire.Surface, await self._transport.json("GET", path, params=params))
 
+    async def _futures(self, paths: int | None = None) -> wire.Futures:
+        """Plays the policy from its start in two worlds, with ``paths`` paths of each.
+
+        In one of them every period brings the law that is worst for what is decided, in the other periods are drawn
+        from the record. Every step of the first is solved, so it takes a while. :func:`ballast.plots.futures` draws the
+        answer.
+        """
+        return cast(wire.Futures, await self._transport.json("GET", f"{self._path}/futures", params={"paths": paths}))
+
     async def _decide(
         self, period: int = 1, state: Mapping[str, float] | None = None, noises: Sequence[float] = ()
     ) -> wire.DecideAnswer:
@@ -160,6 +169,7 @@ class Policy(_Policy):
     detail = Answering(wire.PolicyDetail).blocking(_Policy._detail)
     export = blocking(_Policy._export)
     surface = Answering(wire.Surface).blocking(_Policy._surface)
+    futures = Answering(wire.Futures).blocking(_Policy._futures)
     decide = Answering(wire.DecideAnswer).blocking(_Policy._decide)
     session = blocking_into(_Policy._session, Session)
     label = Answering(wire.Labels).blocking(_Policy._label)
@@ -172,6 +182,7 @@ class AsyncPolicy(_Policy):
     detail = _Policy._detail
     export = _Policy._export
     surface = _Policy._surface
+    futures = _Policy._futures
     decide = _Policy._decide
     session = awaiting_into(_Policy._session, AsyncSession)
     label = _Policy._label

@@ -358,6 +358,11 @@ class _Session(Labelled):
         body = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in scenario.items()}
         return cast(wire.AssetsWhatIfPoint, await self._transport.json("POST", "/what-if", body=body))
 
+    async def _futures(self, paths: int | None = None) -> wire.Futures:
+        """Plays the session on, from its coming period to the last that its policy decides, as
+        :meth:`Policy.futures <ballast.Policy.futures>` plays a policy."""
+        return cast(wire.Futures, await self._transport.json("GET", f"{self._path}/futures", params={"paths": paths}))
+
     async def _history(self) -> wire.History:
         """Returns the start of the session, all reports and answers, and what the answers would be now.
 
@@ -454,6 +459,7 @@ class Session(_Session):
     correct = Answering(wire.Corrected).blocking(_Session._correct)
     renew = Answering(wire.Renewed).blocking(_Session._renew)
     what_if = blocking(_Session._what_if)
+    futures = Answering(wire.Futures).blocking(_Session._futures)
     assets_what_if = Answering(wire.AssetsWhatIfPoint).blocking(_Session._assets_what_if)
     label = Answering(wire.Labels).blocking(_Session._label)
     history = Answering(wire.History).blocking(_Session._history)
@@ -476,6 +482,7 @@ class AsyncSession(_Session):
     correct = _Session._correct
     renew = _Session._renew
     what_if = _Session._what_if
+    futures = _Session._futures
     assets_what_if = _Session._assets_what_if
     label = _Session._label
     history = _Session._history

@@ -537,6 +537,17 @@ Explain: TypeAlias = Literal["worst_case"]
 """The explanation shown beside an allocation."""
 
 
+class FanPoint(TypedDict):
+    """Quantiles over paths at one time."""
+
+    low: float
+    """Value below which a tenth of the paths lie."""
+    median: float
+    """The median."""
+    high: float
+    """Value below which nine tenths of the paths lie."""
+
+
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
 """The map from a state to the inputs of a surrogate."""
 
@@ -1948,6 +1959,17 @@ class CoverageAtSize(TypedDict):
     sample_size: int
     """Number of returns known."""
     covered: Estimate
+class Course(TypedDict):
+    """The course of a figure in both worlds: before each period, and at the end."""
+
+    name: str
+    """Name of the figure."""
+    worst: list[FanPoint]
+    """In the world in which every period brings the worst law."""
+    record: list[FanPoint]
+    """In the world in which periods are drawn from the record."""
+
+
     """Share of paths whose ball held the true law."""
 
 
@@ -2147,6 +2169,25 @@ class JobProgress(TypedDict):
     steps_done: int
     steps_total: int
     step: NotRequired[int | None]
+class Futures(TypedDict):
+    """The futures of a policy from a state."""
+
+    period: int
+    """First period that is played, from 1."""
+    paths: int
+    """Number of paths of each world."""
+    promised: float
+    """Worth for certain against the worst laws, as the policy says it at the start."""
+    stated_error: NotRequired[float | None]
+    """Standard deviation that the policy states for it, as an amount; null if it states none."""
+    played: Estimate
+    """Worth for certain in the worst world, as these paths find it, with a 90 % interval."""
+    courses: list[Course]
+    """Courses of wealth, or of each state of a declared problem and of what was earned."""
+    sentence: str
+    """The two worlds in words."""
+
+
     """Step being solved; steps are solved from the last to the first. Null in a simulation."""
     phase: NotRequired[Phase | None]
     points_done: NotRequired[int | None]

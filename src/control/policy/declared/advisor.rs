@@ -69,6 +69,11 @@ impl DeclaredAdvisor {
         &self.specification
     }
 
+    /// Returns the problem that was read from the formulas.
+    pub fn problem(&self) -> &Declared {
+        &self.problem
+    }
+
     /// Returns the formulas that jump, which may be mistakes.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
@@ -162,12 +167,17 @@ impl DeclaredAdvisor {
     /// The first period, whose step has no surrogate, and those of [`Self::decide`].
     pub fn predicted(&self, period: usize, state: &BTreeMap<String, f64>, noises: &[f64]) -> Result<f64, FieldError> {
         let (step, state, seen) = self.situation(period, Some(state), noises)?;
-        let features = self.controlled.step(&self.problem, step).features(&state, &self.law(&seen));
-        let gain = self.controlled.gain(step, &features).ok_or_else(|| {
+        let worth = self.worth_after(step, &state, &seen).ok_or_else(|| {
             FieldError::new("period", period, "must be after the first, whose step is solved where it is asked for")
         })?;
-        let worth = self.problem.worth(gain, self.problem.baseline(step, &state));
         Ok(worth / self.problem.discounted(step))
+    }
+
+    /// Returns the worth of a state with what was earned, as of the start, by the surrogate of its step; `None` at step 0.
+    pub fn worth_after(&self, step: usize, state: &EarnedState, seen: &[f64]) -> Option<f64> {
+        let features = self.controlled.step(&self.problem, step).features(state, &self.law(seen));
+        let gain = self.controlled.gain(step, &features)?;
+        Some(self.problem.worth(gain, self.problem.baseline(step, state)))
     }
 
     /// Returns the uncertainty set once these noises, in the unit of the solver, were seen. Its radius and its moments are
@@ -190,7 +200,7 @@ impl DeclaredAdvisor {
     }
 
     /// Returns the law that is known once so many noises were seen.
-    fn law(&self, seen: &[f64]) -> EmpiricalDistribution {
+    pub fn law(&self, seen: &[f64]) -> EmpiricalDistribution {
         let own = &self.specification.problem;
         let mut law = own.learning.law(&own.history);
         if own.framework.learns() {
@@ -249,7 +259,8 @@ impl DeclaredAdvisor {
     }
 
     /// Returns the error of a worth by the values of the step after, as of the start: 0 after the last step, which is exact.
-    fn value_error(&self, step: usize, worth: f64) -> Option<f64> {
+    /// `None` if the policy was not trained to an accuracy.
+    pub fn value_error(&self, step: usize, worth: f64) -> Option<f64> {
         self.specification.design.accuracy?;
         let after =
             self.policy.steps.get(step).map_or(Some(0.0), |after| Some(after.diagnostics.expected_error?.total));

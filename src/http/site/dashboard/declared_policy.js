@@ -5,17 +5,21 @@ import { beside, walking } from "./declared_asking.js";
 import { announce, facts, h, section, table } from "./dom.js";
 import { area, fieldset, input, refusal, sending } from "./form.js";
 import { count, percent, significant } from "./format.js";
+import { futuresOf } from "./futures.js";
 import { pointed } from "./number_text.js";
 import { caution, utility, warningList } from "./specification.js";
 
 /** Formats a number of a declared problem, whose unit is not known. */
 export const plain = (value) => significant(value, 6);
 
+/** Returns which courses of a declared problem are drawn: what is earned only if periods earn something. */
+export const isMoved = ({ reward }) => (name) => name !== "earned" || (reward ?? null) !== null;
+
 /** Says the states of a declared problem. */
 export const statesWords = (states) => Object.entries(states).map(([name, value]) => `${name}: ${plain(value)}`).join(", ");
 
 /** Returns the body of the page of policy `id`, with `map`, its map. `isCompared` tells whether the service can compare it. */
-export function declaredBody(id, { specification, warnings }, isCompared, map) {
+export function declaredBody(id, { specification, warnings }, isCompared, map, leaving) {
   const { problem, design } = specification;
   const { horizon, history } = problem;
   const answer = h("div", { id: "decision" });
@@ -33,6 +37,7 @@ export function declaredBody(id, { specification, warnings }, isCompared, map) {
     section("What to do in a period", deciding(id, problem, answer)),
     answer,
     map,
+    futuresOf(`/policies/${id}`, leaving, { format: plain, shown: isMoved(problem) }),
     isCompared ? beside(id, specification) : "",
     isCompared ? walking(specification) : "",
     section("The problem", formulas(problem)),

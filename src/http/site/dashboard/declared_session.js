@@ -4,10 +4,11 @@ import { get, post } from "./api.js";
 import { lineChart } from "./chart.js";
 import { CHANGES, correctionFrame } from "./correction.js";
 import { csvText } from "./csv.js";
-import { decided, plain, statesWords } from "./declared_policy.js";
+import { decided, isMoved, plain, statesWords } from "./declared_policy.js";
 import { announce, disclosure, facts, h, section, table } from "./dom.js";
 import { input, refusal, select } from "./form.js";
 import { count, moment, short, tick } from "./format.js";
+import { futuresOf } from "./futures.js";
 import { policyLink } from "./naming.js";
 import { pointed } from "./number_text.js";
 import { calendar, day } from "./periods.js";
@@ -47,6 +48,7 @@ async function fill(holder, shown, notice) {
     action === null ? "" : section(`Report ${shown.calendar.inText(session.period)}`, reporting(shown, action.actions ?? null)),
     figures(shown),
     action?.actions ? section("What if", supposing(shown)) : "",
+    action?.actions ? futuresOf(`/sessions/${id}`, leaving, { format: plain, shown: isMoved(problem) }) : "",
     first ? "" : course(shown),
     first ? "" : periods(shown),
   );

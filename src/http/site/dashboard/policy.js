@@ -5,7 +5,8 @@ import { lineChart } from "./chart.js";
 import { declaredBody } from "./declared_policy.js";
 import { disclosure, h, section, table } from "./dom.js";
 import { pressed } from "./form.js";
-import { basisPoints, count, figures, moment, percent, percentTick, short } from "./format.js";
+import { basisPoints, count, figures, moment, percent, percentTick, short, wealth } from "./format.js";
+import { futuresOf } from "./futures.js";
 import { labelled, titled } from "./naming.js";
 import { unitOf } from "./periods.js";
 import { policyMap } from "./policy_map.js";
@@ -15,7 +16,7 @@ import { surfaceView } from "./surface_view.js";
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics, annualised, warnings } = policy;
-  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, await offers("/evaluate"), policyMap(id, specification.problem)));
+  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, await offers("/evaluate"), policyMap(id, specification.problem), leaving));
   const { element, told } = answer(specification, diagnostics);
   const body = [
     h(
@@ -28,6 +29,7 @@ export async function view(id, leaving) {
     ),
     again(id),
     section("What it holds", surfaceView({ id, problem: specification.problem, leaving, told })),
+    futuresOf(`/policies/${id}`, leaving, { format: wealth }),
     solved(specification, diagnostics),
   ];
   const evaluate = (await offers("/evaluate"))

@@ -10,6 +10,7 @@ import { addedIn, banked, netAdded, standing } from "./flows.js";
 import { pressed } from "./form.js";
 import { allocation, count, counted, percent, points, short, wealth } from "./format.js";
 import { asking } from "./frontier.js";
+import { futuresOf } from "./futures.js";
 import { labelled, titled } from "./naming.js";
 import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
@@ -93,6 +94,7 @@ async function fill(holder, told) {
     h("div", { class: "columns" }, advice, wealthCourse(shown)),
     figures(shown, action),
     ...found,
+    futuresOf(`/sessions/${id}`, leaving, { format: wealth, x: { label: "Period", format: shown.calendar.after, here: shown.calendar.after, tick: shown.calendar.brief, whole: true } }),
     observed(shown),
     frontier(shown),
   );

@@ -1,0 +1,28 @@
+// The futures of a policy and a session: played when they are opened, in the words and figures of the service.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { browser, call, service, trained } from "./ballast.js";
+import { plain } from "./page.js";
+
+test("the worst of every period is played and drawn beside the record", async () => {
+  const [ballast, chromium] = await Promise.all([service(), browser()]);
+  try {
+    const page = await chromium.newPage();
+    page.setDefaultTimeout(20_000);
+    const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+    const problem = { horizon: 3, rate_per_step: 0.002, history, radius: { rule: "bridge", alpha: 0.1, scale: 0.2 } };
+    const policy = await trained(ballast.url, { problem, design: { count: 50 } });
+    const { session } = await call(ballast.url, "/sessions", { policy });
+    for (const [path, place] of [["policies", policy], ["sessions", session]]) {
+      await page.goto(`${ballast.url}/#/${path}/${place}`);
+      await page.getByText("Play this policy against the worst law of every period").click();
+      await page.getByRole("slider", { name: "Wealth", exact: true }).last().waitFor();
+      const { sentence } = await call(ballast.url, `/${path}/${place}/futures`);
+      assert.ok(plain(await page.locator("main").innerText()).includes(plain(sentence)), sentence);
+    }
+  } finally {
+    await chromium.close();
+    await ballast.stop();
+  }
+});
