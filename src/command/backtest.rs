@@ -26,12 +26,14 @@ use clap::Args;
 use serde::Serialize;
 use thiserror::Error;
 
+use self::weights::OwnStrategy;
 use super::caution;
 use super::progress::Parts;
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
 
 mod assets;
 mod files;
+mod weights;
 
 #[derive(Debug, Clone, Args)]
 pub struct BacktestArgs {
@@ -84,6 +86,10 @@ pub struct BacktestArgs {
     /// Train every policy as if trading were free
     #[arg(long)]
     cost_blind: bool,
+    /// A strategy of your own to compare, as NAME=FILE, up to ten of them: a CSV file of dates and the share of wealth held
+    /// in each period, or for several assets a column with the name of each
+    #[arg(long)]
+    weights: Vec<OwnStrategy>,
     /// Design points per step: more is more accurate and slower; 100 unless given
     #[arg(long)]
     count: Option<usize>,
@@ -226,6 +232,7 @@ impl BacktestArgs {
             risk_aversion: self.risk_aversion,
             trading_cost: self.trading_cost()?,
             cost_blind: self.cost_blind,
+            weights: Default::default(),
             count: self.count.unwrap_or_else(defaults::count),
             seed: self.seed,
         })
@@ -245,7 +252,15 @@ impl BacktestArgs {
     }
 
     fn backtest(&self, returns: &Returns) -> Result<Backtest, BacktestError> {
-        Ok(Backtest::new(self.request(returns)?)?)
+        let request = self.request(returns)?;
+        let backtest = Backtest::new(request.clone())?;
+        if self.weights.is_empty() {
+            return Ok(backtest);
+        }
+        let dates: Vec<String> = returns.rows().iter().map(|row| row.date.clone()).collect();
+        let shares = |own: &OwnStrategy| Ok((own.name.clone(), own.rows(&[], &dates, backtest.walk.window)?.concat()));
+        let weights = self.weights.iter().map(shares).collect::<Result<_, BacktestError>>()?;
+        Ok(Backtest::new(BacktestRequest { weights, ..request })?)
     }
 }
 
@@ -269,7 +284,11 @@ fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
 impl From<FieldError> for BacktestError {
     fn from(FieldError { field, value, rule }: FieldError) -> Self {
         // Fields of an object belong to its option.
-        let field = if field.starts_with("centre.") { field.replacen('.', " ", 1) } else { field };
+        let field = if ["centre.", "weights."].iter().any(|object| field.starts_with(object)) {
+            field.replacen('.', " ", 1)
+        } else {
+            field
+        };
         let option = match (field.strip_prefix("simple_returns"), field.strip_prefix("assets")) {
             (Some(at), _) => format!("the file{at}"),
             (None, Some(at)) => format!("--column{at}"),

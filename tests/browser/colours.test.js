@@ -11,8 +11,8 @@ const { colourOf, colourOfLevel, colourOfMix } = await dashboardModule("strategi
 /** Strategies that stand on a page together, as reports call them. */
 const PAGES = [
   ["adaptive", "static", "plug_in", "known_law", "parametric_adaptive", "parametric_static", "all_bank", "sixty_forty", "all_stock"],
-  ["static", "plug_in", "cost_blind", "own_mix", "sixty_forty", "all_stock", "all_bank"],
-  ["policy", "robust", "robust_sup", "robust_static", "plug_in", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"],
+  ["static", "plug_in", "cost_blind", "own_mix", "sixty_forty", "all_stock", "all_bank", "own"],
+  ["policy", "robust", "robust_sup", "robust_static", "plug_in", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal", "own"],
 ];
 
 test("every strategy has a colour, no two of a page the same, and the same ones on every page", () => {

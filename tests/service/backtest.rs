@@ -437,3 +437,45 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
         assert!(!refused.status.success() && error.contains(complaint), "{options}: {error}");
     }
 }
+
+/// Strategies of the user's own hold what they say, beside the others: 60 % by its own name is 60/40, and of two equal assets
+/// equal shares are those of the service.
+#[tokio::test(flavor = "multi_thread")]
+async fn strategies_of_one_s_own_are_walked_beside_the_others() {
+    let app = App::start().await;
+    let shares: Vec<f64> = (0..20).map(|quarter| if quarter < 12 { 0.0 } else { 0.6 }).collect();
+    let own = json!({ "Mine": shares, "Half": vec![0.5; 20] });
+    let reported = report(&app, &queue(&app, &request(2, &json!({ "weights": own }))).await).await;
+    let named = |name: &str| {
+        let place = reported["strategies"].as_array().unwrap().iter().position(|one| one["strategy"] == name).unwrap();
+        (reported["strategies"][place].clone(), reported["periods"][place].clone())
+    };
+    let ((mine, periods), (sixty, expected)) = (named("Mine"), named("60/40"));
+    assert_eq!((&mine["kind"], &periods["wealth"]), (&json!("own"), &expected["wealth"]));
+    assert_eq!(mine["yearly_certainty_equivalent"], sixty["yearly_certainty_equivalent"]);
+    assert_eq!(named("Half").1["allocation"][0], json!(0.5));
+    for (weights, field) in [
+        (json!({ "Mine": vec![0.5; 19] }), "weights.Mine"),
+        (json!({ "Mine": vec![60.0; 20] }), "weights.Mine[0]"),
+        (json!({ "60/40": vec![0.5; 20] }), "weights"),
+        (json!({ " Mine": vec![0.5; 20] }), "weights"),
+    ] {
+        let (status, problem) = app.post("/backtest", &request(2, &json!({ "weights": weights }))).await;
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{problem}");
+    }
+
+    let (risky, rate, dates) = record(20);
+    let rows: Vec<Vec<f64>> = risky.iter().enumerate().map(|(at, z)| vec![*z, *z + 0.001 * (at % 3) as f64]).collect();
+    let assets = json!({ "assets": ["a", "b"], "simple_returns": rows, "rate": rate, "dates": dates, "windows": [12],
+        "trading_cost": 0.001, "weights": { "Mine": vec![[0.5, 0.5]; 20] } });
+    let reported = report(&app, &queue(&app, &assets).await).await;
+    let wealth = |name: &str| {
+        let periods = reported["periods"].as_array().unwrap();
+        periods.iter().find(|one| one["strategy"] == name).unwrap()["wealth"].clone()
+    };
+    assert_eq!(wealth("Mine"), wealth("Equal shares"));
+    let mut wrong = assets.clone();
+    wrong["weights"]["Mine"][3] = json!([0.7, 0.4]);
+    let (status, problem) = app.post("/backtest", &wrong).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("weights.Mine[3]")), "{problem}");
+}

@@ -5,6 +5,7 @@ use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsW
 use ballast::control::progress::Watch;
 use ballast::report::FileError;
 
+use super::weights::OwnStrategy;
 use super::{BacktestArgs, BacktestError, ReportOfRecord, Window, page, refused};
 use crate::command::progress::Parts;
 use crate::command::returns::SeveralReturns;
@@ -76,12 +77,17 @@ impl BacktestArgs {
             seed: self.seed,
         };
         let names_columns = self.returns.names_columns();
-        AssetsBacktest::new(record, choices).map_err(|error| match BacktestError::from(error) {
+        let named = |error| match BacktestError::from(error) {
             BacktestError::Option { option, value, rule } if option == "--column" && !names_columns => {
                 refused("the file", value, &format!("{rule}. Choose assets with --column, once for each"))
             }
             error => error,
-        })
+        };
+        let backtest = AssetsBacktest::new(record, choices).map_err(named)?;
+        let AssetsRecord { assets, dates, .. } = &backtest.record;
+        let rows = |own: &OwnStrategy| Ok((own.name.clone(), own.rows(assets, dates, backtest.first)?));
+        let weights = self.weights.iter().map(rows).collect::<Result<_, BacktestError>>()?;
+        Ok(backtest.with_own(weights)?)
     }
 }
 

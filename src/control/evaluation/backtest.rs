@@ -4,9 +4,10 @@ use jiff::civil::Date;
 
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::analysis::{Analysis, StrategyLine};
-use crate::control::evaluation::names::{StrategyKind, at_level, mix_name};
+use crate::control::evaluation::names::{StrategyKind, at_level, check_own_names, mix_name};
 use crate::control::evaluation::walk_forward::{ActualPeriod, Decision, Strategy, WalkForward};
 use crate::control::evaluation::yearly_worth::Scale;
+use crate::control::problem::actions::Band;
 use crate::control::progress::Watch;
 use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::framework::Framework;
@@ -82,11 +83,13 @@ impl Backtest {
         walk.specification(Framework::Adaptive, request.alpha[0], &periods[..walk.window])
             .completed()
             .map_err(|error| renamed(error, field))?;
+        let strategies = strategies(&request);
+        check_own_names(request.weights.keys(), strategies.iter().map(|((_, name), _)| name.clone()))?;
         Ok(Backtest {
             frequency: request.frequency()?,
             periods_per_year: given(request.periods_per_year),
             days: request.days(),
-            strategies: strategies(&request),
+            strategies,
             request,
             walk,
             periods,
@@ -156,6 +159,12 @@ impl Backtest {
         let names = self.strategies.iter().map(|(name, _)| name.clone());
         let mut lines: Vec<StrategyLine> =
             names.zip(decisions).map(|(name, decisions)| StrategyLine::new(name, decisions, lived, cost)).collect();
+        let own = self.request.weights.iter().map(|(name, shares)| {
+            let decision = |share: &f64| Decision { band: Band::of(&[*share]), radius: 0.0, source: None };
+            let decisions = shares[self.walk.window..].iter().map(decision).collect();
+            StrategyLine::new((StrategyKind::Own, name.clone()), decisions, lived, cost)
+        });
+        lines.extend(own);
         lines.push(lines[main].hindsight(lived, cost));
         let (periods_per_year, seed) = (self.periods_per_year, self.walk.seed);
         let scale = Scale { periods_per_year, utility: self.walk.utility(), seed };

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::error::FieldError;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::framework::Framework;
 
@@ -45,6 +46,8 @@ pub enum StrategyKind {
     EqualShares,
     /// A constant 60 % of wealth in equal shares of every asset.
     SixtyEqual,
+    /// A strategy of the user's own, which has a name of theirs.
+    Own,
 }
 
 impl StrategyKind {
@@ -67,6 +70,7 @@ impl StrategyKind {
             StrategyKind::InverseVolatility => "Inverse volatility",
             StrategyKind::EqualShares => "Equal shares",
             StrategyKind::SixtyEqual => "60 % in equal shares",
+            StrategyKind::Own => "Own",
         }
     }
 }
@@ -91,6 +95,22 @@ pub fn mix_name(share: f64) -> String {
         1.0 => StrategyKind::AllStock.name().into(),
         _ => format!("{} in stocks", percent(share)),
     }
+}
+
+/// Checks that the names of a user's own strategies differ from those of all others.
+///
+/// # Errors
+/// The first that does not.
+pub fn check_own_names<'a>(
+    own: impl Iterator<Item = &'a String>,
+    others: impl Iterator<Item = String> + Clone,
+) -> Result<(), FieldError> {
+    for name in own {
+        if others.clone().any(|other| other == *name) {
+            return Err(FieldError::new("weights", name, "must differ from the names of the other strategies"));
+        }
+    }
+    Ok(())
 }
 
 /// Returns the name of one of several adaptive policies, by the confidence `1 - alpha` of its ball.

@@ -1,5 +1,7 @@
 //! The walk-forward request: the periods of a record, and how the walk-forward goes through them.
 
+use std::collections::BTreeMap;
+
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,10 +12,11 @@ use crate::control::request::caution::CautionLevel;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
+use crate::control::request::own_weights::{OwnWeights, check_weights};
 use crate::control::request::radius_rules::{ALPHA, RADIUS_SCALE};
 use crate::control::request::rules::{
     COUNT, HISTORY_LENGTH, HORIZON, LOG_RETURNS, RATE, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST,
-    return_bounds, whole, within,
+    return_bounds, same_length, whole, within,
 };
 use crate::control::request::specification::default_seed;
 use crate::control::request::support::Support;
@@ -88,6 +91,12 @@ pub struct BacktestRequest {
     /// If true, every policy is trained as if trading were free. Default false.
     #[serde(default)]
     pub cost_blind: bool,
+    /// Strategies of your own by name, at most 10: the share of wealth that each holds in every period of the record,
+    /// 0 to 1. Those of the first window are not used. A share may use only what was known before its period: nothing
+    /// here can check that.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(value_type = std::collections::HashMap<String, Vec<f64>>)]
+    pub weights: OwnWeights,
     /// Number of design points per step, 10 to 10,000. Default 100.
     #[serde(default = "defaults::count")]
     pub count: usize,
@@ -231,6 +240,7 @@ impl BacktestRequest {
         let year = self.periods_per_year.ok_or_else(|| FieldError::new("periods_per_year", "null", rule))?;
         whole("periods_per_year", year, &YEAR)?;
         self.check_strategies()?;
+        check_weights(&self.weights, self.period_count())?;
         let every = self.every.unwrap_or_else(|| self.horizon.map_or(year, |horizon| year.min(horizon)));
         let horizon = self.horizon.unwrap_or(every);
         let window = self.window.unwrap_or_else(|| usual_window(WINDOW_YEARS * year, self.period_count(), year));
@@ -334,15 +344,4 @@ impl BacktestRequest {
         }
         Ok(())
     }
-}
-
-/// Checks that a list is as long as the record.
-///
-/// # Errors
-/// The list has another length.
-pub fn same_length(field: &str, found: usize, wanted: usize) -> Result<(), FieldError> {
-    if found == wanted {
-        return Ok(());
-    }
-    Err(FieldError::new(field, format!("{found} values"), format!("must hold {wanted} values, one for each return")))
 }

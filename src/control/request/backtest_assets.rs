@@ -1,18 +1,22 @@
 //! The walk-forward request for several assets: a table of returns, and how the walk-forward goes through it.
 
+use std::collections::BTreeMap;
+
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
 use super::assets::{ASSETS, DATES, NAMES, check_names};
-use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, frequency, same_length};
+use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, frequency};
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::declared_backtest::DeclaredBacktest;
 use super::frequency::Frequency;
+use super::own_weights::OwnAssetsWeights;
 use super::radius_rules::ALPHA;
 use super::rules::{
-    COUNT, HORIZON, LOG_RETURNS, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST, return_bounds, whole, within,
+    COUNT, HORIZON, LOG_RETURNS, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST, return_bounds, same_length,
+    whole, within,
 };
 use super::specification::default_seed;
 use super::support::Support;
@@ -93,6 +97,12 @@ pub struct AssetsBacktestRequest {
     /// into account. Default 0.
     #[serde(default)]
     pub trading_cost: f64,
+    /// Strategies of your own by name, at most 10: for every period of the record the shares of wealth in the assets, in
+    /// their order, which add up to at most 1. Those of the longest window are not used. Shares may use only what was
+    /// known before their period: nothing here can check that.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(value_type = std::collections::HashMap<String, Vec<Vec<f64>>>)]
+    pub weights: OwnAssetsWeights,
     /// Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1.
     #[serde(default = "default_seed")]
     pub seed: u64,

@@ -22,6 +22,7 @@ pub mod frequency;
 pub mod frontier;
 pub mod fund;
 pub mod learning;
+pub mod own_weights;
 pub mod radius_rule;
 pub mod radius_rules;
 pub mod rules;

@@ -281,6 +281,17 @@ fn surrogate(surrogate: &SurrogateSpecification) -> Result<(), FieldError> {
     Ok(())
 }
 
+/// Checks that a list is as long as the record.
+///
+/// # Errors
+/// The list has another length.
+pub fn same_length(field: &str, found: usize, wanted: usize) -> Result<(), FieldError> {
+    if found == wanted {
+        return Ok(());
+    }
+    Err(FieldError::new(field, format!("{found} values"), format!("must hold {wanted} values, one for each return")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

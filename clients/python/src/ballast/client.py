@@ -350,6 +350,7 @@ class _Ballast:
         risk_aversion: float | None = None,
         trading_cost: float | None = None,
         cost_blind: bool | None = None,
+        weights: Mapping[str, Iterable[float]] | None = None,
         count: int | None = None,
         seed: int | None = None,
         idempotency_key: str | None = None,
@@ -359,7 +360,8 @@ class _Ballast:
         ``returns``, ``kind`` and ``choices`` are as in ``train``. ``rate`` is what the bank paid: one fraction for all
         periods or one for each. By default it is the column of rates in ``returns``. ``dates`` are texts or dates, one
         for each number, by default those of the index of a pandas object. They show how many periods make a year;
-        without dates, give ``periods_per_year``. The service chooses what you leave out, and the report shows what it
+        without dates, give ``periods_per_year``. ``weights`` has strategies of your own by name, each with its share of
+        wealth in every period of the record; those of the first window are not used. The service chooses what you leave out, and the report shows what it
         chose. Raises ``ValueError`` before anything is queued if ``returns``, ``rate`` or ``dates`` cannot be correct.
         """
         found = await self._one(returns, kind, choices)
@@ -378,6 +380,7 @@ class _Ballast:
             "risk_aversion": risk_aversion,
             "trading_cost": trading_cost,
             "cost_blind": cost_blind,
+            "weights": None if weights is None else {name: list(own) for name, own in weights.items()},
             "count": count,
             "seed": seed,
         }
@@ -402,6 +405,7 @@ class _Ballast:
         support: wire.Support | None = None,
         risk_aversion: float | None = None,
         trading_cost: float | None = None,
+        weights: Mapping[str, Iterable[Iterable[float]]] | None = None,
         seed: int | None = None,
         idempotency_key: str | None = None,
     ) -> wire.Job:
@@ -411,7 +415,8 @@ class _Ballast:
         ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``. ``rate`` and ``dates`` are as in
         ``backtest``, but dates are required. ``strategies`` has ``"policy"``, the trained policy that a session
         follows, ``"one_step"``, the one-step rule, or both; ``horizon`` and ``count`` are those of a policy.
-        ``windows`` says how many of the last periods each strategy learns from, with ``None`` for all. The service
+        ``windows`` says how many of the last periods each strategy learns from, with ``None`` for all. ``weights`` are as
+        in ``backtest``, with the share of each asset in every period. The service
         chooses what you leave out, and the report shows what it chose. Raises ``ValueError`` before anything is queued
         if ``returns``, ``rate`` or ``dates`` cannot be correct.
         """
@@ -433,6 +438,7 @@ class _Ballast:
             "support": support,
             "risk_aversion": risk_aversion,
             "trading_cost": trading_cost,
+            "weights": None if weights is None else {name: [list(row) for row in own] for name, own in weights.items()},
             "seed": seed,
         }
         return _having_read(await self._queued("/backtest", _given(request), idempotency_key), found)

@@ -1305,7 +1305,7 @@ StrategyFamily: TypeAlias = Literal["policy", "one_step"]
 """Strategies of a walk-forward of several assets that are compared with the rules that people use."""
 
 
-StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "policy", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"]
+StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "policy", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal", "own"]
 """A kind of strategy in a walk-forward, which decides its colour and its sentences."""
 
 
@@ -1737,6 +1737,12 @@ class AssetsBacktestRequest(TypedDict):
     Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it; no other strategy takes it
     into account. Default 0.
     """
+    weights: NotRequired[dict[str, list[list[float]]]]
+    """
+    Strategies of your own by name, at most 10: for every period of the record the shares of wealth in the assets, in
+    their order, which add up to at most 1. Those of the longest window are not used. Shares may use only what was
+    known before their period: nothing here can check that.
+    """
     seed: NotRequired[int]
     """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
 
@@ -1953,12 +1959,6 @@ class ComparedStrategy(TypedDict):
     """Means over all paths, period by period."""
 
 
-class CoverageAtSize(TypedDict):
-    """How often the ball held the true law at one sample size."""
-
-    sample_size: int
-    """Number of returns known."""
-    covered: Estimate
 class Course(TypedDict):
     """The course of a figure in both worlds: before each period, and at the end."""
 
@@ -1970,6 +1970,12 @@ class Course(TypedDict):
     """In the world in which periods are drawn from the record."""
 
 
+class CoverageAtSize(TypedDict):
+    """How often the ball held the true law at one sample size."""
+
+    sample_size: int
+    """Number of returns known."""
+    covered: Estimate
     """Share of paths whose ball held the true law."""
 
 
@@ -2163,12 +2169,6 @@ class FundSpecification(TypedDict):
     """Log-returns by date, oldest first; each date has one value for each asset."""
 
 
-class JobProgress(TypedDict):
-    """The progress of a job."""
-
-    steps_done: int
-    steps_total: int
-    step: NotRequired[int | None]
 class Futures(TypedDict):
     """The futures of a policy from a state."""
 
@@ -2188,6 +2188,12 @@ class Futures(TypedDict):
     """The two worlds in words."""
 
 
+class JobProgress(TypedDict):
+    """The progress of a job."""
+
+    steps_done: int
+    steps_total: int
+    step: NotRequired[int | None]
     """Step being solved; steps are solved from the last to the first. Null in a simulation."""
     phase: NotRequired[Phase | None]
     points_done: NotRequired[int | None]
@@ -2979,6 +2985,12 @@ class BacktestRequest(TypedDict):
     """Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it. Default 0."""
     cost_blind: NotRequired[bool]
     """If true, every policy is trained as if trading were free. Default false."""
+    weights: NotRequired[dict[str, list[float]]]
+    """
+    Strategies of your own by name, at most 10: the share of wealth that each holds in every period of the record,
+    0 to 1. Those of the first window are not used. A share may use only what was known before its period: nothing
+    here can check that.
+    """
     count: NotRequired[int]
     """Number of design points per step, 10 to 10,000. Default 100."""
     seed: NotRequired[int]

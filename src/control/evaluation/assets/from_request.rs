@@ -41,6 +41,7 @@ impl AssetsBacktest {
             seed: request.seed,
         };
         let backtest = AssetsBacktest::new(record, choices).map_err(|error| renamed(error, field))?;
+        let backtest = backtest.with_own(request.weights.clone())?;
         backtest.check_size(field)?;
         Ok(backtest)
     }

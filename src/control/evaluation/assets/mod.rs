@@ -18,6 +18,7 @@ use crate::control::assets::advising::FundsBall;
 use crate::control::cache::Cache;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
+use crate::control::evaluation::names::check_own_names;
 use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
@@ -28,6 +29,7 @@ use crate::control::request::backtest_assets::StrategyFamily;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::frequency::Frequency;
 use crate::control::request::frontier::asked_of;
+use crate::control::request::own_weights::{OwnAssetsWeights, check_assets_weights};
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{DesignSpecification, ProblemSpecification, UtilitySpecification};
 
@@ -65,6 +67,8 @@ pub struct AssetsBacktest {
     pub choices: AssetsChoices,
     /// The first period that is decided: after the longest window, or after 20 years if all returns are known.
     pub first: usize,
+    /// Strategies of the user's own by name, with their shares date by date.
+    pub own: Vec<(String, Vec<Vec<f64>>)>,
 }
 
 /// The decisions of one strategy, period by period.
@@ -122,7 +126,7 @@ impl AssetsBacktest {
         if found < first + year {
             return Err(too_long(first, found, year));
         }
-        let backtest = AssetsBacktest { record, choices, first };
+        let backtest = AssetsBacktest { record, choices, first, own: Vec::new() };
         let support = Some(backtest.choices.support);
         for window in &backtest.choices.windows {
             for start in backtest.starts() {
@@ -134,6 +138,26 @@ impl AssetsBacktest {
             }
         }
         Ok(backtest)
+    }
+
+    /// Adds strategies of the user's own.
+    ///
+    /// # Errors
+    /// A name or a share that breaks a rule.
+    pub fn with_own(mut self, own: OwnAssetsWeights) -> Result<Self, FieldError> {
+        check_assets_weights(&own, self.record.assets.len(), self.record.rows.len())?;
+        let name = |strategy: AssetsStrategy| self.name_of(strategy);
+        check_own_names(own.keys(), self.strategies().into_iter().map(name))?;
+        self.own = own.into_iter().collect();
+        Ok(self)
+    }
+
+    /// Returns the name of a strategy in words.
+    fn name_of(&self, strategy: AssetsStrategy) -> String {
+        match strategy.rule {
+            Rule::Own { place } => self.own[place].0.clone(),
+            _ => strategy.name(|window| self.window_in_words(window)),
+        }
     }
 
     /// Returns the log-returns of the periods that are decided.
@@ -168,7 +192,8 @@ impl AssetsBacktest {
 
     /// Returns the strategies in their order.
     pub fn strategies(&self) -> Vec<AssetsStrategy> {
-        strategies(&self.choices.windows, &self.choices.strategies)
+        let own = (0..self.own.len()).map(|place| AssetsStrategy { rule: Rule::Own { place }, window: None });
+        strategies(&self.choices.windows, &self.choices.strategies).into_iter().chain(own).collect()
     }
 
     /// Returns the strategies, each with the number of its first step of work in a job.
@@ -316,7 +341,7 @@ impl AssetsBacktest {
         let is_equal = matches!(strategy.rule, Rule::Equal { .. });
         let mix = |total| keep(&vec![equal(self.record.assets.len(), total); held.len()]);
         let own_mix = (!is_equal).then(|| MixBooks::new(account.mean_allocation(), mix));
-        let name = strategy.name(|window| self.window_in_words(window));
+        let name = self.name_of(strategy);
         AssetsLine { name, strategy, radii, held, account, own_mix }
     }
 }

@@ -39,6 +39,11 @@ pub enum Rule {
     MinimumVariance,
     /// All wealth, in inverse proportion to the deviations of the returns.
     InverseVolatility,
+    /// The shares of a strategy of the user's own, by its place among those.
+    Own {
+        /// Its place in the order of their names.
+        place: usize,
+    },
     /// An equal share in every asset.
     Equal {
         /// Share in all assets together.
@@ -96,6 +101,7 @@ impl Rule {
             Rule::InverseVolatility => StrategyKind::InverseVolatility,
             Rule::Equal { share: 1.0 } => StrategyKind::EqualShares,
             Rule::Equal { .. } => StrategyKind::SixtyEqual,
+            Rule::Own { .. } => StrategyKind::Own,
         }
     }
 
@@ -125,7 +131,7 @@ impl AssetsStrategy {
     pub fn name(&self, known: impl Fn(Option<usize>) -> String) -> String {
         let caution = self.rule.caution().map_or(String::new(), |level| format!(", {}", caution_in_words(level)));
         let window = match self.rule {
-            Rule::Equal { .. } => String::new(),
+            Rule::Equal { .. } | Rule::Own { .. } => String::new(),
             _ => format!(", knows {}", known(self.window)),
         };
         format!("{}{caution}{window}", self.rule.kind().name())
@@ -166,6 +172,7 @@ impl AssetsStrategy {
                 (None, Rule::MinimumVariance) => least_variance(&covariance(rows)),
                 (None, Rule::InverseVolatility) => inverse_volatility(rows),
                 (None, Rule::Equal { share }) => equal(rows[0].len(), share),
+                (None, Rule::Own { place }) => backtest.own[place].1[period].clone(),
                 (None, Rule::Robust { norm, caution }) => solved(norm, caution),
                 (None, Rule::Static { caution } | Rule::Policy { caution }) => solved(GroundNorm::ScaledOne, caution),
             };

@@ -14,7 +14,8 @@ const TOKENS = [
   ["own_mix", "policy"],
 ];
 
-export const colourOf = (kind) => TOKENS.findIndex((kinds) => kinds.includes(kind));
+/** Strategies of the user's own have the first colour of the mixes, which are on other pages. */
+export const colourOf = (kind) => (kind === "own" ? TOKENS.length + 1 : TOKENS.findIndex((kinds) => kinds.includes(kind)));
 
 /** Constant shares in stocks that have names; the colours of the others lie between those of none and all in stocks. */
 const MIXES = { 0: "all_bank", 0.6: "sixty_forty", 1: "all_stock" };
