@@ -1,5 +1,5 @@
 //! `ballast-lab coverage`: how often balls hold the law that records were drawn from, how wide they are, and how much their
-//! robust advice loses.
+//! robust advice loses; and how often the balls of all steps of a horizon hold it.
 
 use std::error::Error;
 use std::num::ParseFloatError;
@@ -9,18 +9,21 @@ use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::learning::Learning;
 use ballast::control::request::radius_rule::RadiusRule;
-use ballast::control::request::rules::HISTORY_LENGTH;
+use ballast::control::request::rules::{HISTORY_LENGTH, HORIZON};
 use ballast::control::request::sampling_law::{MixtureComponent, SamplingLaw};
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
 use ballast::numerics::law::ContinuousLaw;
+use ballast::numerics::statistics::summary::Estimate;
 use clap::Args;
 
 use balls::{BallCoverage, CoverageQuestion, DrawnLaw, coverage};
+use horizon::{HorizonCoverage, horizon_coverage};
 
 use super::market::Market;
 use super::paper;
 
 mod balls;
+mod horizon;
 
 /// Interest rate for the paper's mixture, and for the laws that have its mean and variance.
 const RATE: f64 = 0.002;
@@ -52,6 +55,9 @@ pub struct CoverageArgs {
     /// Relative risk aversion: 1 is log utility, more is more careful
     #[arg(long, default_value_t = 3.0)]
     risk_aversion: f64,
+    /// Measure instead how often the law is left at some step of this many, under `bridge` and under `joint`
+    #[arg(long)]
+    horizon: Option<usize>,
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -92,6 +98,9 @@ pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
         return Err(FieldError::new("--sizes", size, rule).into());
     }
     let CoverageArgs { alpha, records, seed, .. } = *arguments;
+    if let Some(horizon) = arguments.horizon {
+        return over_horizon(arguments, horizon);
+    }
     let bridge = |scale: f64| RadiusRule::Bridge { alpha, paths: PATHS, scale, correction: None };
     let rules = [bridge(0.0), bridge(0.5), bridge(1.0), RadiusRule::Calibrated { alpha, paths: PATHS, scale: 1.0 }];
     println!(
@@ -122,8 +131,7 @@ fn line(name: &str, size: usize, (centre, rule): (&CentreSpecification, &RadiusR
     };
     let BallCoverage { covered, radius, lost, allocation } = found;
     let percent = |share: f64| 100.0 * share;
-    let covered =
-        format!("{:.1} [{:.1}, {:.1}] %", percent(covered.value), percent(covered.low), percent(covered.high));
+    let covered = share(covered);
     let lost = format!("{:.2} [{:.2}, {:.2}]", lost.value, lost.low, lost.high);
     let centre = centre.name();
     format!(
@@ -131,6 +139,40 @@ fn line(name: &str, size: usize, (centre, rule): (&CentreSpecification, &RadiusR
         radius.value,
         percent(*allocation)
     )
+}
+
+fn share(Estimate { value, low, high }: &Estimate) -> String {
+    let [value, low, high] = [value, low, high].map(|share| 100.0 * share);
+    format!("{value:.1} [{low:.1}, {high:.1}] %")
+}
+
+/// Prints how often the law is left over a horizon, with balls of single steps and with joint ones.
+fn over_horizon(arguments: &CoverageArgs, horizon: usize) -> Result<(), Box<dyn Error>> {
+    if !HORIZON.contains(&horizon) {
+        let rule = format!("must lie in [{}, {}]", HORIZON.start(), HORIZON.end());
+        return Err(FieldError::new("--horizon", horizon, rule).into());
+    }
+    let CoverageArgs { alpha, records, seed, .. } = *arguments;
+    let single = RadiusRule::Bridge { alpha, paths: PATHS, scale: 1.0, correction: None };
+    let rules = vec![single, RadiusRule::Joint { alpha, paths: PATHS }];
+    println!(
+        "{:<22}{:>6}{:>7}{:>29}{:>27}{:>27}{:>8}",
+        "law", "n", "steps", "bridge left at first [90 %]", "bridge ever left", "joint ever left", "factor"
+    );
+    let utility = UtilitySpecification::relative(arguments.risk_aversion);
+    for Named { name, law, rate_per_step, .. } in laws()? {
+        for &size in &arguments.sizes {
+            let (rules, centres) = (rules.clone(), Vec::new());
+            let question =
+                CoverageQuestion { size, records, rate_per_step, utility, centres, rules, seed, level: LEVEL };
+            let found = horizon_coverage(&law, &question, horizon).map_err(by_option)?;
+            let [HorizonCoverage { left_at_first, ever_left, radius }, joint] = &found[..] else { continue };
+            let shares = [left_at_first, ever_left, &joint.ever_left].map(share);
+            let factor = joint.radius.value / radius.value;
+            println!("{name:<22}{size:>6}{horizon:>7}{:>29}{:>27}{:>27}{factor:>8.3}", shares[0], shares[1], shares[2]);
+        }
+    }
+    Ok(())
 }
 
 fn laws() -> Result<Vec<Named>, ParseFloatError> {

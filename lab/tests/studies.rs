@@ -17,7 +17,10 @@ fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_opti
     for centre in [" empirical ", " smoothed ", " volatility_scaled ", " mixed "] {
         assert_eq!(lines.iter().filter(|line| line.contains(centre)).count(), 32, "{output}");
     }
+    let (over_a_horizon, _) = run(&["--records", "20", "--sizes", "5,8", "--horizon", "3"]);
+    assert_eq!(over_a_horizon.lines().count(), 1 + 4 * 2, "{over_a_horizon}");
     for (arguments, option) in [
+        (["--horizon", "0"], "--horizon"),
         (["--alpha", "0"], "--alpha"),
         (["--sizes", "1"], "--sizes"),
         (["--risk-aversion", "0.5"], "--risk-aversion"),

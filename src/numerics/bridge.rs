@@ -10,13 +10,14 @@
 //! H is simulated over the directions of bridges, and the quantile integrates their lengths out. H is the length, which
 //! has a chi law, times the statistic over the direction; the two are independent. Source: paper, section 2.1, (2.4).
 //!
-//! Its modules hold the law of the statistic, its paths, its quantiles for laws that grow, and for funds of several
-//! assets.
+//! Its modules hold the law of the statistic, its paths, its quantiles for laws that grow, for several sizes in a row,
+//! and for funds of several assets.
 
 pub mod calibration;
 pub mod funds;
 pub mod grown;
 pub mod limit;
+pub mod partial_sums;
 pub mod paths;
 pub mod scale_mixture;
 pub mod sized_gaps;

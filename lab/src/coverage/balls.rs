@@ -86,8 +86,21 @@ pub struct BallCoverage {
     pub allocation: f64,
 }
 
+impl CoverageQuestion {
+    /// Returns the number of groups of records. Each group has its own bridges and is the unit of the intervals. If all
+    /// records shared one set, all radii would err alike, and no interval over records would show it.
+    pub fn groups(&self) -> usize {
+        GROUPS.rev().find(|count| self.records.is_multiple_of(*count)).unwrap_or(self.records)
+    }
+
+    /// Returns the seed of the bridges of a record's group. Stream: (seed, "coverage radius", n, group).
+    pub fn seed_of(&self, index: usize, groups: usize) -> u64 {
+        stream(self.seed, "coverage radius", self.size, index * groups / self.records).random()
+    }
+}
+
 /// A law prepared for drawing records.
-struct Prepared<'a> {
+pub struct Prepared<'a> {
     law: &'a DrawnLaw,
     distance: Option<LawDistance>,
     /// Atoms of the law, ascending, and their masses; a continuous law is discretised by quadrature.
@@ -96,7 +109,8 @@ struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    fn of(law: &'a DrawnLaw) -> Self {
+    /// Prepares a law.
+    pub fn of(law: &'a DrawnLaw) -> Self {
         match law {
             DrawnLaw::Continuous(continuous) => {
                 let (mut atoms, masses) = continuous.quadrature();
@@ -113,7 +127,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Draws one record. Stream: (seed, "coverage", n, index).
-    fn record(&self, question: &CoverageQuestion, index: usize) -> Vec<f64> {
+    pub fn record(&self, question: &CoverageQuestion, index: usize) -> Vec<f64> {
         let mut generator = stream(question.seed, "coverage", question.size, index);
         let mut draw = || match self.law {
             DrawnLaw::Continuous(law) => {
@@ -134,7 +148,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Returns the distance from a centre to the law itself.
-    fn distance(&self, centre: &Centre) -> f64 {
+    pub fn distance(&self, centre: &Centre) -> f64 {
         let weighed = centre.atoms.iter().copied().zip(centre.masses.iter().copied());
         if let Some(distance) = &self.distance {
             let placed: Vec<Placed> = weighed.map(|(atom, mass)| distance.place(atom, mass)).collect();
@@ -172,14 +186,11 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
     let bank = 1.0 + question.rate_per_step;
     let worth = |allocation: f64| prepared.worth(allocation, bank, utility);
     let (_, best) = maximise_concave_scalar(worth, 0.0, 1.0, ALLOCATION_TOLERANCE);
-    // Each group of records has its own bridges and is the unit of the intervals. If all records shared one set, all
-    // radii would err alike, and no interval over records would show it.
-    let groups = GROUPS.rev().find(|count| question.records.is_multiple_of(*count)).unwrap_or(question.records);
+    let groups = question.groups();
     let kept = Cache::default();
     let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {
         let record = prepared.record(question, index);
-        // Stream: (seed, "coverage radius", n, group).
-        let seed = stream(question.seed, "coverage radius", question.size, index * groups / question.records).random();
+        let seed = question.seed_of(index, groups);
         let of_centre = |centre: &CentreSpecification| {
             let problem = ProblemSpecification {
                 horizon: 1,

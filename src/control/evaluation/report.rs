@@ -187,7 +187,7 @@ pub struct RadiusSpread {
 /// How often the ball held the true law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Coverage {
-    /// Target coverage `1 - alpha`, if the radius rule has an alpha.
+    /// Target coverage `1 - alpha`, if the radius rule has an alpha. Under `joint` it is for all balls of a path together.
     pub target: Option<f64>,
     /// Coverage by ascending sample size; one entry if the ball is frozen.
     pub by_sample_size: Vec<CoverageAtSize>,
@@ -207,7 +207,7 @@ pub struct CoverageAtSize {
 /// Results at one initial history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct HistoryReport {
-    /// The bridge quantile there; null under radius rules other than `bridge` and `calibrated`.
+    /// The bridge quantile there; null under radius rules other than `bridge`, `calibrated` and `joint`.
     pub quantile: Option<f64>,
     /// Radius of the first framework with a ball, in log-return; 0 if there is none.
     pub radius: f64,

@@ -66,9 +66,9 @@ pub struct Uncertainty {
     pub effective_size: f64,
     /// Raw moments of the learned law, from the first to the specification's count.
     pub moments: Vec<f64>,
-    /// (1 - alpha)-quantile of the bridge statistic; absent under radius rules other than `bridge` and `calibrated`.
-    /// Under `bridge` it is exact for the history of the policy. After more returns it is simulated in proportion to
-    /// that value.
+    /// (1 - alpha)-quantile of the bridge statistic; absent under radius rules other than `bridge`, `calibrated` and
+    /// `joint`. Under `bridge` it is exact for the history of the policy. After more returns it is simulated in
+    /// proportion to that value.
     pub quantile: Option<f64>,
     /// The radius, as in an advice.
     pub radius: f64,

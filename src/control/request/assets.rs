@@ -129,13 +129,17 @@ impl AssetsProblem {
         }
     }
 
-    /// Checks the names, the returns and the composition of the assets.
+    /// Checks the names, the returns, the radius rule and the composition of the assets.
     ///
     /// # Errors
     /// The first field that breaks a rule.
     pub fn check(&self) -> Result<(), FieldError> {
         check_names("problem.assets", &self.assets)?;
         check_rows("problem.history", &self.history, &self.assets, self.support)?;
+        if let Some(rule @ RadiusRule::Joint { .. }) = self.radius {
+            let allowed = "must be bridge, calibrated, root_n or fixed: what the rule promises holds for one asset";
+            return Err(FieldError::new("problem.radius.rule", rule.name(), allowed));
+        }
         check_composition("problem.composition", &self.composition, self.assets.len())
     }
 }

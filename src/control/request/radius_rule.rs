@@ -39,6 +39,17 @@ pub enum RadiusRule {
         #[serde(default = "defaults::scale")]
         scale: f64,
     },
+    /// The radius of `bridge` times a factor found once, from the history, with which the balls of all steps of the
+    /// horizon hold the law together in a share 1 - alpha of all cases. With one step, or a ball frozen at the history,
+    /// the factor is 1. The weights of returns must be equal.
+    Joint {
+        /// Miscoverage: the probability that the ball of any step misses the true law, 0.001 to 0.999. Default 0.1.
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+        /// Number of simulated paths, 100 to 100,000. Default 2000.
+        #[serde(default = "defaults::paths")]
+        paths: usize,
+    },
     /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
     Concentration {
         /// Miscoverage, 0.001 to 0.999. Default 0.1.
@@ -77,6 +88,7 @@ impl RadiusRule {
         match self {
             RadiusRule::Bridge { .. } => "bridge",
             RadiusRule::Calibrated { .. } => "calibrated",
+            RadiusRule::Joint { .. } => "joint",
             RadiusRule::Concentration { .. } => "concentration",
             RadiusRule::RootN { .. } => "root_n",
             RadiusRule::Fixed { .. } => "fixed",
@@ -100,7 +112,7 @@ impl RadiusRule {
         RadiusRule::Bridge { alpha, paths: defaults::paths(), scale, correction: None }
     }
 
-    /// Multiplies the radius of a simulated rule by `factor`; other rules stay as they are.
+    /// Multiplies the scale of a rule that has one by `factor`; other rules stay as they are.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {
@@ -117,7 +129,9 @@ impl RadiusRule {
     /// Returns the number of simulated paths, 0 under rules that simulate none.
     pub fn paths(&self) -> usize {
         match *self {
-            RadiusRule::Bridge { paths, .. } | RadiusRule::Calibrated { paths, .. } => paths,
+            RadiusRule::Bridge { paths, .. }
+            | RadiusRule::Calibrated { paths, .. }
+            | RadiusRule::Joint { paths, .. } => paths,
             _ => 0,
         }
     }
@@ -127,6 +141,7 @@ impl RadiusRule {
         match *self {
             RadiusRule::Bridge { alpha, .. }
             | RadiusRule::Calibrated { alpha, .. }
+            | RadiusRule::Joint { alpha, .. }
             | RadiusRule::Concentration { alpha, .. }
             | RadiusRule::ChiSquare { alpha } => Some(alpha),
             RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,

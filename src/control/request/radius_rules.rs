@@ -4,6 +4,7 @@ use crate::control::error::FieldError;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds, whole, within};
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
+use crate::numerics::bridge::partial_sums::CELLS;
 use crate::numerics::bridge::paths::GRADED_FROM;
 
 /// Allowed number of simulated bridge paths.
@@ -13,6 +14,8 @@ const BRIDGE_NUMBERS: usize = 30_000_000;
 /// Largest product of paths and returns for a calibration, which reads the paths for each of a thousand records: about a
 /// second.
 const CALIBRATED_NUMBERS: usize = 3_000_000;
+/// Largest number of normals behind a joint factor: about four seconds.
+const JOINT_NUMBERS: usize = 300_000_000;
 /// Allowed factors on a bridge radius.
 pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
 /// Allowed corrections of a simulated quantile: a hundred paths are off by less.
@@ -36,6 +39,7 @@ impl Bounded for RadiusRule {
     const BOUNDS: &'static [FieldBounds] = &[
         ("bridge.alpha", ValueBounds::number(ALPHA)),
         ("calibrated.alpha", ValueBounds::number(CALIBRATED_ALPHA)),
+        ("joint.alpha", ValueBounds::number(ALPHA)),
         ("concentration.alpha", ValueBounds::number(ALPHA)),
         ("chi_square.alpha", ValueBounds::number(REGION_ALPHA)),
         ("paths", ValueBounds::count(&PATHS)),
@@ -68,27 +72,32 @@ pub fn check_radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result
         }
         _ => {}
     }
+    let size = problem.history.len() + problem.horizon;
+    let check_scale = |scale: f64| within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1);
     match *rule {
-        RadiusRule::Bridge { alpha, paths, scale, .. } | RadiusRule::Calibrated { alpha, paths, scale } => {
-            let calibrated = matches!(rule, RadiusRule::Calibrated { .. });
-            let ((least, most), numbers) =
-                if calibrated { (CALIBRATED_ALPHA, CALIBRATED_NUMBERS) } else { (ALPHA, BRIDGE_NUMBERS) };
-            within("problem.radius.alpha", alpha, least, most)?;
-            whole("problem.radius.paths", paths, &PATHS)?;
-            within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;
-            if let RadiusRule::Bridge { correction: Some(correction), .. } = *rule {
-                within("problem.radius.correction", correction, RADIUS_CORRECTION.0, RADIUS_CORRECTION.1)?;
-            }
-            let size = problem.history.len() + problem.horizon;
-            let times = if calibrated { size } else { size.min(GRADED_FROM) };
-            if paths.saturating_mul(times) > numbers {
-                let counted = if calibrated { String::new() } else { format!(" (of which {GRADED_FROM} count)") };
-                let rule = format!(
-                    "must be smaller: multiplied by the final sample size{counted} it may be at most {numbers}"
-                );
-                return Err(FieldError::new("problem.radius.paths", paths, rule));
-            }
-            Ok(())
+        RadiusRule::Bridge { alpha, paths, scale, correction } => {
+            within("problem.radius.alpha", alpha, ALPHA.0, ALPHA.1)?;
+            check_bridges(paths, size)?;
+            check_scale(scale)?;
+            let (least, most) = RADIUS_CORRECTION;
+            correction.map_or(Ok(()), |correction| within("problem.radius.correction", correction, least, most))
+        }
+        RadiusRule::Calibrated { alpha, paths, scale } => {
+            within("problem.radius.alpha", alpha, CALIBRATED_ALPHA.0, CALIBRATED_ALPHA.1)?;
+            check_paths(paths, size, CALIBRATED_NUMBERS, "the final sample size")?;
+            check_scale(scale)
+        }
+        RadiusRule::Joint { .. } if problem.learning.decays() => {
+            let rule =
+                "must be another rule if weights decay: such balls have no last step until which to hold the law";
+            Err(FieldError::new("problem.radius.rule", name, rule))
+        }
+        RadiusRule::Joint { alpha, paths } => {
+            within("problem.radius.alpha", alpha, ALPHA.0, ALPHA.1)?;
+            check_bridges(paths, size)?;
+            let times = problem.history.len().min(CELLS).saturating_mul(problem.horizon);
+            let counted = format!("problem.horizon and by the sample size (of which {CELLS} count)");
+            check_paths(paths, times, JOINT_NUMBERS, &counted)
         }
         RadiusRule::Concentration { alpha, numerator, rate } => {
             within("problem.radius.alpha", alpha, ALPHA.0, ALPHA.1)?;
@@ -99,4 +108,21 @@ pub fn check_radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result
         RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1),
         RadiusRule::ChiSquare { alpha } => within("problem.radius.alpha", alpha, REGION_ALPHA.0, REGION_ALPHA.1),
     }
+}
+
+/// Checks the number of paths of the bridges of a final sample size.
+fn check_bridges(paths: usize, size: usize) -> Result<(), FieldError> {
+    let counted = format!("the final sample size (of which {GRADED_FROM} count)");
+    check_paths(paths, size.min(GRADED_FROM), BRIDGE_NUMBERS, &counted)
+}
+
+/// Checks a number of paths, of which each has `times` numbers and all together at most so many; `counted` describes
+/// `times`.
+fn check_paths(paths: usize, times: usize, most: usize, counted: &str) -> Result<(), FieldError> {
+    whole("problem.radius.paths", paths, &PATHS)?;
+    if paths.saturating_mul(times) > most {
+        let rule = format!("must be smaller: multiplied by {counted} it may be at most {most}");
+        return Err(FieldError::new("problem.radius.paths", paths, rule));
+    }
+    Ok(())
 }

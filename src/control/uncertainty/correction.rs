@@ -8,7 +8,7 @@ use crate::numerics::bridge::sized_gaps::Statistic;
 
 impl RadiusEstimator {
     /// Returns the factor on simulated quantiles that makes the one of the history exact. `None` under a calibration,
-    /// which already removes their error, and under rules without bridges. Cost: that of the law of the statistic, 25
+    /// whose factor already removes their error, and under rules without bridges. Cost: that of the law of the statistic, 25
     /// ms at 240 returns and 0.13 s at 1,024.
     ///
     /// Checked by: `a_corrected_radius_is_exact_and_stays_near_as_returns_are_learned`.
@@ -23,7 +23,7 @@ impl RadiusEstimator {
 
     /// Returns the correction. Paths have the error of simulated quantiles of one size in common, and so do quantiles
     /// of similar laws.
-    fn correction(&self, alpha: f64, paths: usize) -> f64 {
+    pub(super) fn correction(&self, alpha: f64, paths: usize) -> f64 {
         let bridges = self.bridges(self.learned.sample_size(), paths);
         let simulated = bridges.bridge_quantile(&self.learned, Statistic::Current, alpha);
         let exact = || self.exact.get_or_init(|| bridges.exact(&self.learned)).quantile(1.0 - alpha);

@@ -4,6 +4,7 @@
 //!
 //! or, if returns are assumed normal, the joint confidence region of mean and variance.
 
+mod calibration;
 pub mod centre;
 mod correction;
 pub mod joint;

@@ -9,7 +9,6 @@ use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::control::uncertainty::centre::record;
-use crate::numerics::bridge::calibration::calibration_factor;
 use crate::numerics::bridge::limit::BridgeLaw;
 use crate::numerics::bridge::paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::bridge::sized_gaps::Statistic;
@@ -26,12 +25,12 @@ const LEAST_THINNED: usize = 9;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
-    /// The rule of the specification, with `bridge` instead of `calibrated`; a radius of 0 if the framework has no
-    /// uncertainty (known law, plug-in).
+    /// The rule of the specification, with `bridge` instead of `calibrated` and `joint`; a radius of 0 if the framework
+    /// has no uncertainty (known law, plug-in).
     pub(super) rule: RadiusRule,
-    /// The calibration, under `calibrated`.
+    /// The calibration, under `calibrated` and `joint`.
     pub(super) calibration: Option<Calibration>,
-    seed: u64,
+    pub(super) seed: u64,
     /// Sample size at the last step.
     last_size: usize,
     /// True if weights decay by more than a little.
@@ -49,9 +48,19 @@ pub struct RadiusEstimator {
 /// The factor on the radius that the history implies, computed when a radius is first needed.
 pub(super) struct Calibration {
     /// Oldest first.
-    history: Vec<f64>,
-    retention: f64,
-    factor: OnceLock<f64>,
+    pub(super) history: Vec<f64>,
+    pub(super) retention: f64,
+    pub(super) goal: CalibrationGoal,
+    pub(super) factor: OnceLock<f64>,
+}
+
+/// The event that a calibrated radius gives the probability 1 - alpha.
+#[derive(Clone, Copy)]
+pub(super) enum CalibrationGoal {
+    /// The ball of a record drawn from the smoothed history holds that law.
+    SmoothedLaw,
+    /// The balls of this many steps in a row hold the law together.
+    AllSteps(usize),
 }
 
 /// The radius of a law, and the quantile behind it under the rules of the bridge.
@@ -59,7 +68,7 @@ pub(super) struct Calibration {
 pub struct Measure {
     /// In log-return; for a confidence region, in estimated standard deviations.
     pub radius: f64,
-    /// Absent under rules other than `bridge` and `calibrated`.
+    /// Absent under rules other than `bridge`, `calibrated` and `joint`.
     pub quantile: Option<f64>,
 }
 
@@ -80,19 +89,22 @@ impl RadiusEstimator {
             Framework::KnownLaw | Framework::PlugIn => RadiusRule::Fixed { radius: 0.0 },
             _ => specification.problem.radius_in_force(),
         };
-        let (rule, calibrated) = match rule {
+        let Specification { problem, seed, .. } = specification;
+        let steps = if problem.framework.is_frozen() { 1 } else { problem.horizon };
+        let bridge = |alpha, paths, scale| RadiusRule::Bridge { alpha, paths, scale, correction: None };
+        let (rule, goal) = match rule {
             RadiusRule::Calibrated { alpha, paths, scale } => {
-                (RadiusRule::Bridge { alpha, paths, scale, correction: None }, true)
+                (bridge(alpha, paths, scale), Some(CalibrationGoal::SmoothedLaw))
             }
-            rule => (rule, false),
+            RadiusRule::Joint { alpha, paths } => (bridge(alpha, paths, 1.0), Some(CalibrationGoal::AllSteps(steps))),
+            rule => (rule, None),
         };
-        let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
-        let learning = specification.problem.learning;
-        let history = record(&specification.problem.history, &specification.problem);
+        let (last_size, learning) = (problem.history.len() + problem.horizon - 1, problem.learning);
+        let history = record(&problem.history, problem);
         let (learned, retention) = (learning.law(&history), learning.retention());
-        let calibration = calibrated.then(|| Calibration { history, retention, factor: OnceLock::new() });
+        let calibration = goal.map(|goal| Calibration { history, retention, goal, factor: OnceLock::new() });
         let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL;
-        let (seed, centre) = (specification.seed, specification.problem.centre.clone());
+        let (seed, centre) = (*seed, problem.centre.clone());
         RadiusEstimator { rule, calibration, seed, last_size, decays, centre, learned, exact: OnceLock::new(), kept }
     }
 
@@ -180,30 +192,6 @@ impl RadiusEstimator {
             }
             _ => self.radius_of_size(law.effective_size()),
         }
-    }
-
-    /// Returns the rule with the result of a calibration: it gives every law the same radius, without the history.
-    pub fn calibrated_rule(&self) -> RadiusRule {
-        match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale, correction } => {
-                RadiusRule::Bridge { alpha, paths, scale: self.calibrated(scale, alpha, paths), correction }
-            }
-            rule => rule,
-        }
-    }
-
-    /// Returns `scale` times the factor of the calibration.
-    fn calibrated(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
-        let Some(Calibration { history, retention, factor }) = self.calibration.as_ref().filter(|_| scale > 0.0) else {
-            return scale;
-        };
-        let find = || calibration_factor(&self.bridges(history.len(), paths), history, *retention, alpha, self.seed);
-        scale * factor.get_or_init(find)
-    }
-
-    /// Returns the calibrated scale times the correction, which applies to every radius by the bridge.
-    fn factor(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
-        self.calibrated(scale, alpha, paths) * self.correction_at(alpha, paths)
     }
 
     /// Returns the radius of `law` and its parts.
@@ -315,7 +303,7 @@ impl RadiusEstimator {
     /// Returns the radius under the rules that use the effective sample size alone.
     fn radius_of_size(&self, size: f64) -> f64 {
         let of_returns = match self.rule {
-            RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. } => 0.0,
+            RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. } | RadiusRule::Joint { .. } => 0.0,
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => return radius,

@@ -602,7 +602,7 @@ class HistoryReport(TypedDict):
     """Results at one initial history."""
 
     quantile: NotRequired[float | None]
-    """The bridge quantile there; null under radius rules other than `bridge` and `calibrated`."""
+    """The bridge quantile there; null under radius rules other than `bridge`, `calibrated` and `joint`."""
     radius: float
     """Radius of the first framework with a ball, in log-return; 0 if there is none."""
     promised: list[float]
@@ -1070,6 +1070,20 @@ class RadiusRule2(TypedDict):
 
 
 class RadiusRule3(TypedDict):
+    """
+    The radius of `bridge` times a factor found once, from the history, with which the balls of all steps of the
+    horizon hold the law together in a share 1 - alpha of all cases. With one step, or a ball frozen at the history,
+    the factor is 1. The weights of returns must be equal.
+    """
+
+    alpha: NotRequired[float]
+    """Miscoverage: the probability that the ball of any step misses the true law, 0.001 to 0.999. Default 0.1."""
+    paths: NotRequired[int]
+    """Number of simulated paths, 100 to 100,000. Default 2000."""
+    rule: Literal["joint"]
+
+
+class RadiusRule4(TypedDict):
     """`sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin."""
 
     alpha: NotRequired[float]
@@ -1081,7 +1095,7 @@ class RadiusRule3(TypedDict):
     rule: Literal["concentration"]
 
 
-class RadiusRule4(TypedDict):
+class RadiusRule5(TypedDict):
     """`kappa / sqrt(n)`."""
 
     kappa: float
@@ -1089,7 +1103,7 @@ class RadiusRule4(TypedDict):
     rule: Literal["root_n"]
 
 
-class RadiusRule5(TypedDict):
+class RadiusRule6(TypedDict):
     """A fixed radius at every sample size."""
 
     radius: float
@@ -1097,7 +1111,7 @@ class RadiusRule5(TypedDict):
     rule: Literal["fixed"]
 
 
-class RadiusRule6(TypedDict):
+class RadiusRule7(TypedDict):
     """
     `sqrt(kappa / n)` estimated standard deviations, with kappa the (1 - alpha)-quantile of chi-square with two
     degrees of freedom. The region is `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, with m and v the
@@ -1109,7 +1123,7 @@ class RadiusRule6(TypedDict):
     rule: Literal["chi_square"]
 
 
-RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5 | RadiusRule6
+RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5 | RadiusRule6 | RadiusRule7
 """
 Rule by which the radius of the uncertainty set follows from the sample of size n. `chi_square` is for the
 confidence region of the parametric frameworks, every other rule for the Wasserstein ball.
@@ -1444,9 +1458,9 @@ class Uncertainty(TypedDict):
     """Raw moments of the learned law, from the first to the specification's count."""
     quantile: NotRequired[float | None]
     """
-    (1 - alpha)-quantile of the bridge statistic; absent under radius rules other than `bridge` and `calibrated`.
-    Under `bridge` it is exact for the history of the policy. After more returns it is simulated in proportion to
-    that value.
+    (1 - alpha)-quantile of the bridge statistic; absent under radius rules other than `bridge`, `calibrated` and
+    `joint`. Under `bridge` it is exact for the history of the policy. After more returns it is simulated in
+    proportion to that value.
     """
     radius: float
     """The radius, as in an advice."""
@@ -3045,7 +3059,7 @@ class Coverage(TypedDict):
     """How often the ball held the true law."""
 
     target: NotRequired[float | None]
-    """Target coverage `1 - alpha`, if the radius rule has an alpha."""
+    """Target coverage `1 - alpha`, if the radius rule has an alpha. Under `joint` it is for all balls of a path together."""
     by_sample_size: list[CoverageAtSize]
     """Coverage by ascending sample size; one entry if the ball is frozen."""
     ever_left: Estimate

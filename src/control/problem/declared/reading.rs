@@ -133,7 +133,11 @@ impl Declared {
         });
         if let Some(rule @ (RadiusRule::Concentration { .. } | RadiusRule::ChiSquare { .. })) = radius {
             let rule = rule.name();
-            return Err(FieldError::new("problem.radius.rule", rule, "must be bridge, calibrated, root_n or fixed"));
+            return Err(FieldError::new(
+                "problem.radius.rule",
+                rule,
+                "must be bridge, calibrated, joint, root_n or fixed",
+            ));
         }
         let mut investor =
             ProblemSpecification::of(problem.history.iter().map(|noise| self.scaled(*noise)).collect(), 0.0);

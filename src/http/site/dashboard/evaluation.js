@@ -218,14 +218,16 @@ function radii({ strategies }) {
   });
 }
 
-function coverage({ strategies }) {
+function coverage({ strategies, request }) {
   const covered = strategies.filter(({ coverage }) => coverage);
   if (covered.length === 0) return "";
+  const together = request.problem.radius?.rule === "joint";
   const rows = covered.flatMap((strategy) =>
-    strategy.coverage.by_sample_size.map((row) => ({ ...row, strategy, target: strategy.coverage.target })),
+    strategy.coverage.by_sample_size.map((row) => ({ ...row, strategy, target: together ? null : strategy.coverage.target })),
   );
+  const aim = ({ coverage: { target } }) => (together ? ` The radius aims at ${percent(1 - target, 0)}.` : "");
   const left = covered.map(
-    (strategy) => `${named(strategy)}: the law left the ball at some period on ${interval(strategy.coverage.ever_left, percent)} of the paths.`,
+    (strategy) => `${named(strategy)}: the law left the ball at some period on ${interval(strategy.coverage.ever_left, percent)} of the paths.${aim(strategy)}`,
   );
   return [
     ...left.map((sentence) => h("p", { class: "note" }, sentence)),

@@ -82,6 +82,8 @@ function radiusRule(radius) {
       const factor = radius.rule === "bridge" ? "" : ", times the factor calibrated from the history";
       return `${times}the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an${factor}`;
     }
+    case "joint":
+      return `the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an, times the factor for all periods together`;
     case "concentration":
       return `the concentration bound at ${percent(1 - radius.alpha, 0)} (C ${significant(radius.C)}, c ${significant(radius.c)})`;
     case "root_n":
@@ -182,7 +184,7 @@ export function caution(problem) {
   const { radius } = problem;
   if (!isCautious(problem)) return "none";
   const { alpha, scale = 1 } = radius;
-  const by = { calibrated: ", calibrated", concentration: " by the concentration bound" }[radius.rule] ?? "";
+  const by = { calibrated: ", calibrated", joint: " over all periods together", concentration: " by the concentration bound" }[radius.rule] ?? "";
   const confidence = alpha === undefined ? radiusRule(radius) : `${percentName(1 - alpha)} confidence${by}`;
   const acted = levelInWords(problem);
   return `${acted}${scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`}`;
