@@ -353,6 +353,45 @@ fn a_ball_holds_the_true_law_where_it_is_wide_enough() {
     assert!(adaptive.by_sample_size.iter().all(|at| at.covered.value == 0.0) && fixed.ever_left.value == 1.0);
 }
 
+/// Returns the distance of the laws of two records: between the sorted records, each value repeated until both have the same
+/// length.
+fn apart(one: &[f64], other: &[f64]) -> f64 {
+    let repeated = |record: &[f64], times: usize| {
+        let mut all: Vec<f64> = record.iter().flat_map(|value| std::iter::repeat_n(*value, times)).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let pairs = repeated(one, other.len()).into_iter().zip(repeated(other, one.len()));
+    pairs.map(|(one, other)| (one - other).abs()).sum::<f64>() / (one.len() * other.len()) as f64
+}
+
+#[test]
+fn the_share_inside_the_first_ball_is_what_sorted_returns_give() {
+    let kappa = 0.5;
+    let mut request = small(json!({ "frameworks": ["adaptive", "static"], "constant_mixes": [] }));
+    request["problem"]["radius"] = json!({ "rule": "root_n", "kappa": kappa });
+    let (evaluation, followers, outcomes) = simulated(request);
+    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
+    let coverage = |index: usize| report.strategies[index].coverage.clone().unwrap().by_sample_size;
+    assert_eq!(coverage(1).iter().map(|at| at.inside_first.value).collect::<Vec<f64>>(), [1.0]);
+    let history = &evaluation.histories[0];
+    let mut shares = Vec::new();
+    for (step, at) in coverage(0).iter().enumerate() {
+        let is_inside = |path: &usize| {
+            let learned = [history.as_slice(), &evaluation.returns(0, *path)[..step]].concat();
+            let radius = |record: &[f64]| kappa / (record.len() as f64).sqrt();
+            apart(history, &learned) + radius(&learned) <= radius(history) + 1e-12
+        };
+        let expected = (0..100).filter(is_inside).count() as f64 / 100.0;
+        // Both are the same count of a hundred paths.
+        assert!((at.inside_first.value - expected).abs() < 1e-12, "{step}: {at:?} {expected}");
+        shares.push(expected);
+    }
+    assert!(shares[0] == 1.0 && shares[1..].iter().any(|share| (0.05..0.95).contains(share)), "{shares:?}");
+    let named = report.sentences.iter().filter(|sentence| sentence.contains("inside the first ball")).count();
+    assert_eq!(named, 1, "{:?}", report.sentences);
+}
+
 /// Measured for the project by other code: 82 % at n = 20, where alpha promises 90 %.
 #[test]
 fn the_bridge_ball_covers_the_paper_s_law_less_often_than_it_promises() {

@@ -5,6 +5,7 @@ pub mod analysis;
 pub mod assets;
 pub mod backtest;
 pub mod backtest_report;
+mod coverage;
 pub mod deciding_paths;
 pub mod declared_comparison;
 pub mod declared_walk;

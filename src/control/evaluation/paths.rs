@@ -24,7 +24,7 @@ use crate::control::request::specification::Specification;
 use crate::control::training::Training;
 use crate::control::uncertainty::centre::{Centring, record};
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::law::law_distance::{LawDistance, Placed};
+use crate::numerics::law::law_distance::{LawDistance, Placed, distance_of_samples};
 use crate::numerics::machine::streams::stream;
 
 /// Progress is reported about this often.
@@ -49,6 +49,8 @@ pub struct Lived {
     pub radius: f64,
     /// Distance from the centre of its ball to the true law.
     pub distance: f64,
+    /// Distance from the centre of its ball to that of the path's first ball.
+    pub moved: f64,
     /// True if the advice was solved anew.
     pub resolved: bool,
 }
@@ -281,13 +283,13 @@ impl Simulator<'_> {
         self.distances.learn(sample, spread);
     }
 
-    /// Returns the distances of the centre to the true law before each return.
-    fn distances_along(&self, sample: &[Placed], returns: &[f64]) -> Vec<f64> {
-        let mut sample = sample.to_vec();
+    /// Returns the distances of the centre to the true law and to the first centre, before each return.
+    fn distances_along(&self, first: &[Placed], returns: &[f64]) -> Vec<[f64; 2]> {
+        let mut sample = first.to_vec();
         let before = |&log_return: &f64| {
-            let distance = self.distances.distance(&sample);
+            let distances = [self.distances.distance(&sample), distance_of_samples(first, &sample)];
             self.learn(&mut sample, log_return);
-            distance
+            distances
         };
         returns.iter().map(before).collect()
     }
@@ -298,7 +300,7 @@ impl Simulator<'_> {
         advisor: &Advisor,
         history: usize,
         returns: &[f64],
-        distances: &[f64],
+        distances: &[[f64; 2]],
         lived: &mut Vec<Lived>,
         seconds: &mut f64,
     ) -> Result<PathOutcome, TrainError> {
@@ -314,8 +316,8 @@ impl Simulator<'_> {
             if resolved {
                 *seconds += (self.clock)() - started;
             }
-            let distance = distances[if moves { step } else { 0 }];
-            lived.push(Lived { allocation: advice.allocation, radius: advice.radius, distance, resolved });
+            let [distance, moved] = distances[if moves { step } else { 0 }];
+            lived.push(Lived { allocation: advice.allocation, radius: advice.radius, distance, moved, resolved });
             ended = ended.after(walk.state.wealth, dynamics.contribution);
         }
         Ok(ended)

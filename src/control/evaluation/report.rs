@@ -202,6 +202,10 @@ pub struct CoverageAtSize {
     pub sample_size: usize,
     /// Share of paths whose ball held the true law.
     pub covered: Estimate,
+    /// Share of paths whose ball lay inside the first ball of the path, `W1(F_0, F_t) + e_t <= e_0`, with F the centres
+    /// and e the radii. If every return is allowed, this is exact, because mass may move beyond the last return. With a
+    /// `support` a ball may lie inside without it, and the share is a lower bound.
+    pub inside_first: Estimate,
 }
 
 /// Results at one initial history.

@@ -7,8 +7,8 @@ use crate::control::evaluation::deciding_paths::few_decide;
 use crate::control::evaluation::names::{framework_name, mix_name};
 use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes};
 use crate::control::evaluation::report::{
-    Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport,
-    RadiusSpread, Spread, StrategyReport, UtilityReport, WealthReport,
+    Costs, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport, RadiusSpread, Spread,
+    StrategyReport, UtilityReport, WealthReport,
 };
 use crate::control::evaluation::verdict::beside_own_mix;
 use crate::control::policy::content_hash;
@@ -63,11 +63,12 @@ impl EvaluationReport {
         let strategies: Vec<StrategyReport> = strategies.collect::<serde_json::Result<_>>()?;
         let names = strategies.iter().map(|strategy| strategy.strategy.as_str());
         let few_decide = few_decide(names.zip(&wealth), relative, floor);
+        let nested = strategies.iter().filter_map(StrategyReport::inside_first).collect::<Vec<_>>();
         Ok(EvaluationReport {
             format: FORMAT.to_owned(),
             reference: strategies.get(reference).map_or(String::new(), |strategy| strategy.strategy.clone()),
             histories: table.histories(),
-            sentences: strategies.iter().filter_map(sentence).chain(few_decide).collect(),
+            sentences: strategies.iter().filter_map(sentence).chain(few_decide).chain(nested).collect(),
             strategies,
             request: request.clone(),
             costs,
@@ -106,11 +107,11 @@ fn binned(values: impl Iterator<Item = f64>, edges: &[f64]) -> Vec<usize> {
 }
 
 /// Everything simulated, strategy by strategy.
-struct SimulationTable<'a> {
-    evaluation: &'a Evaluation,
-    followers: &'a [Follower],
-    outcomes: &'a Outcomes,
-    sample: Clustered,
+pub(super) struct SimulationTable<'a> {
+    pub(super) evaluation: &'a Evaluation,
+    pub(super) followers: &'a [Follower],
+    pub(super) outcomes: &'a Outcomes,
+    pub(super) sample: Clustered,
     wealth: &'a [Vec<f64>],
     utilities: &'a [Vec<f64>],
     edges: &'a [f64],
@@ -263,26 +264,6 @@ impl SimulationTable<'_> {
             }
         };
         (0..problem.horizon).map(period).collect()
-    }
-
-    fn coverage(&self, index: usize) -> Coverage {
-        let problem = &self.evaluation.request.problem;
-        let horizon = problem.horizon;
-        let left = |lived: &Lived| lived.distance > lived.radius;
-        let outcomes = &self.outcomes.outcomes;
-        let at_size = |step: usize| CoverageAtSize {
-            sample_size: problem.history.len() + step,
-            covered: self.sample.share(outcomes, |outcome| !left(&outcome.lived[index * horizon + step])),
-        };
-        // A frozen ball is the same in all periods.
-        let steps = if self.followers[index].framework.learns() { problem.horizon } else { 1 };
-        Coverage {
-            target: problem.radius_rule().alpha().map(|alpha| 1.0 - alpha),
-            by_sample_size: (0..steps).map(at_size).collect(),
-            ever_left: self
-                .sample
-                .share(outcomes, |outcome| outcome.lived[index * horizon..(index + 1) * horizon].iter().any(left)),
-        }
     }
 
     fn histories(&self) -> Vec<HistoryReport> {

@@ -146,6 +146,21 @@ impl LawDistance {
     }
 }
 
+/// Returns the distance of the laws of two samples, ascending by value, with their weights. Cost O(n).
+///
+/// Checked by: `tests/solver/evaluate.rs::the_share_inside_the_first_ball_is_what_sorted_returns_give`.
+pub fn distance_of_samples(one: &[Placed], other: &[Placed]) -> f64 {
+    let masses = |sample: &[Placed], sign: f64| {
+        let total: f64 = sample.iter().map(|placed| placed.weight).sum();
+        sample.iter().map(|placed| (placed.value, sign * placed.weight / total)).collect::<Vec<_>>()
+    };
+    let mut apart = [masses(one, 1.0), masses(other, -1.0)].concat();
+    // A stable sort merges two ascending parts in one pass.
+    apart.sort_by(|left, right| left.0.total_cmp(&right.0));
+    let (atoms, apart): (Vec<f64>, Vec<f64>) = apart.into_iter().unzip();
+    distance_of_masses(&atoms, &apart)
+}
+
 /// Returns the distance of two laws on the same ascending atoms: the integral of the difference of their distribution
 /// functions. `apart` is the difference of their masses at each atom. Cost O(atoms).
 ///

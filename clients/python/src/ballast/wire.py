@@ -1991,6 +1991,12 @@ class CoverageAtSize(TypedDict):
     """Number of returns known."""
     covered: Estimate
     """Share of paths whose ball held the true law."""
+    inside_first: Estimate
+    """
+    Share of paths whose ball lay inside the first ball of the path, `W1(F_0, F_t) + e_t <= e_0`, with F the centres
+    and e the radii. If every return is allowed, this is exact, because mass may move beyond the last return. With a
+    `support` a ball may lie inside without it, and the share is a lower bound.
+    """
 
 
 class Decide(TypedDict):

@@ -238,6 +238,7 @@ function coverage({ strategies, request }) {
         { name: "Returns seen", numeric: true, cell: ({ sample_size }) => count(sample_size) },
         { name: "Ball held the law", numeric: true, cell: (row) => interval(row.covered, percent) },
         { name: "Aimed at", numeric: true, cell: ({ target }) => (target === null ? "\u2013" : percent(target, 0)) },
+        { name: "Inside the first ball", numeric: true, cell: (row) => interval(row.inside_first, percent) },
       ],
       rows,
     ),
