@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use crate::control::request::annualised::{self, compounded};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::specification::ProblemSpecification;
+use crate::numerics::statistics::tail_index::{TailIndex, tail_indices};
 
 /// Annual rates above this are rarely paid in a currency that keeps its value.
 const HIGH_RATE_A_YEAR: f64 = 0.15;
@@ -21,6 +22,11 @@ const LARGE_DEVIATION_A_YEAR: f64 = 3.0;
 const LARGE_DEVIATION: f64 = 0.5;
 /// Costs above this are those of houses, not of assets that are traded every period.
 const HIGH_TRADING_COST: f64 = 0.02;
+
+/// Order of the moment that a ball needs more than: its radius is finite if a moment above the second exists.
+const NEEDED_MOMENT: f64 = 2.0;
+/// Standard errors between the estimate of a tail index and its upper bound: 95 %, one-sided.
+const TAIL_ERRORS: f64 = 1.645;
 
 /// Something in a valid request that may be a mistake.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -47,6 +53,9 @@ pub enum WarningCode {
     RecordInPercent,
     /// Trading costs more than 2 %.
     TradingCostHigh,
+    /// A tail of the record is so heavy that moments above the second may not exist, and the returns have no bounds: the
+    /// tail index is below 2 by 1.645 standard errors.
+    TailHeavy,
     /// A formula of a declared problem jumps as a state or the noise moves.
     Jumps,
 }
@@ -54,8 +63,12 @@ pub enum WarningCode {
 impl Warning {
     /// Renames the fields to those of a walk-forward; `returns` is its field of returns.
     pub fn of_walk(self, returns: &'static str) -> Self {
-        let names =
-            [("problem.rate_per_step", "rate"), ("problem.trading_cost", "trading_cost"), ("problem.history", returns)];
+        let names = [
+            ("problem.rate_per_step", "rate"),
+            ("problem.trading_cost", "trading_cost"),
+            ("problem.history", returns),
+            ("problem.support", "support"),
+        ];
         Warning {
             field: names.iter().find(|(from, _)| *from == self.field).map_or(self.field, |(_, to)| (*to).into()),
             message: names.iter().fold(self.message, |message, (from, to)| message.replace(from, to)),
@@ -65,6 +78,28 @@ impl Warning {
 }
 
 impl ProblemSpecification {
+    /// Warns of a tail of the history without a moment above the second. That is the paper's postulate (2.1): without
+    /// such a moment, the distance of the empirical law need not shrink as 1/sqrt(n), and the radius means nothing.
+    /// Bounds on the returns give every moment. A normal law has them too, so only frameworks with a ball are checked.
+    ///
+    /// Checked by: `heavy_tails_are_warned_of_and_light_ones_rarely`.
+    fn tail_heavy(&self) -> Option<Warning> {
+        if !self.framework.has_ball() || self.support_rule().given().is_some() {
+            return None;
+        }
+        let is_heavy = |tail: &TailIndex| tail.index + TAIL_ERRORS * tail.standard_error < NEEDED_MOMENT;
+        let named = ["lower", "upper"].into_iter().zip(tail_indices(&self.history));
+        let heavy = named.filter_map(|(name, tail)| tail.filter(is_heavy).map(|tail| (name, tail)));
+        let (name, tail) = heavy.min_by(|(_, one), (_, other)| one.index.total_cmp(&other.index))?;
+        let TailIndex { index, standard_error, count } = tail;
+        let text = format!(
+            "has a heavy {name} tail: its index by {count} returns is {index:.1}, with a standard error of \
+             {standard_error:.1}, so moments above the second may not exist and no radius can be trusted. Give bounds \
+             on the returns in problem.support"
+        );
+        Some(warning(WarningCode::TailHeavy, "problem.history", text))
+    }
+
     /// Returns the warnings, in the order of the request. Cost O(n ln n) for n returns.
     ///
     /// Checked by: `what_is_mistaken_is_warned_of_and_what_is_usual_is_not`.
@@ -112,6 +147,7 @@ impl ProblemSpecification {
                 .then(|| warning(WarningCode::TradingCostHigh, "problem.trading_cost", cost_high())),
             in_percent("problem.history", self.deviation()),
             assumed.and_then(|deviation| in_percent("problem.centre.history", deviation)),
+            self.tail_heavy(),
         ]
         .into_iter()
         .flatten()
@@ -131,7 +167,14 @@ fn percent(share: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use rand::RngExt;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal, StudentT};
+
     use super::*;
+    use crate::control::request::framework::Framework;
+    use crate::control::request::support::Support;
+    use crate::numerics::machine::streams::stream;
 
     /// Returns the warnings for a rate, periods per year, a trading cost, and the deviation of returns with mean 1 %.
     fn warned(rate: f64, periods_per_year: Option<f64>, trading_cost: f64, deviation: f64) -> Vec<WarningCode> {
@@ -167,6 +210,50 @@ mod tests {
         assert_eq!(warned(0.0001, None, 0.0, 1.1), [RecordInPercent]);
         assert_eq!(warned(0.0025, months, 0.05, 0.045), [TradingCostHigh]);
         assert_eq!(warned(0.2, months, 0.05, 1.5), [RateHigh, RateAboveRecord, TradingCostHigh, RecordInPercent]);
+    }
+
+    #[test]
+    fn heavy_tails_are_warned_of_and_light_ones_rarely() {
+        let records = 500;
+        let student = |degrees: f64| StudentT::new(degrees).unwrap();
+        let share = |size: usize, draw: &dyn Fn(&mut ChaCha8Rng) -> f64| {
+            let is_warned = |index: &usize| {
+                let mut generator = stream(3, "heavy", size, *index);
+                // Small enough to be in no doubt about their unit.
+                let history: Vec<f64> = (0..size).map(|_| 1e-6 * draw(&mut generator)).collect();
+                let warnings = ProblemSpecification::of(history, -0.01).warnings();
+                warnings.iter().any(|warning| warning.code == WarningCode::TailHeavy)
+            };
+            (0..records).filter(is_warned).count() as f64 / records as f64
+        };
+        for size in [60, 120, 240, 1000] {
+            let normal = share(size, &|generator| generator.sample(StandardNormal));
+            let light = share(size, &|generator| student(4.0).sample(generator));
+            let heavy = share(size, &|generator| student(1.5).sample(generator));
+            assert!(normal < 0.05 && light < 0.05 && heavy > 0.5, "{size}: {normal} {light} {heavy}");
+        }
+    }
+
+    #[test]
+    fn a_heavy_tail_is_no_matter_if_the_returns_have_bounds_or_no_ball_is_drawn() {
+        // Quantiles of a law with P(Z > z) = z^-1 below, none above.
+        let fallen = |cell: usize| -0.001 * (1.0 - (cell as f64 + 0.5) / 100.0).recip();
+        let history: Vec<f64> = (0..100).map(fallen).collect();
+        let problem = ProblemSpecification::of(history, -0.01);
+        let warned = |problem: &ProblemSpecification| problem.warnings().into_iter().map(|one| one.message).collect();
+        let found: Vec<String> = warned(&problem);
+        assert!(
+            found.len() == 1
+                && found[0].starts_with("problem.history has a heavy lower tail: its index by 10 returns is ")
+        );
+        let between = Some(Support::Between { min: -1.0, max: 1.0 });
+        let framework = Framework::PlugIn;
+        for other in [
+            ProblemSpecification { support: between, ..problem.clone() },
+            ProblemSpecification { framework, ..problem },
+        ] {
+            assert_eq!(warned(&other), [""; 0]);
+        }
     }
 
     #[test]

@@ -4,3 +4,4 @@ pub mod block_bootstrap;
 pub mod exchangeability;
 pub mod long_run_mean;
 pub mod summary;
+pub mod tail_index;

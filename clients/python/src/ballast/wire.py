@@ -1551,7 +1551,7 @@ class WalkedStrategy(TypedDict):
     """Period by period."""
 
 
-WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "jumps"]
+WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "tail_heavy", "jumps"]
 """Kind of a warning."""
 
 

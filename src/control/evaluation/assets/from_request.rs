@@ -101,6 +101,7 @@ impl AssetsBacktest {
         let problem = ProblemSpecification {
             periods_per_year: Some(self.record.periods_per_year as f64),
             trading_cost: self.choices.trading_cost,
+            support: Some(self.choices.support),
             ..ProblemSpecification::of(fund_returns(rows, &inverse_volatility(rows)), self.record.bank[self.first - 1])
         };
         problem.warnings().into_iter().map(|warning| warning.of_walk(request.returns().0)).collect()
