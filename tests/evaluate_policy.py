@@ -56,7 +56,11 @@ def radius_of(problem, size):
     if rule["rule"] == "root_n":
         return share * rule["kappa"] / math.sqrt(size)
     if rule["rule"] == "concentration":
-        return share * math.sqrt(math.log(rule["C"] / rule["alpha"]) / (rule["c"] * size))
+        length, alpha = problem["support"]["max"] - problem["support"]["min"], rule["alpha"]
+        bounds = [0.5 + math.sqrt(math.log(1 / alpha) / 2)]
+        if problem["learning"]["kind"] == "equal":
+            bounds.append(math.sqrt(math.log(2 / alpha) / 2))
+        return share * length * min(bounds) / math.sqrt(size)
     raise ValueError(f"{rule['rule']} must be asked for with its radius")
 
 

@@ -114,7 +114,7 @@ test("the form of an evaluation stands before whoever asks from a policy", async
 });
 
 test("the table of policies stands whole at 1280 pixels, whatever its words, with boxes of one size", async () => {
-  const problem = { horizon: 2, rate_per_step: 0.002, history: HISTORY, utility: { kind: "exponential", risk_aversion: 0.01 }, radius: { rule: "concentration", alpha: 0.1, C: 1, c: 1 } };
+  const problem = { horizon: 2, rate_per_step: 0.002, history: HISTORY, utility: { kind: "exponential", risk_aversion: 0.01 }, radius: { rule: "concentration", alpha: 0.1 }, support: { rule: "between", min: -1, max: 1 } };
   await trained(ballast.url, { problem, design: { count: 20 }, name: "A name of so many words that it takes more than a line of the table" });
   await go("#/policies");
   const table = page.getByRole("region", { name: "Policies, newest first" });

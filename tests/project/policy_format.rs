@@ -52,7 +52,14 @@ fn policies() -> Vec<Value> {
     known["problem"]["law"] = json!({ "kind": "gaussian_mixture",
         "components": [{ "weight": 1.0, "mean": 0.01, "variance": 0.002 }] });
     let chi_square = || json!({ "rule": "chi_square", "alpha": 0.5 });
-    let concentration = json!({ "rule": "concentration", "alpha": 0.1, "C": 1.0, "c": 4000.0 });
+    let concentrated = |alpha: f64| {
+        let mut concentrated =
+            policy("adaptive", json!({ "kind": "log" }), json!({ "rule": "concentration", "alpha": alpha }), json!({}));
+        concentrated["problem"]["support"] = json!({ "rule": "between", "min": -0.07, "max": 0.3 });
+        // A bank so bad that balls this wide leave something to hold.
+        concentrated["problem"]["rate_per_step"] = json!(-0.1);
+        concentrated
+    };
     let value = json!({ "target": "value" });
     let raw_value = json!({ "target": "value", "features": "raw_moments", "moment_count": 3 });
     let costly = |framework: &str, utility: Value, surrogate: Value| {
@@ -97,7 +104,8 @@ fn policies() -> Vec<Value> {
         policy("adaptive", exponential(), bridge(), six()),
         policy("adaptive", power(), bridge(), value.clone()),
         policy("adaptive", exponential(), json!({ "rule": "root_n", "kappa": 0.02 }), value),
-        policy("adaptive", json!({ "kind": "log" }), concentration, json!({})),
+        concentrated(0.5),
+        decaying(concentrated(0.99)),
         policy("plug_in", exponential(), bridge(), json!({})),
         policy("plug_in", json!({ "kind": "log" }), bridge(), raw_value),
         policy("adaptive", exponential(), bridge(), json!({ "features": "raw_moments" })),

@@ -349,6 +349,8 @@ async fn what_is_wrong_with_several_assets_is_named() {
         (with(&|p| p["ground_norm"] = json!("two")), "problem.ground_norm"),
         (with(&|p| p["rate_per_step"] = json!(-2.0)), "problem.rate_per_step"),
         (with(&|p| p["radius"] = json!({ "rule": "chi_square", "alpha": 0.5 })), "problem.radius.rule"),
+        (with(&|p| p["radius"] = json!({ "rule": "joint" })), "problem.radius.rule"),
+        (with(&|p| p["radius"] = json!({ "rule": "concentration" })), "problem.radius.rule"),
         (with(&|p| p["utility"] = json!({ "kind": "power", "risk_aversion": 0.5 })), "problem.utility.risk_aversion"),
         (json!({ "problem": good, "wealth": -1.0 }), "wealth"),
     ];

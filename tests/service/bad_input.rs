@@ -94,8 +94,9 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/radius", json!({"rule": "bridge", "paths": 1}), "problem.radius.paths"),
         ("/problem/radius", json!({"rule": "bridge", "scale": -1.0}), "problem.radius.scale"),
         ("/problem/radius", json!({"rule": "bridge", "correction": 3.0}), "problem.radius.correction"),
-        ("/problem/radius", json!({"rule": "concentration", "C": 0.0, "c": 1.0}), "problem.radius.C"),
-        ("/problem/radius", json!({"rule": "concentration", "C": 2.0, "c": 0.0}), "problem.radius.c"),
+        ("/problem/radius", json!({"rule": "joint", "alpha": 1.0}), "problem.radius.alpha"),
+        ("/problem/radius", json!({"rule": "joint", "paths": 1}), "problem.radius.paths"),
+        ("/problem/radius", json!({"rule": "concentration"}), "problem.support"),
         ("/problem/radius", json!({"rule": "root_n", "kappa": -1.0}), "problem.radius.kappa"),
         ("/problem/radius", json!({"rule": "fixed", "radius": -1.0}), "problem.radius.radius"),
         ("/problem/support", json!({"rule": "worst_seen", "factor": 0.5}), "problem.support.factor"),
@@ -224,7 +225,7 @@ fn the_description_is_as_strict_as_the_rules_of_single_fields() {
     assert_eq!(loose, DECIDED_TOGETHER);
 }
 
-const DECIDED_TOGETHER: [&str; 21] = [
+const DECIDED_TOGETHER: [&str; 22] = [
     "problem.action_interval[0]",
     "problem.action_interval[1]",
     "problem.contributions",
@@ -238,6 +239,7 @@ const DECIDED_TOGETHER: [&str; 21] = [
     "problem.centre.law",
     "problem.centre.kind",
     "problem.centre.law",
+    "problem.support",
     "problem.levels",
     "problem.support.max",
     "problem.support.max",

@@ -198,10 +198,15 @@ fn a_mixed_ball_has_the_radius_of_the_share_seen_but_for_a_fixed_one() {
         (bridge(0.4), true),
         (json!({ "rule": "calibrated", "alpha": 0.5, "paths": 200 }), true),
         (json!({ "rule": "root_n", "kappa": 0.02 }), true),
-        (json!({ "rule": "concentration", "alpha": 0.1, "C": 1.0, "c": 4000.0 }), true),
+        (json!({ "rule": "joint", "alpha": 0.5, "paths": 200 }), true),
+        (json!({ "rule": "concentration", "alpha": 0.1 }), true),
         (json!({ "rule": "fixed", "radius": 0.01 }), false),
     ] {
-        let of = |centre: Value| Problem::new(&specification(request(3, rule.clone(), centre)));
+        let of = |centre: Value| {
+            let mut request = request(3, rule.clone(), centre);
+            request["problem"]["support"] = json!({ "rule": "between", "min": -1.0, "max": 1.0 });
+            Problem::new(&specification(request))
+        };
         let [plain, mixed] = [json!({ "kind": "empirical" }), mixed(weight)].map(of);
         let mut law = EmpiricalDistribution::new(&HISTORY);
         for seen in [0.03, -0.02] {

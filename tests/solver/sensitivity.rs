@@ -26,7 +26,7 @@ fn problems() -> Vec<Value> {
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(9.0), "radius": { "rule": "root_n", "kappa": 0.03 },
             "framework": "static", "support": { "rule": "between", "min": -0.11, "max": 0.1 }, "action_interval": [0.0, 0.6] }),
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": { "kind": "exponential", "risk_aversion": 0.03 }, "contributions": -3.0,
-            "radius": { "rule": "concentration", "alpha": 0.3, "C": 1.0, "c": 900.0 }, "trading_cost": 0.004 }),
+            "radius": { "rule": "root_n", "kappa": 0.0366 }, "trading_cost": 0.004 }),
         json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(5.0), "framework": "parametric_static",
             "radius": { "rule": "chi_square", "alpha": 0.8 } }),
         json!({ "history": HISTORY, "utility": power(6.0), "framework": "plug_in", "rate_per_step": 0.01 }),

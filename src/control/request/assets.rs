@@ -136,7 +136,7 @@ impl AssetsProblem {
     pub fn check(&self) -> Result<(), FieldError> {
         check_names("problem.assets", &self.assets)?;
         check_rows("problem.history", &self.history, &self.assets, self.support)?;
-        if let Some(rule @ RadiusRule::Joint { .. }) = self.radius {
+        if let Some(rule @ (RadiusRule::Joint { .. } | RadiusRule::Concentration { .. })) = self.radius {
             let allowed = "must be bridge, calibrated, root_n or fixed: what the rule promises holds for one asset";
             return Err(FieldError::new("problem.radius.rule", rule.name(), allowed));
         }

@@ -50,17 +50,14 @@ pub enum RadiusRule {
         #[serde(default = "defaults::paths")]
         paths: usize,
     },
-    /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
+    /// `D min(sqrt(ln(2 / alpha) / (2 n)), (1/2 + sqrt(ln(1 / alpha) / 2)) / sqrt(n))`, with D the length of the
+    /// `support`, which must be `between`. At every n and for every law on the support, a ball misses the law with
+    /// probability at most alpha, if returns are independent. If weights decay, only the second term applies. Sources:
+    /// Massart (1990) for the constant of the Dvoretzky-Kiefer-Wolfowitz inequality, and McDiarmid (1989).
     Concentration {
         /// Miscoverage, 0.001 to 0.999. Default 0.1.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
-        /// Constant C of the inequality, from `alpha` to 1e9.
-        #[serde(rename = "C")]
-        numerator: f64,
-        /// Constant c of the inequality, per squared log-return, 1e-9 to 1e12.
-        #[serde(rename = "c")]
-        rate: f64,
     },
     /// `kappa / sqrt(n)`.
     RootN {

@@ -28,10 +28,6 @@ pub const ALPHA: (f64, f64) = (1e-3, 0.999);
 const CALIBRATED_ALPHA: (f64, f64) = (1e-2, 0.999);
 /// Allowed miscoverages of a confidence region; at 1 it is the sample's own law.
 const REGION_ALPHA: (f64, f64) = (1e-3, 1.0);
-/// Largest constant C of the concentration inequality; the smallest is alpha.
-const LARGEST_NUMERATOR: f64 = 1e9;
-/// Allowed constants c of the concentration inequality, per squared log-return.
-const CONCENTRATION_RATE: (f64, f64) = (1e-9, 1e12);
 /// Allowed constants kappa of a radius of kappa / sqrt(n), in log-return.
 pub const KAPPA: (f64, f64) = (0.0, 100.0);
 
@@ -45,8 +41,6 @@ impl Bounded for RadiusRule {
         ("paths", ValueBounds::count(&PATHS)),
         ("scale", ValueBounds::number(RADIUS_SCALE)),
         ("correction", ValueBounds::number(RADIUS_CORRECTION)),
-        ("C", ValueBounds::Above(0.0, LARGEST_NUMERATOR)),
-        ("c", ValueBounds::number(CONCENTRATION_RATE)),
         ("kappa", ValueBounds::number(KAPPA)),
         ("radius", ValueBounds::number(FIXED_RADIUS)),
     ];
@@ -99,11 +93,12 @@ pub fn check_radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result
             let counted = format!("problem.horizon and by the sample size (of which {CELLS} count)");
             check_paths(paths, times, JOINT_NUMBERS, &counted)
         }
-        RadiusRule::Concentration { alpha, numerator, rate } => {
-            within("problem.radius.alpha", alpha, ALPHA.0, ALPHA.1)?;
-            within("problem.radius.C", numerator, alpha, LARGEST_NUMERATOR)?;
-            within("problem.radius.c", rate, CONCENTRATION_RATE.0, CONCENTRATION_RATE.1)
+        RadiusRule::Concentration { .. } if problem.support_rule().given().is_none() => {
+            let rule =
+                "must be between under the radius rule concentration, whose radius follows from the bounds on returns";
+            Err(FieldError::new("problem.support", "no bounds", rule))
         }
+        RadiusRule::Concentration { alpha } => within("problem.radius.alpha", alpha, ALPHA.0, ALPHA.1),
         RadiusRule::RootN { kappa } => within("problem.radius.kappa", kappa, KAPPA.0, KAPPA.1),
         RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1),
         RadiusRule::ChiSquare { alpha } => within("problem.radius.alpha", alpha, REGION_ALPHA.0, REGION_ALPHA.1),

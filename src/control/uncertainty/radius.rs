@@ -8,12 +8,13 @@ use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
+use crate::control::request::support::Interval;
 use crate::control::uncertainty::centre::record;
 use crate::numerics::bridge::limit::BridgeLaw;
 use crate::numerics::bridge::paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::bridge::sized_gaps::Statistic;
-use crate::numerics::law::confidence_region;
 use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::{concentration, confidence_region};
 use crate::numerics::search::chebyshev::local_cubic;
 
 /// If the oldest return of the last law weighs at least this share of the newest, the decay of weights is treated as
@@ -35,6 +36,8 @@ pub struct RadiusEstimator {
     last_size: usize,
     /// True if weights decay by more than a little.
     decays: bool,
+    /// Length of the support if it is given, else 0.
+    support_length: f64,
     /// The rule for the centres of the balls.
     centre: CentreSpecification,
     /// The law of the history. Most laws of a design share its values.
@@ -104,8 +107,20 @@ impl RadiusEstimator {
         let (learned, retention) = (learning.law(&history), learning.retention());
         let calibration = goal.map(|goal| Calibration { history, retention, goal, factor: OnceLock::new() });
         let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL;
+        let support_length = problem.support_rule().given().map_or(0.0, |Interval { min, max }| max - min);
         let (seed, centre) = (*seed, problem.centre.clone());
-        RadiusEstimator { rule, calibration, seed, last_size, decays, centre, learned, exact: OnceLock::new(), kept }
+        RadiusEstimator {
+            rule,
+            calibration,
+            seed,
+            last_size,
+            decays,
+            support_length,
+            centre,
+            learned,
+            exact: OnceLock::new(),
+            kept,
+        }
     }
 
     /// Returns true if laws of one sample size have different radii.
@@ -304,7 +319,9 @@ impl RadiusEstimator {
     fn radius_of_size(&self, size: f64) -> f64 {
         let of_returns = match self.rule {
             RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. } | RadiusRule::Joint { .. } => 0.0,
-            RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
+            RadiusRule::Concentration { alpha } => {
+                self.support_length * concentration::radius(alpha, size, self.learned.retention())
+            }
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => return radius,
             RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, size),
@@ -339,7 +356,9 @@ mod tests {
 
     fn estimator(framework: &str, rule: Value) -> RadiusEstimator {
         let history = [0.01, -0.02, 0.03, 0.005];
-        let request = json!({ "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.0, "radius": rule, "history": history } });
+        let support = json!({ "rule": "between", "min": -0.1, "max": 0.3 });
+        let request = json!({ "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.0, "radius": rule,
+            "support": support, "history": history } });
         let specification = serde_json::from_value::<Specification>(request).unwrap();
         RadiusEstimator::new(&specification, Cache::default())
     }
@@ -350,10 +369,10 @@ mod tests {
 
     #[test]
     fn every_rule_of_the_sample_size_has_its_formula() {
-        // By hand, at n = 5: sqrt(ln(2 / 0.1) / (3 * 5)), 0.4 / sqrt(5), 0.25, sqrt(-2 ln(0.1) / 5), and none if the
+        // By hand, at n = 5: 0.4 sqrt(ln(2 / 0.1) / (2 * 5)), 0.4 / sqrt(5), 0.25, sqrt(-2 ln(0.1) / 5), and none if the
         // law is assumed to be true.
         let rules = [
-            ("adaptive", json!({ "rule": "concentration", "alpha": 0.1, "C": 2.0, "c": 3.0 }), 0.446_895_4),
+            ("adaptive", json!({ "rule": "concentration", "alpha": 0.1 }), 0.218_933_1),
             ("adaptive", json!({ "rule": "root_n", "kappa": 0.4 }), 0.178_885_4),
             ("adaptive", json!({ "rule": "fixed", "radius": 0.25 }), 0.25),
             ("parametric_adaptive", json!({ "rule": "chi_square", "alpha": 0.1 }), 0.959_705_2),

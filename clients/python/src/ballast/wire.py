@@ -1084,14 +1084,15 @@ class RadiusRule3(TypedDict):
 
 
 class RadiusRule4(TypedDict):
-    """`sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin."""
+    """
+    `D min(sqrt(ln(2 / alpha) / (2 n)), (1/2 + sqrt(ln(1 / alpha) / 2)) / sqrt(n))`, with D the length of the
+    `support`, which must be `between`. At every n and for every law on the support, a ball misses the law with
+    probability at most alpha, if returns are independent. If weights decay, only the second term applies. Sources:
+    Massart (1990) for the constant of the Dvoretzky-Kiefer-Wolfowitz inequality, and McDiarmid (1989).
+    """
 
     alpha: NotRequired[float]
     """Miscoverage, 0.001 to 0.999. Default 0.1."""
-    C: float
-    """Constant C of the inequality, from `alpha` to 1e9."""
-    c: float
-    """Constant c of the inequality, per squared log-return, 1e-9 to 1e12."""
     rule: Literal["concentration"]
 
 

@@ -131,12 +131,12 @@ impl Declared {
             RadiusRule::Fixed { radius } => RadiusRule::Fixed { radius: radius / (high - low) },
             rule => rule,
         });
-        if let Some(rule @ (RadiusRule::Concentration { .. } | RadiusRule::ChiSquare { .. })) = radius {
+        if let Some(rule @ RadiusRule::ChiSquare { .. }) = radius {
             let rule = rule.name();
             return Err(FieldError::new(
                 "problem.radius.rule",
                 rule,
-                "must be bridge, calibrated, joint, root_n or fixed",
+                "must be bridge, calibrated, joint, concentration, root_n or fixed",
             ));
         }
         let mut investor =

@@ -85,7 +85,7 @@ function radiusRule(radius) {
     case "joint":
       return `the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an, times the factor for all periods together`;
     case "concentration":
-      return `the concentration bound at ${percent(1 - radius.alpha, 0)} (C ${significant(radius.C)}, c ${significant(radius.c)})`;
+      return `the concentration bound at ${percent(1 - radius.alpha, 0)} for laws on the support`;
     case "root_n":
       return `${significant(radius.kappa)} / \u221an`;
     case "chi_square":
