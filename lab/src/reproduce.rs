@@ -14,7 +14,9 @@ use super::evaluate::write;
 use super::tables;
 
 mod findings;
+mod first_guess;
 mod printed;
+mod radius;
 mod runs;
 
 #[derive(Debug, Clone, Args)]
@@ -32,8 +34,10 @@ pub struct Reproduce {
 #[derive(Debug, Clone, Serialize)]
 pub struct ReproductionPlan {
     pub horizon: usize,
-    /// Design points of the learning framework; the others use as many, up to the paper's 200.
+    /// Design points of the learning framework and, up to the paper's 200, of the known law.
     pub count: usize,
+    /// Design points of a framework frozen at its history, where wealth is the only input.
+    pub ladder: usize,
     /// Simulated bridges behind a quantile.
     pub bridges: usize,
     pub histories: usize,
@@ -44,9 +48,20 @@ pub struct ReproductionPlan {
     pub most_drawn: usize,
     pub study_sizes: Vec<usize>,
     pub study_count: usize,
-    pub study_ladder: usize,
     pub study_histories: usize,
     pub study_paths: usize,
+    /// Lengths of history and horizons at which histories with a small Q are compared with average ones.
+    pub change_sizes: Vec<usize>,
+    pub change_horizons: Vec<usize>,
+    /// Histories drawn to find them.
+    pub change_drawn: usize,
+    /// Lengths of history and horizons after a wrong first guess.
+    pub guess_sizes: Vec<usize>,
+    pub guess_horizons: Vec<usize>,
+    /// Design points and bridges where several horizons are compared.
+    pub long_count: usize,
+    pub long_ladder: usize,
+    pub long_bridges: usize,
 }
 
 impl ReproductionPlan {
@@ -54,16 +69,24 @@ impl ReproductionPlan {
         ReproductionPlan {
             horizon: 10,
             count: 1000,
+            ladder: 40,
             bridges: 2000,
-            histories: 200,
+            histories: 100,
             paths: 500,
             close_histories: 40,
             most_drawn: 200_000,
             study_sizes: vec![20, 80, 320, 1280],
             study_count: 300,
-            study_ladder: 40,
             study_histories: 40,
             study_paths: 100,
+            change_sizes: vec![20, 80],
+            change_horizons: vec![10, 40],
+            change_drawn: 4000,
+            guess_sizes: vec![20, 60],
+            guess_horizons: vec![5, 10, 20, 40],
+            long_count: 100,
+            long_ladder: 12,
+            long_bridges: 500,
         }
     }
 
@@ -77,8 +100,13 @@ impl ReproductionPlan {
             most_drawn: 20_000,
             study_sizes: vec![20, 80],
             study_count: 30,
-            study_ladder: 20,
+            ladder: 20,
             study_histories: 4,
+            change_horizons: vec![5, 10],
+            change_drawn: 100,
+            guess_horizons: vec![5, 10],
+            long_count: 30,
+            long_bridges: 200,
             ..ReproductionPlan::full()
         }
     }
@@ -86,11 +114,10 @@ impl ReproductionPlan {
     /// Returns true if the run is large enough that differences from the paper exceed chance and the error of coarse
     /// designs.
     fn decides(&self) -> bool {
-        let ReproductionPlan { count, bridges, histories, close_histories, study_histories, .. } =
-            ReproductionPlan::full();
-        let least = [count, bridges, histories, close_histories, study_histories];
-        let own = [self.count, self.bridges, self.histories, self.close_histories, self.study_histories];
-        own.iter().zip(least).all(|(own, least)| *own >= least)
+        let sizes = |plan: &ReproductionPlan| {
+            [plan.count, plan.bridges, plan.histories, plan.close_histories, plan.study_histories, plan.long_count]
+        };
+        sizes(self).iter().zip(sizes(&ReproductionPlan::full())).all(|(own, least)| *own >= least)
     }
 }
 
@@ -102,6 +129,8 @@ struct Reproduction {
     findings: Vec<findings::Finding>,
     section: runs::Section,
     study: runs::Study,
+    changes: Vec<radius::ChangeRow>,
+    guesses: Vec<first_guess::GuessRow>,
 }
 
 pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
@@ -110,9 +139,12 @@ pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
     let workshop = ComparisonRun::new()?;
     let section = runs::section(&plan, &workshop)?;
     let study = runs::study(&plan, &workshop)?;
+    let changes = radius::changes(&plan, &workshop)?;
+    let guesses = first_guess::study(&plan, &workshop)?;
     workshop.finish();
-    let findings = findings::all(&section, &study, &plan);
-    let whole = Reproduction { seconds: workshop.seconds(), plan, findings, section, study };
+    let findings = Vec::new();
+    let mut whole = Reproduction { seconds: workshop.seconds(), plan, findings, section, study, changes, guesses };
+    whole.findings = findings::all(&whole);
     let html = page(&whole, arguments.quick)?;
     write(&arguments.out, "reproduction.html", &html)?;
     write(&arguments.out, "reproduction.json", &serde_json::to_string_pretty(&whole)?)?;
@@ -147,7 +179,11 @@ fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
     let mut csv = Csv::new(&["table", "strategy", "statistic", "paper", "value", "low", "high"]);
     for (index, (case, table)) in whole.section.cases.iter().zip(&printed::TABLES).enumerate() {
         for strategy in case.report.iter().flat_map(|report| &report.strategies) {
-            let Some(column) = table.column(strategy.framework) else { continue };
+            if strategy.framework.is_none() {
+                continue;
+            }
+            // A framework without a printed column has its figures beside empty ones.
+            let column = table.column(strategy.framework).unwrap_or(&[f64::NAN; 6]);
             let ours = tables::estimates(strategy);
             for (name, paper) in printed::STATISTICS.iter().zip(column) {
                 let Some((_, Estimate { value, low, high })) = ours.iter().find(|(own, _)| own == name) else {
@@ -174,5 +210,9 @@ fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
             csv.row(names.into_iter().chain([value, low, high].map(|figure| figure.to_string())));
         }
     }
-    write(folder, "convergence.csv", &csv.into_text())
+    write(folder, "convergence.csv", &csv.into_text())?;
+    write(folder, "smaller_radius.csv", &radius::shrunk_csv(&whole.section.shrunk))?;
+    write(folder, "larger.csv", &radius::changes_csv(&whole.changes))?;
+    write(folder, "first_guess.csv", &first_guess::csv(&whole.guesses))?;
+    write(folder, "first_guess_periods.csv", &first_guess::periods_csv(&whole.guesses))
 }

@@ -84,6 +84,11 @@ pub fn screen(report: &EvaluationReport) -> String {
     text + "\n" + &report.sentences.join("\n") + "\n"
 }
 
+/// Returns an estimate and both its ends, for CSV.
+pub fn ends(estimate: Estimate) -> [String; 3] {
+    [estimate.value, estimate.low, estimate.high].map(shown)
+}
+
 /// Formats a figure for CSV, empty if there is none.
 pub fn shown(figure: f64) -> String {
     if figure.is_nan() { String::new() } else { figure.to_string() }

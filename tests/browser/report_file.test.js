@@ -75,11 +75,13 @@ test("several assets are told by the same charts, and by what was held of each",
 
 test("the quick reproduction gives no verdict, and says so of every statement", async () => {
   await open("paper/reproduction.html");
-  const [agrees, differs, undecided] = await Promise.all(["agrees", "differs", "undecided"].map((name) => page.locator(`.verdicts.${name} li`).count()));
-  assert.ok(agrees + differs === 0 && undecided > 5, `${agrees}, ${differs} and ${undecided}`);
-  await page.getByRole("heading", { name: `Not enough to tell: ${undecided}` }).waitFor();
+  const [agrees, differs, undecided, small] = await Promise.all(["agrees", "differs", "undecided", "too_small"].map((name) => page.locator(`.verdicts.${name} li`).count()));
+  assert.ok(agrees + differs + undecided === 0 && small > 5, `${agrees}, ${differs}, ${undecided} and ${small}`);
+  await page.getByRole("heading", { name: `Too small a run to tell: ${small}` }).waitFor();
+  const colours = await page.evaluate(() => [".verdicts.too_small li", "p.note", ".words p"].map((selector) => getComputedStyle(document.querySelector(selector)).color));
+  assert.ok(colours[0] === colours[1] && colours[0] !== colours[2], `${colours}`);
   assert.doesNotMatch((await page.locator(".verdicts").allInnerTexts()).join(" "), /[\s[(]-\d/);
-  for (const name of ["Figure 1", /Table 1 and Figure 2/, /Table 2 and Figure 2/, /frontier/, /Convergence/]) await page.getByRole("heading", { name }).waitFor();
+  for (const name of ["Figure 1", /Table 1 and Figure 2/, /Table 2 and Figure 2/, /frontier/, "Static with a smaller radius", "Larger t0 and T", "A wrong first guess", /Convergence/]) await page.getByRole("heading", { name }).waitFor();
   // A band has its colour beside the line in the legend.
   const banded = page.locator("figure", { has: page.locator("path.band") });
   assert.equal(await banded.locator(".legend rect.band").count(), await banded.locator("path.band").count());

@@ -2,15 +2,18 @@
 
 use std::fmt;
 
-use ballast::control::evaluation::report::{StrategyReport, UtilityReport};
+use ballast::control::evaluation::report::{EvaluationReport, StrategyReport, UtilityReport};
 use ballast::control::request::framework::Framework;
 use ballast::numerics::machine::digits::fixed;
 use ballast::numerics::statistics::summary::Estimate;
 use serde::Serialize;
 
-use super::ReproductionPlan;
 use super::printed::{LOW_QUANTILE, MEAN_QUANTILE, QUANTILES, TABLES};
+use super::radius::apart;
 use super::runs::{CLOSENESS, Quantiles, Section, Slope, Study};
+use super::{Reproduction, runs};
+
+mod learning;
 
 /// Terminal utility of all wealth in the bank, 100 (1 - exp(-1.002^10)).
 const ALL_BANK: f64 = 63.947_03;
@@ -28,6 +31,8 @@ pub enum Verdict {
     Differs,
     /// Undecided: the intervals allow both.
     Undecided,
+    /// The run is too small for a verdict.
+    TooSmall,
 }
 
 /// A statement of the paper, and the result here.
@@ -44,6 +49,7 @@ impl fmt::Display for Finding {
             Verdict::Agrees => "Agrees",
             Verdict::Differs => "Differs",
             Verdict::Undecided => "Not enough to tell",
+            Verdict::TooSmall => "Too small a run to tell",
         };
         write!(f, "{verdict}: {} {}", self.statement, self.found)
     }
@@ -98,19 +104,23 @@ fn mean_and_variance(ours: &UtilityReport, paper: &[f64; 6]) -> Verdict {
 }
 
 fn shown(estimate: Estimate) -> String {
-    format!("{:.4} [{:.4}, {:.4}]", estimate.value, estimate.low, estimate.high)
+    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(|figure| fixed(figure, 4));
+    format!("{value} [{low}, {high}]")
 }
 
-/// Returns every statement, in the order of the paper; none if the run is too small for a verdict.
-pub fn all(section: &Section, study: &Study, plan: &ReproductionPlan) -> Vec<Finding> {
-    let mut findings = compared(section, study);
-    if !plan.decides() {
-        findings.iter_mut().for_each(|finding| finding.verdict = Verdict::Undecided);
+/// Returns every statement, in the order of section 3, and that of section 2.4. None has a verdict if the run is too
+/// small for one.
+pub fn all(whole: &Reproduction) -> Vec<Finding> {
+    let mut findings = compared(&whole.section);
+    findings.extend(learning::all(whole));
+    findings.extend(slopes(&whole.study));
+    if !whole.plan.decides() {
+        findings.iter_mut().for_each(|finding| finding.verdict = Verdict::TooSmall);
     }
     findings
 }
 
-fn compared(section: &Section, study: &Study) -> Vec<Finding> {
+fn compared(section: &Section) -> Vec<Finding> {
     let mut findings = quantiles(section);
     for (index, case) in section.cases.iter().enumerate() {
         let Some(report) = &case.report else {
@@ -129,10 +139,31 @@ fn compared(section: &Section, study: &Study) -> Vec<Finding> {
             (followed(Framework::Adaptive), followed(Framework::KnownLaw), followed(Framework::Static))
         {
             findings.extend(table(index, adaptive, known, fixed));
+            findings.extend(parametric(index, report));
         }
     }
-    findings.extend(slopes(study));
     findings
+}
+
+/// Returns the finding on the fourth framework of the paper, for which it prints no figures.
+fn parametric(index: usize, report: &EvaluationReport) -> Option<Finding> {
+    let (known, own) = (report.framework(Framework::KnownLaw)?, report.framework(Framework::ParametricStatic)?);
+    let ahead = runs::mean_gap(report, Framework::KnownLaw, Framework::ParametricStatic)?;
+    Some(Finding {
+        verdict: together(&[positive(ahead), above(known.utility.variance, own.utility.variance)]),
+        statement: format!(
+            "Table {}: parametric static is the fourth framework, without printed figures; the known law beats every other \
+             in the mean, and those are robust against more.",
+            index + 1
+        ),
+        found: format!(
+            "Here parametric static earns {} with variance {:.3}, against {:.4} and {:.3} with the known law.",
+            shown(own.utility.mean),
+            own.utility.variance.value,
+            known.utility.mean.value,
+            known.utility.variance.value
+        ),
+    })
 }
 
 fn quantiles(section: &Section) -> Vec<Finding> {
@@ -175,11 +206,8 @@ fn table(index: usize, adaptive: &StrategyReport, known: &StrategyReport, fixed:
     let more_than_adaptive = |strategy: &StrategyReport| {
         strategy.difference.as_ref().map_or(Verdict::Undecided, |difference| positive(difference.utility))
     };
-    let static_behind = match more_than_adaptive(fixed) {
-        Verdict::Agrees => Verdict::Differs,
-        Verdict::Differs => Verdict::Agrees,
-        Verdict::Undecided => Verdict::Undecided,
-    };
+    let beyond_static = fixed.difference.as_ref().map(|difference| reversed(difference.utility));
+    let static_behind = beyond_static.map_or(Verdict::Undecided, positive);
     vec![
         Finding {
             verdict: all_bank(&fixed.utility),
@@ -192,6 +220,18 @@ fn table(index: usize, adaptive: &StrategyReport, known: &StrategyReport, fixed:
             verdict: together(&[more_than_adaptive(known), static_behind]),
             statement: format!("Table {number}: in the mean the known law beats adaptive, and adaptive beats static."),
             found: format!("Here {:.4}, {:.4}, {:.4}.", mean.1, mean.0, mean.2),
+        },
+        Finding {
+            verdict: together(&[static_behind, above(ours.quantile_90, fixed.utility.quantile_90)]),
+            statement: format!(
+                "Table {number}: adaptive beats static significantly in the mean and the 90 % quantile."
+            ),
+            found: format!(
+                "Here adaptive is ahead by {} in the mean; the 90 % quantiles are {} and {}.",
+                beyond_static.map_or_else(String::new, shown),
+                shown(ours.quantile_90),
+                shown(fixed.utility.quantile_90)
+            ),
         },
         Finding {
             verdict: together(&[
@@ -219,6 +259,11 @@ fn table(index: usize, adaptive: &StrategyReport, known: &StrategyReport, fixed:
             ),
         },
     ]
+}
+
+/// Returns the estimate of the opposite difference.
+fn reversed(estimate: Estimate) -> Estimate {
+    Estimate { value: -estimate.value, low: -estimate.high, high: -estimate.low }
 }
 
 fn all_bank(utility: &UtilityReport) -> Verdict {

@@ -4,12 +4,13 @@ use std::error::Error;
 
 use ballast::control::cache::Cache;
 use ballast::control::evaluation::paths::{Evaluation, Follower};
-use ballast::control::evaluation::report::EvaluationReport;
+use ballast::control::evaluation::report::{EvaluationReport, HistoryReport};
 use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::problem::utility::utility;
 use ballast::control::request::evaluation::EvaluationRequest;
 use ballast::control::request::framework::Framework;
+use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::Specification;
 use ballast::control::uncertainty::laws::Laws;
 use ballast::control::uncertainty::radius::RadiusEstimator;
@@ -22,11 +23,14 @@ use serde_json::json;
 
 use super::ReproductionPlan;
 use super::printed::{QUANTILES, TABLES};
+use super::radius::{self, ShrunkRow};
 use crate::compare::ComparisonRun;
 use crate::paper;
 
 /// Number of returns of a history.
 pub const SAMPLE_SIZE: usize = 20;
+/// Confidence of the intervals.
+pub const LEVEL: f64 = 0.95;
 /// Relative distance within which a history's quantile must lie from a table's for the history to belong to it.
 pub const CLOSENESS: f64 = 0.02;
 /// Number of histories that share bridges; it divides a batch.
@@ -62,6 +66,8 @@ pub struct Section {
     /// Results over histories drawn from the true law.
     pub all: EvaluationReport,
     pub cases: Vec<Case>,
+    /// Results with ever smaller radii, over the histories of the first case; empty if fewer than two were found.
+    pub shrunk: Vec<ShrunkRow>,
 }
 
 /// Returns the request of the paper's problem, for drawn histories of `sample_size` returns.
@@ -74,26 +80,36 @@ pub fn request(
         "problem": paper::problem(sample_size, plan.horizon),
         "design": { "sampling_law": paper::mixture(), "count": plan.count },
         "frameworks": frameworks, "paths": plan.paths,
-        "histories": { "kind": "drawn", "count": plan.histories },
+        "histories": { "kind": "drawn", "count": plan.histories }, "level": LEVEL,
     });
-    request["problem"]["radius"] = json!({ "rule": "bridge", "alpha": 0.1, "paths": plan.bridges });
+    request["problem"]["radius"] = json!(bridge(plan.bridges));
     Ok(serde_json::from_value(request)?)
 }
 
+/// Returns the paper's radius rule, whose quantiles come from `paths` simulated bridges.
+pub fn bridge(paths: usize) -> RadiusRule {
+    RadiusRule::Bridge { alpha: 0.1, paths, scale: 1.0, correction: None }
+}
+
 pub fn section(plan: &ReproductionPlan, workshop: &ComparisonRun) -> Result<Section, Box<dyn Error>> {
-    let request = request(plan, SAMPLE_SIZE, &[Framework::Adaptive, Framework::KnownLaw, Framework::Static])?;
-    let evaluation = Evaluation::new(request.clone())?;
+    use Framework::{Adaptive, KnownLaw, ParametricStatic, Static};
+    let mut request = request(plan, SAMPLE_SIZE, &[Adaptive, KnownLaw, Static, ParametricStatic])?;
+    let mut evaluation = Evaluation::new(request.clone())?;
     let (quantiles, close) =
         workshop.run("looking for the paper's histories", plan.horizon, |_| seek(plan, &evaluation));
     let started = workshop.seconds();
     let followers = workshop.train(&evaluation)?;
     let trained = workshop.seconds() - started;
+    // The frozen frameworks are trained for each history, within the simulation.
+    (evaluation.request.design.count, request.design.count) = (Some(plan.ladder), Some(plan.ladder));
     let (_, all) = workshop.compare("simulating all histories", &evaluation, &followers, trained)?;
     let mut cases = Vec::new();
-    for (table, histories) in TABLES.iter().zip(close) {
+    for (table, histories) in TABLES.iter().zip(&close) {
         cases.push(case(plan, workshop, &request, &followers, table.quantile, histories)?);
     }
-    Ok(Section { quantiles, all: all.in_utility(), cases })
+    let nearest: Vec<Vec<f64>> = close[0].iter().take(plan.close_histories).cloned().collect();
+    let shrunk = if nearest.len() < 2 { Vec::new() } else { radius::shrunk(plan, workshop, &nearest)? };
+    Ok(Section { quantiles, all: all.in_utility(), cases, shrunk })
 }
 
 /// Draws histories until each table has enough of its own or the limit is reached. Returns the quantiles of all, and
@@ -146,10 +162,10 @@ fn case(
     request: &EvaluationRequest,
     followers: &[Follower],
     target: f64,
-    mut histories: Vec<Vec<f64>>,
+    histories: &[Vec<f64>],
 ) -> Result<Case, Box<dyn Error>> {
     let found = histories.len();
-    histories.truncate(plan.close_histories);
+    let histories: Vec<Vec<f64>> = histories.iter().take(plan.close_histories).cloned().collect();
     if histories.len() < 2 {
         return Ok(Case { quantile: target, found, report: None });
     }
@@ -157,6 +173,15 @@ fn case(
     let stage = format!("simulating the histories with Q near {target}");
     let (_, report) = workshop.compare(&stage, &evaluation, followers, 0.0)?;
     Ok(Case { quantile: target, found, report: Some(report.in_utility()) })
+}
+
+/// Returns the mean terminal utility of one framework less that of another, on the same returns.
+pub fn mean_gap(report: &EvaluationReport, one: Framework, other: Framework) -> Option<Estimate> {
+    let index = |wanted| report.strategies.iter().position(|strategy| strategy.framework == Some(wanted));
+    let (one, other) = (index(one)?, index(other)?);
+    let gap = |history: &HistoryReport| history.mean_utility[one] - history.mean_utility[other];
+    let gaps: Vec<f64> = report.histories.iter().map(gap).collect();
+    Some(Clustered::new(1, gaps.len(), report.request.level).mean(&gaps))
 }
 
 /// How the gap to the known law closes as histories grow.
@@ -245,13 +270,11 @@ fn study_size(
     };
     let adaptive = sized(&[Framework::KnownLaw, Framework::Adaptive], plan.study_count)?;
     // A design over one input needs few points, and every history has its own.
-    let fixed = sized(&[Framework::KnownLaw, Framework::Static], plan.study_ladder)?;
+    let fixed = sized(&[Framework::KnownLaw, Framework::Static], plan.ladder)?;
     let row = |report: &EvaluationReport, framework: Framework| {
         let sample = Clustered::new(1, report.histories.len(), report.request.level);
         let kind = report.request.problem.utility;
-        let gap = |history: &ballast::control::evaluation::report::HistoryReport| {
-            utility(kind, history.promised[0]) - utility(kind, history.promised[1])
-        };
+        let gap = |history: &HistoryReport| utility(kind, history.promised[0]) - utility(kind, history.promised[1]);
         let value: Vec<f64> = report.histories.iter().map(gap).collect();
         let realised: Vec<f64> =
             report.histories.iter().map(|history| history.mean_utility[0] - history.mean_utility[1]).collect();

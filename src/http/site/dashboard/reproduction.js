@@ -1,7 +1,7 @@
 // The paper's section 3 computed anew: which claims hold and which do not, then each of its tables and figures.
 
 import { lineChart } from "./chart.js";
-import { h, section, table } from "./dom.js";
+import { disclosure, h, section, table } from "./dom.js";
 import { count, minus, percent, percentTick, significant, tick } from "./format.js";
 import { histogram } from "./histogram.js";
 import { PAPER } from "./specification.js";
@@ -9,8 +9,8 @@ import { colourOf, colourOfMix } from "./strategies.js";
 import { interval } from "./verdict.js";
 
 const STATISTICS = [["mean", "Mean"], ["variance", "Variance"], ["quantile_20", "20 % quantile"], ["quantile_90", "90 % quantile"], ["max", "Most"], ["min", "Least"]];
-/** The columns of the paper's tables, with their frameworks and names. */
-const PRINTED = { adaptive: ["adaptive", "Adaptive robust"], known_law: ["known_law", "True law"], static_robust: ["static", "Static robust"] };
+/** The columns of the paper's tables, with their frameworks and names. It names a fourth framework and prints no column of it. */
+const PRINTED = { adaptive: ["adaptive", "Adaptive robust"], known_law: ["known_law", "True law"], static_robust: ["static", "Static robust"], none: ["parametric_static", "Parametric static robust"] };
 const BINS = 30;
 
 const four = (value) => tick(value, 0.0001);
@@ -22,7 +22,7 @@ const find = ({ strategies }, wanted) => strategies.find(({ framework }) => fram
 const number = (name, cell) => ({ name, numeric: true, cell });
 const note = (...words) => h("p", { class: "note" }, words);
 
-export function body({ plan, quick, sample_size, findings, section: found, study, printed }) {
+export function body({ plan, quick, sample_size, findings, section: found, study, changes, guesses, printed }) {
   return [
     h(
       "div",
@@ -30,16 +30,19 @@ export function body({ plan, quick, sample_size, findings, section: found, study
       h("p", {}, `Bayraktar and Chen, Nonparametric Adaptive Robust Control Under Model Uncertainty, section 3: ${plan.horizon} steps, the bank pays 0.002 a step, exponential utility with risk aversion 0.01, wealth 100, a mixture of two normals, ${sample_size} returns of history, alpha 0.1. Ranges hold with 95 % confidence over initial histories.`),
       quick ? h("p", {}, "This is the quick run: tiny designs and few histories. It is too little for a verdict on the paper.") : "",
     ),
-    section("What holds and what does not", h("div", { class: "duo" }, ["agrees", "differs", "undecided"].map((verdict) => verdicts(verdict, findings.filter((finding) => finding.verdict === verdict))))),
+    section("What holds and what does not", h("div", { class: "duo" }, Object.keys(VERDICTS).map((verdict) => verdicts(verdict, findings.filter((finding) => finding.verdict === verdict))))),
     quantiles(found),
     ...found.cases.map((one, index) => whole(one, index, printed[index], found)),
     mixes(found.all, printed),
     coverage(found.all),
+    smaller(found.shrunk),
+    larger(changes),
+    firstGuess(guesses),
     convergence(study),
   ];
 }
 
-const VERDICTS = { agrees: "Agrees", differs: "Differs", undecided: "Not enough to tell" };
+const VERDICTS = { agrees: "Agrees", differs: "Differs", undecided: "Not enough to tell", too_small: "Too small a run to tell" };
 
 const verdicts = (verdict, some) =>
   some.length > 0 &&
@@ -80,7 +83,7 @@ function whole({ quantile, found, report }, index, printed, { quantiles, all }) 
 function statistics(name, paper, own, all, report, everywhere) {
   const columns = [
     { name: "Terminal utility", cell: ([, label]) => label },
-    number("Paper", ([, , k]) => four(paper[k])),
+    number("Paper", ([, , k]) => (paper ? four(paper[k]) : "not printed")),
     number(`Here, ${count(report.histories.length)} such histories of ${count(report.request.paths)} paths`, ([key]) => statistic(own.utility[key])),
     number(`Here, ${count(everywhere.histories.length)} histories of ${count(everywhere.request.paths)} paths`, ([key]) => statistic(all.utility[key])),
   ];
@@ -161,6 +164,87 @@ function coverage(all) {
         { name: "Aimed at", kind: "line", colour: 2, bare: true, values: sizes.map(() => target) },
       ],
     }),
+  );
+}
+
+function smaller(rows) {
+  if (rows.length === 0) return "";
+  const shares = [...new Set(rows.map(({ radius_share }) => radius_share))].sort((one, other) => one - other);
+  const of = (framework) => shares.map((share) => rows.find((row) => row.framework === framework && row.radius_share === share));
+  return section(
+    "Static with a smaller radius",
+    note("The paper finds static trivial and says that Q must be reduced further for static to hold stocks. Here both frameworks use shares of the radius, over histories with Q near the average."),
+    lineChart({
+      title: "Share of histories after which nothing is ever held in stocks",
+      x: { values: shares, label: "Share of the radius", format: percent, tick: percentTick, log: true },
+      y: { format: percent, tick: percentTick, also: [0, 1] },
+      series: ["static", "adaptive"].map((framework) => ({ name: PAPER[framework], kind: "line", joined: true, colour: colourOf(framework), values: of(framework).map(({ trivial }) => trivial.value) })),
+    }),
+    table(
+      "Static and adaptive with shares of the radius",
+      [
+        { name: "Framework", cell: ({ framework }) => PAPER[framework] },
+        number("Share of the radius", ({ radius_share }) => percent(radius_share, 0)),
+        number("Histories that never hold stocks", ({ trivial }) => interval(trivial, percent)),
+        number("First share in stocks", ({ first }) => interval(first, percent)),
+        number("Its deviation", ({ first_variance }) => percent(Math.sqrt(first_variance.value))),
+        number("Mean utility", ({ mean }) => estimate(mean)),
+        number("Variance", ({ variance }) => interval(variance, tenth)),
+      ],
+      rows,
+    ),
+  );
+}
+
+const tenth = (value) => tick(value, 0.1);
+
+function larger(rows) {
+  const change = (name, key, format) => [number(`${name}, average Q`, (row) => format(row[`${key}s`][0].value)), number(`${name}, smallest Q`, (row) => format(row[`${key}s`][1].value)), number(`Change of ${name.toLowerCase()}`, (row) => interval(row[`change_of_${key}`], format))];
+  return section(
+    "Larger t0 and T",
+    note("What a small Q changes for adaptive: histories with an average Q against those with the smallest of all that were drawn. The paper expects the change to be more significant for larger t0 and T."),
+    table(
+      "Adaptive after an average and a small Q",
+      [{ name: "t0, T", cell: (row) => `${row.sample_size}, ${row.horizon}` }, number("Average Q", (row) => four(row.quantiles[0])), number("Smallest Q", (row) => four(row.quantiles[1])), ...change("Mean", "mean", four), ...change("Variance", "variance", tenth)],
+      rows,
+    ),
+  );
+}
+
+/** Names a strategy by its framework and the share of the radius, and gives its colour. */
+const followed = ({ framework, radius_share: share }) => (share !== null && share < 1 ? `${PAPER[framework]}, ${percent(share, 0)} of the radius` : PAPER[framework]);
+const colourOfFollowed = ({ framework, radius_share: share }) => (share !== null && share < 1 ? colourOf({ adaptive: "parametric_adaptive", static: "own_mix" }[framework]) : colourOf(framework));
+
+function firstGuess(rows) {
+  const [sizes, horizons] = ["sample_size", "horizon"].map((key) => [...new Set(rows.map((row) => row[key]))].sort((one, other) => one - other));
+  const some = (guess, size, horizon) => rows.filter((row) => row.guess === guess && row.sample_size === size && row.horizon === horizon);
+  const longest = horizons.at(-1);
+  const held = (guess) =>
+    lineChart({
+      title: `Average share in stocks after ${sizes[0]} returns; guess: ${guess}`,
+      x: { values: Array.from({ length: longest }, (_, k) => k + 1), label: "Period", format: String, whole: true },
+      y: { format: percent, tick: percentTick, also: [0, 1] },
+      series: some(guess, sizes[0], longest).map((row) => ({ name: followed(row), kind: "line", bare: true, colour: colourOfFollowed(row), values: row.held.map(({ mean }) => mean) })),
+    });
+  const results = (guess, size) => {
+    const at = (row, horizon) => some(guess, size, horizon).find((other) => followed(other) === followed(row));
+    const columns = [
+      { name: "Strategy", cell: followed },
+      ...horizons.map((horizon) => number(`Bias, T = ${horizon}`, (row) => interval(at(row, horizon).bias, (value) => tick(value, 0.01)))),
+      number(`Variance, T = ${longest}`, ({ variance }) => tenth(variance.value)),
+      number("20 % quantile", ({ quantile_20: low }) => tick(low.value, 0.01)),
+      number("Off the known share, first period", ({ distance }) => percent(distance[0].value, 0)),
+      number("Last period", ({ distance }) => percent(distance.at(-1).value, 0)),
+    ];
+    return [h("h3", {}, `Guess: ${guess}, ${count(size)} returns`), table(`Guess: ${guess}, ${size} returns`, columns, some(guess, size, longest))];
+  };
+  const guesses = [...new Set(rows.map(({ guess }) => guess))];
+  return section(
+    "A wrong first guess",
+    note("Histories are drawn from a guessed law and the returns after them from the true one, so the initial law is wrong. The bias is mean terminal utility less the known law's on the same returns. The last columns hold at the longest horizon; the last two are the mean distance of the share in stocks from the known law's. first_guess.csv has every interval."),
+    h("div", { class: "duo" }, guesses.map(held)),
+    guesses.map((guess) => results(guess, sizes[0])),
+    sizes.length > 1 && disclosure(`After ${sizes.slice(1).map(count).join(" and ")} returns`, () => h("div", {}, sizes.slice(1).flatMap((size) => guesses.map((guess) => results(guess, size))).flat())),
   );
 }
 
