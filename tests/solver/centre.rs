@@ -11,6 +11,7 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
 use ballast::control::request::centre::CentreSpecification;
+use ballast::control::request::specification::Specification;
 use ballast::numerics::law::empirical::EmpiricalDistribution;
 use ballast::numerics::law::volatility::rescaled;
 use ballast::numerics::machine::streams::stream;
@@ -394,4 +395,14 @@ async fn a_centre_is_refused_by_name_where_it_has_no_meaning() {
         let (status, problem) = app.post(path, body).await;
         assert_eq!((status.as_u16(), problem["field"].as_str()), (422, Some(field)), "{path}: {problem}");
     }
+}
+
+/// The bound behind the rule is of returns within the support, and rescaled ones may leave it.
+#[test]
+fn a_radius_from_the_support_is_refused_for_rescaled_returns() {
+    let mut request = request(1, json!({ "rule": "concentration" }), volatility_scaled(6.0));
+    request["problem"]["framework"] = json!("static");
+    request["problem"]["support"] = json!({ "rule": "between", "min": -1.0, "max": 1.0 });
+    let refused = serde_json::from_value::<Specification>(request).unwrap().completed().unwrap_err();
+    assert_eq!((refused.field.as_str(), refused.value.as_str()), ("problem.centre", "volatility_scaled"));
 }

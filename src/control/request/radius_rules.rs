@@ -98,6 +98,10 @@ pub fn check_radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result
                 "must be between under the radius rule concentration, whose radius follows from the bounds on returns";
             Err(FieldError::new("problem.support", "no bounds", rule))
         }
+        RadiusRule::Concentration { .. } if problem.centre.takes_order() => {
+            let rule = "must be another under the radius rule concentration: rescaled returns may leave the support";
+            Err(FieldError::new("problem.centre", problem.centre.name(), rule))
+        }
         RadiusRule::Concentration { alpha } => within("problem.radius.alpha", alpha, ALPHA.0, ALPHA.1),
         RadiusRule::RootN { kappa } => within("problem.radius.kappa", kappa, KAPPA.0, KAPPA.1),
         RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1),
