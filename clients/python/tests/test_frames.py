@@ -13,7 +13,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import RETURNS, compare, walk
+from conftest import RETURNS, compare, train, walk
 
 from ballast import Ballast, Frontier, Session, frames, plots
 
@@ -156,6 +156,13 @@ def test_an_evaluation_is_a_frame(ballast: Ballast) -> None:
     assert table.loc["All in the bank"].filter(like="difference").isna().all()
 
 
+def test_a_strategy_of_one_s_own_is_walked(ballast: Ballast) -> None:
+    periods = walk(ballast, alpha=[0.5]).periods()
+    length = 8 + len(periods)
+    mine = walk(ballast, alpha=[0.5], weights={"Mine": [0.6] * length}).periods()
+    assert mine["Mine"].tolist() == mine["60/40"].tolist() == periods["60/40"].tolist()
+
+
 def test_a_frontier_is_a_frame(ballast: Ballast) -> None:
     found = tried(ballast)
     report, table = found.report(), found.frame()
@@ -196,6 +203,17 @@ def test_pictures_show_the_frames(ballast: Ballast) -> None:
     heights = np.asarray(band.vertices)[:, 1]
     assert (heights.min(), heights.max()) == (smoothed["lost_low"].min(), smoothed["lost_high"].max())
     assert plots.frontier(found.report(), axes) is axes
+
+    futures = train(ballast, seed=8).policy().futures(20)
+    axes = plots.futures(futures)
+    assert [line.get_label() for line in axes.get_lines()] == [
+        "the worst law every period",
+        "periods like the record's",
+    ]
+    medians = [point["median"] for point in futures["courses"][0]["worst"]]
+    assert list(axes.get_lines()[0].get_ydata()) == medians  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="'stock': must be one of wealth"):
+        plots.futures(futures, "stock")
 
     advice = ballast.advise(RETURNS, kind="log", rate_per_step=0.002)
     seen, worst = plots.worst_case(advice).collections

@@ -360,6 +360,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     own = policy.session(history=RETURNS[:5], kind="simple")
     own.action(mode="resolve")
     own.what_if(radius_scale=0.5)
+    assert own.futures(20)["period"] == 1
     own.observe(log_return=0.01).correct(1, "revised", log_return=0.02)
     own.renew(policy.id)
     own.refresh().history()
@@ -370,6 +371,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert policy.id in [entry["policy"] for entry in ballast.policies()]
     policy.detail()
     assert policy.surface(across="deviation")["step"] == 0
+    assert policy.futures(20)["paths"] == 20
     ballast.import_policy(policy.export())
     with pytest.raises(package.InvalidField, match="declared"):
         policy.decide()

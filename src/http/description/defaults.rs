@@ -83,7 +83,7 @@ mod tests {
             assert_eq!(schemas[name]["properties"][field]["default"], default, "{name}.{field}");
         }
         let rules = schemas["RadiusRule"]["oneOf"].as_array().unwrap();
-        assert_eq!(rules.iter().filter(|rule| rule["properties"]["alpha"]["default"] == 0.1).count(), 4);
+        assert_eq!(rules.iter().filter(|rule| rule["properties"]["alpha"]["default"] == 0.1).count(), 5);
         assert!(documented().iter().all(|(_, defaults)| !defaults.is_empty()));
     }
 }

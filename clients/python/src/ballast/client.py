@@ -361,8 +361,9 @@ class _Ballast:
         periods or one for each. By default it is the column of rates in ``returns``. ``dates`` are texts or dates, one
         for each number, by default those of the index of a pandas object. They show how many periods make a year;
         without dates, give ``periods_per_year``. ``weights`` has strategies of your own by name, each with its share of
-        wealth in every period of the record; those of the first window are not used. The service chooses what you leave out, and the report shows what it
-        chose. Raises ``ValueError`` before anything is queued if ``returns``, ``rate`` or ``dates`` cannot be correct.
+        wealth in every period of the record; those of the first window are not used. The service chooses what you leave
+        out, and the report shows what it chose. Raises ``ValueError`` before anything is queued if ``returns``,
+        ``rate`` or ``dates`` cannot be correct.
         """
         found = await self._one(returns, kind, choices)
         request = {
@@ -415,10 +416,10 @@ class _Ballast:
         ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``. ``rate`` and ``dates`` are as in
         ``backtest``, but dates are required. ``strategies`` has ``"policy"``, the trained policy that a session
         follows, ``"one_step"``, the one-step rule, or both; ``horizon`` and ``count`` are those of a policy.
-        ``windows`` says how many of the last periods each strategy learns from, with ``None`` for all. ``weights`` are as
-        in ``backtest``, with the share of each asset in every period. The service
-        chooses what you leave out, and the report shows what it chose. Raises ``ValueError`` before anything is queued
-        if ``returns``, ``rate`` or ``dates`` cannot be correct.
+        ``windows`` says how many of the last periods each strategy learns from, with ``None`` for all. ``weights`` are
+        as in ``backtest``, with the share of each asset in every period. The service chooses what you leave out, and
+        the report shows what it chose. Raises ``ValueError`` before anything is queued if ``returns``, ``rate`` or
+        ``dates`` cannot be correct.
         """
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
         beside = _beside(found, returns, rate, dates)
