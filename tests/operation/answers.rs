@@ -137,6 +137,7 @@ impl Store {
             }
             "get /policies/{id}" => large(&of_policy),
             "get /policies/{id}/export" => large(&format!("{of_policy}/export")),
+            "get /policies/{id}/futures" => get(&format!("{of_policy}/futures?paths=1000")),
             "get /policies/{id}/surface" => get(&format!("{of_policy}/surface")),
             "post /returns" => (
                 "/returns".into(),
@@ -147,6 +148,7 @@ impl Store {
             ),
             "get /sessions" => large("/sessions?limit=1000&count=care"),
             "post /sessions" => body("/sessions", labelled(json!({ "policy": policy, "rolling": true }))),
+            "get /sessions/{id}/futures" => get(&format!("{of_session}/futures?paths=1000")),
             "get /sessions/{id}" | "delete /sessions/{id}" => get(&of_session),
             "patch /sessions/{id}" => body(&of_session, labels()),
             "delete /policies/{id}" => get(&of_policy),

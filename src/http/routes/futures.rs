@@ -12,7 +12,6 @@ use crate::http::gate::bodies;
 use crate::http::gate::extract::{Id, Parameters};
 use crate::http::problem::ProblemDocument;
 use crate::service::Service;
-use crate::service::process::memory::Large;
 
 /// Query of futures.
 #[derive(Debug, Deserialize)]
@@ -47,7 +46,7 @@ pub async fn of_policy(
     Parameters(ask): Parameters<FuturesQuery>,
 ) -> Result<Response, ProblemDocument> {
     let futures = service.sessions.futures_of_policy(&caller.tenant, &id, ask.paths()?).await?;
-    bodies::written(&service, Large::from(futures)).await
+    bodies::written(&service, futures).await
 }
 
 /// Plays a session on, from its coming period to the last that its policy decides, in the two worlds of a policy's
@@ -68,5 +67,5 @@ pub async fn of_session(
     Parameters(ask): Parameters<FuturesQuery>,
 ) -> Result<Response, ProblemDocument> {
     let futures = service.sessions.futures_of_session(&caller.tenant, &id, ask.paths()?).await?;
-    bodies::written(&service, Large::from(futures)).await
+    bodies::written(&service, futures).await
 }

@@ -8,9 +8,13 @@ use crate::control::policy::futures::investor::InvestorPlayer;
 use crate::control::policy::futures::{Futures, GamePlayer, Opening, PlayedPath, World, checked_paths};
 use crate::control::policy_document::PreparedPolicy;
 use crate::service::error::ServiceError;
+use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
 use crate::service::sessions::session_state::SessionState;
 use crate::store::Tenant;
+
+/// Bytes of a figure of a played path, with its part of the answer.
+const FIGURE_BYTES: usize = 100;
 
 /// Periods that are played under one permit: a robust step of each takes about a millisecond.
 const PERIODS_A_TURN: usize = 100;
@@ -25,7 +29,7 @@ impl Sessions {
         tenant: &Tenant,
         policy: &str,
         paths: Option<usize>,
-    ) -> Result<Futures, ServiceError> {
+    ) -> Result<Large<Futures>, ServiceError> {
         match self.policies.policy(tenant, policy).await? {
             PreparedPolicy::Investor(advisor) => {
                 let start = advisor.initial_state(None, None)?;
@@ -47,7 +51,7 @@ impl Sessions {
         tenant: &Tenant,
         session: &str,
         paths: Option<usize>,
-    ) -> Result<Futures, ServiceError> {
+    ) -> Result<Large<Futures>, ServiceError> {
         let live = self.get(tenant, session).await?;
         live.check_active()?;
         let step = live.step();
@@ -62,7 +66,7 @@ impl Sessions {
                 self.played(tenant, opening, paths).await?
             }
         };
-        futures.period = live.observed + 1;
+        futures.value.period = live.observed + 1;
         Ok(futures)
     }
 
@@ -73,9 +77,10 @@ impl Sessions {
         tenant: &Tenant,
         opening: Opening<P>,
         paths: Option<usize>,
-    ) -> Result<Futures, ServiceError> {
+    ) -> Result<Large<Futures>, ServiceError> {
         let periods = opening.player.horizon() - opening.step;
         let paths = checked_paths(paths, periods)?;
+        let room = self.memory.answers(2 * paths * (periods + 1) * opening.player.names().len() * FIGURE_BYTES).await?;
         let opening = Arc::new(opening);
         let begun = opening.clone();
         let first = Arc::new(self.resolving.run(tenant, move || begun.first()).await??);
@@ -91,6 +96,6 @@ impl Sessions {
             }
         }
         let [(_, worst), (_, record)] = &worlds;
-        Ok(opening.report(&first, worst, record))
+        Ok(Large { value: opening.report(&first, worst, record), room })
     }
 }
