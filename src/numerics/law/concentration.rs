@@ -4,7 +4,7 @@
 //! In both, W1(F_n, F) is the integral of |F_n - F| over the interval, and returns are independent.
 
 /// Returns the radius for values whose weights fall by the factor `retention` from each to the one before: the smaller
-/// bound of two if weights are equal, else [`weighted_radius`].
+/// bound of two if weights are equal, else that of McDiarmid alone.
 ///
 /// Checked by: `no_law_leaves_its_ball_more_often_than_stated`.
 pub fn radius(alpha: f64, effective_size: f64, retention: f64) -> f64 {
