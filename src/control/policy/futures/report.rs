@@ -76,7 +76,7 @@ pub(super) fn in_words(
     let after = if periods == 1 { format!("one {noun}") } else { format!("{periods} {noun}s") };
     let bank = floor.map_or_else(String::new, |floor| format!(", where the bank alone pays {floor:.2}"));
     format!(
-        "If every {noun} brought the worst law that the data then cannot reject, this policy would be worth {worth:.2} for \
+        "If every {noun} brought the worst case that the data then cannot reject, this policy would be worth {worth:.2} for \
          certain after {after}{bank}. On 8 of 10 such paths {name}, {:.2} now, ends between {:.2} and {:.2}. With {noun}s \
          like those of the record it ends between {:.2} and {:.2}.",
         start.median, worst.low, worst.high, record.low, record.high

@@ -8,7 +8,7 @@ import { count, minus, tick } from "./format.js";
 
 /** The worlds, with their names and colours. */
 const WORLDS = [
-  { world: "worst", name: "Worst law every period", colour: 3 },
+  { world: "worst", name: "Worst case every period", colour: 3 },
   { world: "record", name: "Periods like the record\u2019s", colour: 0 },
 ];
 
@@ -23,7 +23,7 @@ export function futuresOf(path, leaving, { format, shown = () => true, x = { lab
     );
     return place;
   };
-  return section("If the worst came every time", disclosure("Play this policy against the worst law of every period", build));
+  return section("If the worst came every time", disclosure("Play this policy against the worst case of every period", build));
 }
 
 /** Draws the course of a figure in both worlds: the median, and the range of the middle eight of ten paths. */
