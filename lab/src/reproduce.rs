@@ -17,6 +17,7 @@ mod findings;
 mod first_guess;
 mod printed;
 mod radius;
+mod requests;
 mod runs;
 
 #[derive(Debug, Clone, Args)]
@@ -167,7 +168,7 @@ struct ReproductionPage<'a> {
 }
 
 fn page(whole: &Reproduction, quick: bool) -> Result<String, report::FileError> {
-    let shown = ReproductionPage { whole, quick, sample_size: runs::SAMPLE_SIZE, printed: &printed::TABLES };
+    let shown = ReproductionPage { whole, quick, sample_size: requests::SAMPLE_SIZE, printed: &printed::TABLES };
     let sentences: Vec<String> = whole.findings.iter().map(ToString::to_string).collect();
     let title = "Nonparametric adaptive robust control: section 3 anew";
     report::html(dashboard::embedded, "reproduction.js", title, &shown, &sentences)

@@ -16,7 +16,7 @@ use ballast::numerics::statistics::summary::{Clustered, Estimate};
 use ballast::report::Csv;
 use serde::Serialize;
 
-use super::{ReproductionPlan, runs};
+use super::{ReproductionPlan, requests};
 use crate::compare::ComparisonRun;
 use crate::{paper, tables};
 
@@ -80,7 +80,7 @@ impl GuessRow {
 pub fn guesses() -> Vec<FirstGuess> {
     let paper = components();
     let shifted = |by: f64| mixture(paper.iter().map(|one| MixtureComponent { mean: one.mean + by, ..*one }).collect());
-    let mean: f64 = paper.iter().map(|one| one.weight * one.mean).sum();
+    let (mean, _) = moments(&paper);
     // Both the variances within components and the distances of their means from the common one grow.
     let widened = |one: &MixtureComponent| MixtureComponent {
         mean: mean + WIDER.sqrt() * (one.mean - mean),
@@ -180,8 +180,8 @@ fn cell(plan: &ReproductionPlan, workshop: &ComparisonRun, cell: &GuessCell) -> 
     // A small radius changes the frameworks with a ball alone. Differences from the known law need it on the same paths.
     followed.extend(follow(plan, workshop, cell, &[KnownLaw, Adaptive, Static], SMALL)?.into_iter().skip(1));
     let known = followed[0].utility.clone();
-    let histories = Clustered::new(1, plan.study_histories, runs::LEVEL);
-    let paths = Clustered::new(plan.study_histories, plan.study_paths, runs::LEVEL);
+    let histories = Clustered::new(1, plan.study_histories, requests::LEVEL);
+    let paths = Clustered::new(plan.study_histories, plan.study_paths, requests::LEVEL);
     let less = |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(one, other)| one - other).collect::<Vec<f64>>();
     let row = |own: &FollowedStrategy| {
         let beside = followed.iter().find(|other| {
@@ -215,15 +215,11 @@ fn follow(
     radius_share: f64,
 ) -> Result<Vec<FollowedStrategy>, Box<dyn Error>> {
     let FirstGuess { name, guessed, truth } = cell.guess;
-    let mut request = runs::request(plan, cell.sample_size, frameworks)?;
-    request.problem.horizon = cell.horizon;
+    let mut request = requests::sized(plan, cell.sample_size, cell.horizon, frameworks, plan.long_count)?;
     request.problem.law = Some(truth.clone());
     request.problem.caution = Some(CautionLevel::Scale(radius_share));
+    request.problem.radius = Some(requests::bridge(plan.long_bridges));
     request.design.sampling_law = Some(blend(guessed, truth));
-    request.design.count = Some(plan.long_count);
-    request.constant_mixes = Some(Vec::new());
-    request.paths = plan.study_paths;
-    request.problem.radius = Some(runs::bridge(plan.long_bridges));
     let law = continuous_law(guessed, &request.problem);
     let histories = (0..plan.study_histories).map(|index| drawn_history(&request, &law, index)).collect();
     let mut evaluation = Evaluation::starting_at(request, histories)?;

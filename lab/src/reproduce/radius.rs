@@ -17,7 +17,8 @@ use ballast::numerics::statistics::summary::{Clustered, Estimate};
 use ballast::report::Csv;
 use serde::Serialize;
 
-use super::{ReproductionPlan, runs};
+use super::ReproductionPlan;
+use super::requests::{self, sized};
 use crate::compare::ComparisonRun;
 use crate::{paper, tables};
 
@@ -53,7 +54,7 @@ pub fn shrunk(
     let mut rows = Vec::new();
     for radius_share in SHARES {
         for (framework, count) in [(Framework::Static, plan.ladder), (Framework::Adaptive, plan.study_count)] {
-            let mut request = sized(plan, runs::SAMPLE_SIZE, plan.horizon, framework, count)?;
+            let mut request = sized(plan, requests::SAMPLE_SIZE, plan.horizon, &[framework], count)?;
             request.problem.caution = Some(CautionLevel::Scale(radius_share));
             let stage = format!("{} with {radius_share} of the radius", framework.name());
             let (outcomes, report) = followed(workshop, &stage, request, histories.to_vec())?;
@@ -70,7 +71,7 @@ fn shrunk_row(radius_share: f64, framework: Framework, outcomes: &Outcomes, repo
         .clone()
         .map(|paths| paths.iter().flat_map(|path| &path.lived).all(|lived| lived.allocation < NOTHING));
     let first: Vec<f64> = of_histories.map(|paths| paths[0].lived[0].allocation).collect();
-    let sample = Clustered::new(1, first.len(), runs::LEVEL);
+    let sample = Clustered::new(1, first.len(), requests::LEVEL);
     let utility = &report.strategies[0].utility;
     ShrunkRow {
         radius_share,
@@ -121,8 +122,8 @@ fn change(
     sample_size: usize,
     horizon: usize,
 ) -> Result<ChangeRow, Box<dyn Error>> {
-    let mut request = sized(plan, sample_size, horizon, Framework::Adaptive, plan.long_count)?;
-    request.problem.radius = Some(runs::bridge(plan.long_bridges));
+    let mut request = sized(plan, sample_size, horizon, &[Framework::Adaptive], plan.long_count)?;
+    request.problem.radius = Some(requests::bridge(plan.long_bridges));
     let stage = format!("histories of {sample_size} returns by their Q");
     let by_quantile = workshop.run(&stage, horizon, |_| by_quantile(plan, &request));
     let count = plan.study_histories;
@@ -171,22 +172,6 @@ fn by_quantile(plan: &ReproductionPlan, request: &EvaluationRequest) -> Vec<(f64
     let mut drawn = pool::map((0..plan.change_drawn).collect(), draw);
     drawn.sort_by(|one, other| one.0.total_cmp(&other.0));
     drawn
-}
-
-/// Returns the request of one framework of the paper's problem, without constant mixes.
-fn sized(
-    plan: &ReproductionPlan,
-    sample_size: usize,
-    horizon: usize,
-    framework: Framework,
-    count: usize,
-) -> Result<EvaluationRequest, Box<dyn Error>> {
-    let mut request = runs::request(plan, sample_size, &[framework])?;
-    request.problem.horizon = horizon;
-    request.design.count = Some(count);
-    request.constant_mixes = Some(Vec::new());
-    request.paths = plan.study_paths;
-    Ok(request)
 }
 
 fn followed(

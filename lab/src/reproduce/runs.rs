@@ -8,9 +8,8 @@ use ballast::control::evaluation::report::{EvaluationReport, HistoryReport};
 use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::problem::utility::utility;
-use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use ballast::control::request::framework::Framework;
-use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::Specification;
 use ballast::control::uncertainty::laws::Laws;
 use ballast::control::uncertainty::radius::RadiusEstimator;
@@ -19,18 +18,14 @@ use ballast::numerics::machine::streams::stream;
 use ballast::numerics::statistics::summary::{Clustered, Estimate};
 use rand::RngExt;
 use serde::Serialize;
-use serde_json::json;
 
 use super::ReproductionPlan;
 use super::printed::{QUANTILES, TABLES};
 use super::radius::{self, ShrunkRow};
+use super::requests::{self, SAMPLE_SIZE};
 use crate::compare::ComparisonRun;
 use crate::paper;
 
-/// Number of returns of a history.
-pub const SAMPLE_SIZE: usize = 20;
-/// Confidence of the intervals.
-pub const LEVEL: f64 = 0.95;
 /// Relative distance within which a history's quantile must lie from a table's for the history to belong to it.
 pub const CLOSENESS: f64 = 0.02;
 /// Number of histories that share bridges; it divides a batch.
@@ -70,30 +65,9 @@ pub struct Section {
     pub shrunk: Vec<ShrunkRow>,
 }
 
-/// Returns the request of the paper's problem, for drawn histories of `sample_size` returns.
-pub fn request(
-    plan: &ReproductionPlan,
-    sample_size: usize,
-    frameworks: &[Framework],
-) -> Result<EvaluationRequest, Box<dyn Error>> {
-    let mut request = json!({
-        "problem": paper::problem(sample_size, plan.horizon),
-        "design": { "sampling_law": paper::mixture(), "count": plan.count },
-        "frameworks": frameworks, "paths": plan.paths,
-        "histories": { "kind": "drawn", "count": plan.histories }, "level": LEVEL,
-    });
-    request["problem"]["radius"] = json!(bridge(plan.bridges));
-    Ok(serde_json::from_value(request)?)
-}
-
-/// Returns the paper's radius rule, whose quantiles come from `paths` simulated bridges.
-pub fn bridge(paths: usize) -> RadiusRule {
-    RadiusRule::Bridge { alpha: 0.1, paths, scale: 1.0, correction: None }
-}
-
 pub fn section(plan: &ReproductionPlan, workshop: &ComparisonRun) -> Result<Section, Box<dyn Error>> {
     use Framework::{Adaptive, KnownLaw, ParametricStatic, Static};
-    let mut request = request(plan, SAMPLE_SIZE, &[Adaptive, KnownLaw, Static, ParametricStatic])?;
+    let mut request = requests::request(plan, SAMPLE_SIZE, &[Adaptive, KnownLaw, Static, ParametricStatic])?;
     let mut evaluation = Evaluation::new(request.clone())?;
     let (quantiles, close) =
         workshop.run("looking for the paper's histories", plan.horizon, |_| seek(plan, &evaluation));
@@ -257,12 +231,8 @@ fn study_size(
     sample_size: usize,
 ) -> Result<Vec<StudyRow>, Box<dyn Error>> {
     let sized = |frameworks: &[Framework], count: usize| -> Result<EvaluationReport, Box<dyn Error>> {
-        let mut request = request(plan, sample_size, frameworks)?;
-        request.design.count = Some(count);
-        request.constant_mixes = Some(Vec::new());
-        request.paths = plan.study_paths;
-        request.histories =
-            ballast::control::request::evaluation::InitialHistories::Drawn { count: plan.study_histories };
+        let mut request = requests::sized(plan, sample_size, plan.horizon, frameworks, count)?;
+        request.histories = InitialHistories::Drawn { count: plan.study_histories };
         let evaluation = Evaluation::new(request)?;
         let followers = workshop.train(&evaluation)?;
         let stage = format!("simulating histories of {sample_size} returns");
