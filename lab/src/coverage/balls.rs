@@ -22,7 +22,7 @@ use ballast::control::request::rules::LOG_RETURN;
 use ballast::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
 use ballast::control::uncertainty::centre::Centre;
 use ballast::numerics::law::ContinuousLaw;
-use ballast::numerics::law::law_distance::{LawDistance, Placed, distance_of_masses};
+use ballast::numerics::law::law_distance::{LawDistance, Placed, distance_of_laws};
 use ballast::numerics::machine::streams::stream;
 use ballast::numerics::search::minimise::maximise_concave_scalar;
 use ballast::numerics::statistics::block_bootstrap::circular_blocks;
@@ -154,11 +154,7 @@ impl<'a> Prepared<'a> {
             let placed: Vec<Placed> = weighed.map(|(atom, mass)| distance.place(atom, mass)).collect();
             return distance.distance(&placed);
         }
-        let own = self.atoms.iter().copied().zip(self.masses.iter().map(|mass| -mass));
-        let mut apart: Vec<(f64, f64)> = weighed.chain(own).collect();
-        apart.sort_by(|left, right| left.0.total_cmp(&right.0));
-        let (atoms, apart): (Vec<f64>, Vec<f64>) = apart.into_iter().unzip();
-        distance_of_masses(&atoms, &apart)
+        distance_of_laws(weighed, self.atoms.iter().copied().zip(self.masses.iter().copied()))
     }
 
     /// Returns the log certainty equivalent of an allocation, relative to the bank.

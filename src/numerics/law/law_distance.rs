@@ -150,11 +150,17 @@ impl LawDistance {
 ///
 /// Checked by: `tests/solver/evaluate.rs::the_share_inside_the_first_ball_is_what_sorted_returns_give`.
 pub fn distance_of_samples(one: &[Placed], other: &[Placed]) -> f64 {
-    let masses = |sample: &[Placed], sign: f64| {
+    let masses = |sample: &[Placed]| {
         let total: f64 = sample.iter().map(|placed| placed.weight).sum();
-        sample.iter().map(|placed| (placed.value, sign * placed.weight / total)).collect::<Vec<_>>()
+        sample.iter().map(|placed| (placed.value, placed.weight / total)).collect::<Vec<_>>()
     };
-    let mut apart = [masses(one, 1.0), masses(other, -1.0)].concat();
+    distance_of_laws(masses(one), masses(other))
+}
+
+/// Returns the distance of two laws, each given by its atoms, ascending, with their masses. Cost O(atoms).
+pub fn distance_of_laws(one: impl IntoIterator<Item = (f64, f64)>, other: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let other = other.into_iter().map(|(atom, mass)| (atom, -mass));
+    let mut apart: Vec<(f64, f64)> = one.into_iter().chain(other).collect();
     // A stable sort merges two ascending parts in one pass.
     apart.sort_by(|left, right| left.0.total_cmp(&right.0));
     let (atoms, apart): (Vec<f64>, Vec<f64>) = apart.into_iter().unzip();
