@@ -252,13 +252,10 @@ impl BacktestArgs {
     }
 
     fn backtest(&self, returns: &Returns) -> Result<Backtest, BacktestError> {
-        let request = self.request(returns)?;
-        let backtest = Backtest::new(request.clone())?;
-        if self.weights.is_empty() {
-            return Ok(backtest);
-        }
+        let request = self.request(returns)?.completed()?;
+        let window = request.window.unwrap_or_default();
         let dates: Vec<String> = returns.rows().iter().map(|row| row.date.clone()).collect();
-        let shares = |own: &OwnStrategy| Ok((own.name.clone(), own.rows(&[], &dates, backtest.walk.window)?.concat()));
+        let shares = |own: &OwnStrategy| Ok((own.name.clone(), own.rows(&[], &dates, window)?.concat()));
         let weights = self.weights.iter().map(shares).collect::<Result<_, BacktestError>>()?;
         Ok(Backtest::new(BacktestRequest { weights, ..request })?)
     }

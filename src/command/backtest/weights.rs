@@ -51,7 +51,7 @@ impl OwnStrategy {
             [] => return Err(fault(format!("{} columns", headers.len()), "must have one of dates and one of shares")),
             names => names.iter().map(place).collect::<Result<_, _>>()?,
         };
-        let mut known = Vec::new();
+        let mut known: Vec<(String, Vec<f64>)> = Vec::new();
         for row in file.records() {
             let row = row.map_err(|error| fault(error.to_string(), "must have as many cells in every line"))?;
             let share = |place: &usize| {
@@ -62,9 +62,11 @@ impl OwnStrategy {
             };
             known.push((row[0].to_owned(), places.iter().map(share).collect::<Result<Vec<f64>, _>>()?));
         }
+        known.sort_by(|one, other| one.0.cmp(&other.0));
         let rows = dates.iter().enumerate().map(|(period, date)| {
-            // A month may be written with its last day.
-            let mut found = known.iter().filter(|(own, _)| own.starts_with(date.as_str()));
+            let from = known.partition_point(|(own, _)| own < date);
+            let alike = known[from..].iter().take_while(|(own, _)| own.starts_with(date.as_str()));
+            let mut found = alike.filter(|(own, _)| is_date(own, date));
             match (found.next(), found.next()) {
                 _ if period < unused => Ok(vec![0.0; places.len()]),
                 (Some((_, shares)), None) => Ok(shares.clone()),
@@ -74,6 +76,11 @@ impl OwnStrategy {
         });
         rows.collect()
     }
+}
+
+/// Returns true if a date of the file is that of a period. A month may be written with its last day.
+fn is_date(own: &str, date: &str) -> bool {
+    own.strip_prefix(date).is_some_and(|day| day.is_empty() || day.starts_with('-'))
 }
 
 #[cfg(test)]
@@ -94,6 +101,12 @@ mod tests {
         let months = ["2008-01", "2008-02", "2008-03"];
         let one = "date,share\n2008-03-31,0.25\n2008-02-29,0.5\n";
         assert_eq!(rows(one, &[], &months, 1).unwrap(), [[0.0], [0.5], [0.25]]);
+        // Periods without dates have numbers.
+        let numbered: String = (1..=12).map(|period| format!("{period},0.{period:02}\n")).collect();
+        let numbers: Vec<String> = (1..=12).map(|period| period.to_string()).collect();
+        let names: Vec<&str> = numbers.iter().map(String::as_str).collect();
+        let found = rows(&format!("period,share\n{numbered}"), &[], &names, 0).unwrap();
+        assert_eq!((found[0][0], found[9][0], found[11][0]), (0.01, 0.1, 0.12));
         let two = "date,bonds,stocks\n2008-01,0.1,0.2\n2008-02,0.3,0.4\n2008-03,0.5,0.5\n";
         assert_eq!(rows(two, &["stocks", "bonds"], &months, 0).unwrap(), [[0.2, 0.1], [0.4, 0.3], [0.5, 0.5]]);
         for (text, columns, named) in [
