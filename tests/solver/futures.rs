@@ -7,7 +7,7 @@ use ballast::control::policy::advisor::Advisor;
 use ballast::control::policy::declared::DeclaredPolicy;
 use ballast::control::policy::futures::declared::DeclaredPlayer;
 use ballast::control::policy::futures::investor::InvestorPlayer;
-use ballast::control::policy::futures::{Futures, GameMove, GamePlayer, Opening, PlayedPath, World};
+use ballast::control::policy::futures::{Futures, GameMove, GamePlayer, Opening, PlayedPath, Promise, World};
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
 use ballast::control::request::assets::AssetsProblem;
@@ -183,12 +183,8 @@ impl GamePlayer for OtherLaws {
         self.own.utility(step, state)
     }
 
-    fn promised(&self, step: usize, state: &State, decision: &GameMove) -> f64 {
-        self.own.promised(step, state, decision)
-    }
-
-    fn stated_error(&self, step: usize, state: &State, promised: f64) -> Option<f64> {
-        self.own.stated_error(step, state, promised)
+    fn promise(&self, step: usize, state: &State, decision: &GameMove) -> Promise {
+        self.own.promise(step, state, decision)
     }
 
     fn certain(&self, utility: f64) -> f64 {

@@ -95,7 +95,8 @@ impl Sessions {
                 played.extend(found?);
             }
         }
-        let [(_, worst), (_, record)] = &worlds;
-        Ok(Large { value: opening.report(&first, worst, record), room })
+        let [(_, worst), (_, record)] = worlds;
+        let report = self.resolving.run(tenant, move || opening.report(&first, &worst, &record)).await?;
+        Ok(Large { value: report, room })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{GameMove, GamePlayer, Opening, World};
+use super::{GameMove, GamePlayer, Opening, Promise, World};
 use crate::control::error::FieldError;
 use crate::control::policy::declared::DeclaredAdvisor;
 use crate::control::problem::controlled::Controlled;
@@ -91,12 +91,10 @@ impl GamePlayer for DeclaredPlayer {
         problem.utility(worth, self.from)
     }
 
-    fn promised(&self, _: usize, _: &ReachedState, decision: &GameMove) -> f64 {
-        decision.worst.as_ref().map_or(f64::NAN, |(_, worth)| *worth)
-    }
-
-    fn stated_error(&self, step: usize, _: &ReachedState, promised: f64) -> Option<f64> {
-        self.advisor.value_error(step, promised * self.discounted).map(|error| error / self.discounted)
+    fn promise(&self, step: usize, _: &ReachedState, decision: &GameMove) -> Promise {
+        let worth = decision.worst.as_ref().map_or(f64::NAN, |(_, utility)| self.certain(*utility));
+        let error = self.advisor.value_error(step, worth * self.discounted);
+        Promise { worth, stated_error: error.map(|error| error / self.discounted) }
     }
 
     fn certain(&self, utility: f64) -> f64 {

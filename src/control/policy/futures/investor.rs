@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{GameMove, GamePlayer, Opening, World};
+use super::{GameMove, GamePlayer, Opening, Promise, World};
 use crate::control::bellman::BellmanStep;
 use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::solution::RobustSolution;
@@ -88,15 +88,13 @@ impl GamePlayer for InvestorPlayer {
         }
     }
 
-    fn promised(&self, step: usize, state: &State, _: &GameMove) -> f64 {
-        self.of_amount(self.advisor.advise(step, state, AdviceMode::Surrogate).certainty_equivalent)
-    }
-
-    fn stated_error(&self, step: usize, state: &State, promised: f64) -> Option<f64> {
+    fn promise(&self, step: usize, state: &State, _: &GameMove) -> Promise {
+        let advice = self.advisor.advise(step, state, AdviceMode::Surrogate);
+        let (worth, deviation) = (advice.certainty_equivalent, advice.surrogate_sd);
         // Without an accuracy nothing is known of the error of later steps.
-        self.advisor.policy().steps()[step].diagnostics.expected_error?;
-        let deviation = self.advisor.advise(step, state, AdviceMode::Surrogate).surrogate_sd;
-        deviation.is_finite().then_some(promised * deviation)
+        let states_it =
+            self.advisor.policy().steps()[step].diagnostics.expected_error.is_some() && deviation.is_finite();
+        Promise { worth, stated_error: states_it.then_some(worth * deviation) }
     }
 
     fn certain(&self, utility: f64) -> f64 {

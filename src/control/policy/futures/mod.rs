@@ -79,12 +79,8 @@ pub trait GamePlayer: Send + Sync {
     /// Returns the utility of what a state is worth: by the surrogate, and at the horizon the utility itself.
     fn utility(&self, step: usize, state: &Self::State) -> f64;
 
-    /// Returns the utility of what an answer says a state is worth, whose decision is known.
-    fn promised(&self, step: usize, state: &Self::State, decision: &GameMove) -> f64;
-
-    /// Returns the standard deviation that an answer states for the worth `promised`, as an amount; `None` if it states
-    /// none.
-    fn stated_error(&self, step: usize, state: &Self::State, promised: f64) -> Option<f64>;
+    /// Returns what an answer says a state is worth, whose decision is known.
+    fn promise(&self, step: usize, state: &Self::State, decision: &GameMove) -> Promise;
 
     /// Returns the amount that has this utility for certain.
     fn certain(&self, utility: f64) -> f64;
@@ -97,6 +93,15 @@ pub struct GameMove {
     pub actions: Vec<f64>,
     /// The worst law, and the mean utility of the next state under it by the surrogate.
     pub worst: Option<(Adversary, f64)>,
+}
+
+/// The worth for certain that an answer gives for a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Promise {
+    /// The worth, an amount.
+    pub worth: f64,
+    /// The standard deviation that the answer states for it, as an amount; `None` if it states none.
+    pub stated_error: Option<f64>,
 }
 
 /// The world that brings the noises.
@@ -170,7 +175,7 @@ impl<P: GamePlayer> Opening<P> {
             };
             let noise = match (world, &decision.worst) {
                 (World::Worst, Some((adversary, _))) => drawn(adversary, &mut generator),
-                _ => drawn_record(&self.record, &mut generator),
+                _ => drawn_by_mass(masses(&self.record), &mut generator),
             };
             state = player.next(step, &state, &decision, noise)?;
             played.utility = player.utility(step + 1, &state);
@@ -185,24 +190,15 @@ impl<P: GamePlayer> Opening<P> {
     /// Checked by: `tests/solver/futures.rs`.
     pub fn report(&self, first: &GameMove, worst: &[PlayedPath], record: &[PlayedPath]) -> Futures {
         let player = &self.player;
-        let certain = |utility: f64| player.certain(utility);
         let controlled: Vec<f64> = worst.iter().map(|path| path.controlled).collect();
-        let promised = certain(player.promised(self.step, &self.start, first));
-        let played = Clustered::new(1, worst.len(), LEVEL).mean(&controlled).mapped(certain);
+        let Promise { worth: promised, stated_error } = player.promise(self.step, &self.start, first);
+        let played = Clustered::new(1, worst.len(), LEVEL).mean(&controlled).mapped(|utility| player.certain(utility));
         let course =
             |(place, name): (usize, String)| Course { name, worst: fan(worst, place), record: fan(record, place) };
         let courses: Vec<Course> = player.names().into_iter().enumerate().map(course).collect();
         let periods = (player.horizon() - self.step, player.noun());
         let sentence = in_words(&courses, (played.value, player.floor()), periods);
-        Futures {
-            period: self.step + 1,
-            paths: worst.len(),
-            promised,
-            stated_error: player.stated_error(self.step, &self.start, promised),
-            played,
-            courses,
-            sentence,
-        }
+        Futures { period: self.step + 1, paths: worst.len(), promised, stated_error, played, courses, sentence }
     }
 }
 
@@ -210,13 +206,7 @@ impl<P: GamePlayer> Opening<P> {
 fn drawn(adversary: &Adversary, generator: &mut impl rand::Rng) -> f64 {
     match adversary {
         Adversary::Transport { support, moves } => {
-            let whole: f64 = moves.iter().map(|moved| moved.mass).sum();
-            let mut left = whole * generator.random::<f64>();
-            let hit = moves.iter().find(|moved| {
-                left -= moved.mass;
-                left < 0.0
-            });
-            hit.or(moves.last()).map_or(f64::NAN, |moved| support[moved.to])
+            drawn_by_mass(moves.iter().map(|moved| (support[moved.to], moved.mass)), generator)
         }
         Adversary::Normal { worst, .. } => {
             worst.mean + worst.variance.sqrt() * generator.sample::<f64, _>(StandardNormal)
@@ -224,12 +214,21 @@ fn drawn(adversary: &Adversary, generator: &mut impl rand::Rng) -> f64 {
     }
 }
 
-/// Draws a noise from the record by its weights.
-fn drawn_record(record: &EmpiricalDistribution, generator: &mut impl rand::Rng) -> f64 {
-    let mut left = record.total_weight() * generator.random::<f64>();
-    let hit = record.atoms().iter().zip(record.weights()).find(|(_, weight)| {
-        left -= **weight;
-        left < 0.0
-    });
-    hit.map(|(atom, _)| *atom).or(record.atoms().last().copied()).unwrap_or(f64::NAN)
+/// Returns the noises of a record with their weights.
+fn masses(record: &EmpiricalDistribution) -> impl Iterator<Item = (f64, f64)> + Clone {
+    record.atoms().iter().copied().zip(record.weights().iter().copied())
+}
+
+/// Draws one of some values, each with a probability in proportion to its mass; NaN if there are none.
+fn drawn_by_mass(values: impl Iterator<Item = (f64, f64)> + Clone, generator: &mut impl rand::Rng) -> f64 {
+    let mut left = generator.random::<f64>() * values.clone().map(|(_, mass)| mass).sum::<f64>();
+    let mut last = f64::NAN;
+    for (value, mass) in values {
+        last = value;
+        left -= mass;
+        if left < 0.0 {
+            break;
+        }
+    }
+    last
 }
