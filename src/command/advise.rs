@@ -8,6 +8,7 @@ use std::fmt;
 use ballast::control::error::FieldError;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::learning::Learning;
+use ballast::control::request::means::MeansRule;
 use ballast::control::request::rules::HISTORY_LENGTH;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advice::advise::Advise;
@@ -15,6 +16,7 @@ use ballast::service::advice::advise_assets::AdviseAssets;
 use clap::Args;
 
 use super::caution::{self, CautionArgs};
+use super::means::means;
 use super::record::{RecordArguments, show};
 use super::returns::{AnyReturns, Returns, SeveralReturns};
 
@@ -32,6 +34,10 @@ pub struct AdviseArgs {
     /// Periods in which the weight of a return halves; all returns weigh the same unless given
     #[arg(long)]
     half_life: Option<f64>,
+    /// Means of several assets: sample, bayes_stein, or the share of the way from each to their average, 0 to 1; sample
+    /// unless given
+    #[arg(long, value_parser = means)]
+    means: Option<MeansRule>,
     /// Wealth now, in any currency
     #[arg(long, default_value_t = 100.0)]
     wealth: f64,
@@ -77,9 +83,10 @@ impl fmt::Display for Holding {
 }
 
 /// The command-line option for each field of the question.
-const OPTIONS: [(&str, &str); 7] = [
+const OPTIONS: [(&str, &str); 8] = [
     ("problem.learning.half_life", "--half-life"),
     ("problem.trading_cost", "--trading-cost"),
+    ("problem.means.intensity", "--means"),
     ("problem.periods_per_year", "--periods-per-year"),
     ("wealth", "--wealth"),
     ("holding", "--holding"),
@@ -96,6 +103,9 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
 
 fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
     let holding = arguments.one_holding()?;
+    if let Some(means) = arguments.means {
+        return Err(FieldError::new("--means", means.name(), "must be left out: there is one asset").into());
+    }
     let answer = |returns: &Returns| arguments.question(returns, holding).answer();
     let named = |error| by_option(error, returns.rows().len(), arguments.record.source());
     let advised = answer(returns).map_err(named)?;
@@ -120,7 +130,11 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
     }
     let problem = arguments.record.assets_problem(returns, |problem| arguments.caution.applied(problem));
     let question = AdviseAssets {
-        problem: AssetsProblem { trading_cost: arguments.trading_cost, ..problem },
+        problem: AssetsProblem {
+            trading_cost: arguments.trading_cost,
+            means: arguments.means.unwrap_or_default(),
+            ..problem
+        },
         wealth: Some(arguments.wealth),
         holdings: Some(arguments.holdings_of(&returns.record.assets)?),
         seed: arguments.seed,

@@ -18,6 +18,7 @@ use ballast::control::request::backtest::{BacktestRequest, Rates, defaults};
 use ballast::control::request::backtest_assets::StrategyFamily;
 use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::centre::CentreSpecification;
+use ballast::control::request::means::MeansRule;
 use ballast::control::request::support::Support;
 use ballast::http::gate::decode;
 use ballast::http::site::dashboard;
@@ -28,6 +29,7 @@ use thiserror::Error;
 
 use self::weights::OwnStrategy;
 use super::caution;
+use super::means::means;
 use super::progress::Parts;
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
 
@@ -76,6 +78,10 @@ pub struct BacktestArgs {
     /// returns unless given
     #[arg(long, value_parser = centre)]
     centre: Option<CentreSpecification>,
+    /// Means of several assets: sample, bayes_stein, or the share of the way from each to their average, 0 to 1; sample
+    /// unless given
+    #[arg(long, value_parser = means)]
+    means: Option<MeansRule>,
     /// Relative risk aversion: 1 is log utility
     #[arg(long, default_value_t = defaults::risk_aversion())]
     risk_aversion: f64,
@@ -214,6 +220,9 @@ impl BacktestArgs {
             let rule = "must be left out, because the file has one asset";
             return Err(refused("--strategies", format!("{} names", self.strategies.len()), rule));
         }
+        if let Some(means) = self.means {
+            return Err(refused("--means", means.name(), "must be left out, because the file has one asset"));
+        }
         let rows = returns.rows();
         Ok(BacktestRequest {
             log_returns: None,
@@ -281,7 +290,7 @@ fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
 impl From<FieldError> for BacktestError {
     fn from(FieldError { field, value, rule }: FieldError) -> Self {
         // Fields of an object belong to its option.
-        let field = if ["centre.", "weights."].iter().any(|object| field.starts_with(object)) {
+        let field = if ["centre.", "means.", "weights."].iter().any(|object| field.starts_with(object)) {
             field.replacen('.', " ", 1)
         } else {
             field

@@ -11,6 +11,7 @@ pub mod frontier;
 pub mod healthcheck;
 mod host;
 pub mod keys;
+mod means;
 mod moments;
 mod progress;
 mod record;

@@ -18,7 +18,7 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 40] = [
+const DOCUMENTS: [&str; 41] = [
     "control/assets/advice.rs",
     "control/evaluation/assets/report.rs",
     "control/evaluation/backtest_report.rs",
@@ -51,6 +51,7 @@ const DOCUMENTS: [&str; 40] = [
     "control/request/framework.rs",
     "control/request/frontier.rs",
     "control/request/learning.rs",
+    "control/request/means.rs",
     "control/request/radius_rule.rs",
     "control/request/sampling_law.rs",
     "control/request/fund.rs",

@@ -338,6 +338,14 @@ async fn what_is_wrong_with_several_assets_is_named() {
     };
     let cases: Vec<(Value, &str)> = vec![
         (with(&|p| p["assets"] = json!(["stocks"])), "problem.assets"),
+        (with(&|p| p["means"] = json!({ "kind": "shrunk", "intensity": 1.5 })), "problem.means.intensity"),
+        (
+            with(&|p| {
+                p["means"] = json!({ "kind": "bayes_stein" });
+                p["support"] = json!({ "rule": "between", "min": -0.9, "max": 0.9 });
+            }),
+            "problem.means.kind",
+        ),
         (with(&|p| p["assets"] = json!(["stocks", "stocks"])), "problem.assets[1]"),
         (with(&|p| p["assets"] = json!(["stocks", ""])), "problem.assets[1]"),
         (with(&|p| p["history"][3] = json!([0.01])), "problem.history[3]"),

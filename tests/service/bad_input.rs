@@ -189,7 +189,18 @@ fn the_list_covers_every_field() {
     // What was found of levels is checked as a whole.
     let found =
         ["balanced", "bold", "cautious", "paper", "premium_seen", "premiums", "regrets", "spared", "standard_error"];
-    let elsewhere = ["kind", "rule", "assets", "composition", "fund", "given", "ground_norm", "radius_factor"];
+    let elsewhere = [
+        "kind",
+        "rule",
+        "assets",
+        "composition",
+        "fund",
+        "given",
+        "ground_norm",
+        "radius_factor",
+        "means",
+        "intensity",
+    ];
     let missing: Vec<_> = described_fields()
         .into_iter()
         .filter(|field| !walked.contains(field) && ![&elsewhere[..], &found].concat().contains(&field.as_str()))
@@ -650,6 +661,7 @@ fn faulty_walks_of_assets() -> Vec<(&'static str, Value, &'static str)> {
     let gap: Vec<String> = quarters(13).into_iter().filter(|date| date != "2001-04").collect();
     vec![
         ("assets", json!(["stocks"]), "assets"),
+        ("means", json!({ "kind": "shrunk", "intensity": -0.1 }), "means.intensity"),
         ("assets", json!(["stocks", "stocks"]), "assets[1]"),
         ("assets", json!(["stocks", ""]), "assets[1]"),
         ("assets", json!(["stocks", "bonds", "gold"]), "simple_returns[0]"),

@@ -45,7 +45,7 @@ fn training(record: &AssetsRecord) -> Value {
         "problem": {
             "assets": record.assets, "history": record.rows[..WINDOW], "rate_per_step": record.bank[WINDOW - 1],
             "horizon": EVERY + 1, "trading_cost": COST, "contributions": CONTRIBUTION,
-            "radius": { "rule": "bridge", "alpha": 0.5 }, "caution": "bold",
+            "radius": { "rule": "bridge", "alpha": 0.5 }, "caution": "bold", "means": { "kind": "bayes_stein" },
         },
         "design": { "count": 10 },
         "seed": 5,

@@ -10,6 +10,7 @@ use ballast::control::progress::Watch;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::fund::{CompositionRule, FundSpecification};
 use ballast::control::request::learning::Learning;
+use ballast::control::request::means::MeansRule;
 use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::numerics::bridge::funds::fund_returns;
@@ -22,6 +23,7 @@ over_either_store!(
     what_several_assets_report_is_put_right_and_renewed,
     a_session_of_several_assets_is_renewed_by_itself,
     a_fund_that_does_not_vary_is_not_taken,
+    shrunk_means_are_lived_as_the_library_has_them,
     money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_formula,
     a_policy_of_several_assets_goes_out_and_comes_in_as_it_was,
 );
@@ -43,6 +45,52 @@ fn listed(value: &Value) -> Vec<f64> {
     ["stocks", "bonds", "gold"].map(|name| number(&value[name])).to_vec()
 }
 
+/// Trains at half-shrunk means, lives two periods and a restart, and renews onto the policy of the means as seen: each
+/// advice is that of a fund with the means of its policy.
+async fn shrunk_means_are_lived_as_the_library_has_them(mut app: App) {
+    let shrinks = |means: Value| {
+        let mut request = request(3);
+        request["problem"]["means"] = means;
+        request
+    };
+    let half = shrinks(json!({ "kind": "shrunk", "intensity": 0.5 }));
+    app.train(&half).await;
+    app.open_with(json!({ "wealth": 1000.0 })).await;
+    let advised = |advisor: &Advisor, means: MeansRule| {
+        let mut fund = Fund::at(rows(), means, vec![0.0; 3]);
+        let state = fund.renew(rows(), Learning::default(), 1000.0, 0.0);
+        let (state, solution) = fund.compose(advisor, advisor.specification().fund.as_deref().unwrap(), 0, &state);
+        (advisor.advise(0, &state, AdviceMode::Surrogate).allocation, solution.unwrap().allocation)
+    };
+    let (advisor, means) = (trained(&half), MeansRule::Shrunk { intensity: 0.5 });
+    let (total, one_step) = advised(&advisor, means);
+    let action = app.action().await.1;
+    assert_eq!((number(&action["total"]), listed(&action["one_step"]["allocation"])), (total, one_step.clone()));
+    let (plain, plainly) = advised(&advisor, MeansRule::default());
+    assert!(plain != total && plainly != one_step, "shrinking changes the advice");
+    let worst = &action["one_step"]["worst_means"]["stocks"];
+    let column: Vec<f64> = rows().iter().map(|row| row[0]).collect();
+    assert!((number(&worst["seen"]) - sum(&column) / column.len() as f64).abs() < 1e-15, "{worst}");
+    assert!(number(&worst["believed"]) > number(&worst["worst"]), "{worst}");
+
+    for period in 1..=2 {
+        let report = json!({ "log_returns": { "stocks": 0.02, "bonds": -0.005, "gold": 0.03 } });
+        let (status, observed) = app.report(period, report).await;
+        assert_eq!(status, 200, "{observed}");
+    }
+    let action = app.action().await.1;
+    app.restart().await;
+    assert_eq!(app.action().await.1, action);
+    app.train(&shrinks(json!({ "kind": "sample" }))).await;
+    let renewal = json!({ "renewal": 1, "policy": app.policy });
+    let (status, renewed) = app.post(&format!("/sessions/{}/renewals", app.session), &renewal).await;
+    assert_eq!(status, 200, "{renewed}");
+    let action = app.action().await.1;
+    assert!(action["one_step"]["worst_means"]["stocks"].get("believed").is_none(), "{action}");
+    app.restart().await;
+    assert_eq!(app.action().await.1, action);
+}
+
 fn sum(values: &[f64]) -> f64 {
     values.iter().sum()
 }
@@ -58,7 +106,7 @@ async fn a_session_of_several_assets_is_lived_by_their_names(mut app: App) {
     let factor = of.radius_factor.unwrap();
     assert_eq!(number(&policy["specification"]["fund"]["radius_factor"]), factor);
     assert!(factor > 1.0);
-    let mut fund = Fund::at(rows(), vec![0.2, 0.1, 0.0]);
+    let mut fund = Fund::at(rows(), MeansRule::default(), vec![0.2, 0.1, 0.0]);
     let start = State::new(&fund.returns(), 1000.0, Learning::default()).unwrap().with_holding(0.3).unwrap();
     let (state, _) = fund.compose(&advisor, of, 0, &start);
     let expected = advisor.advise(0, &state, AdviceMode::Surrogate);
@@ -406,7 +454,7 @@ fn identical_columns_are_one_asset() {
     single["design"]["initial_laws"] = json!("resampled");
     let asset = crate::support::policies::advisor(single);
     let rows: Vec<Vec<f64>> = one.iter().map(|&z| vec![z; 3]).collect();
-    let mut held = Fund::at(rows, vec![0.0; 3]);
+    let mut held = Fund::at(rows, MeansRule::default(), vec![0.0; 3]);
     let state = State::new(&held.returns(), 100.0, Learning::default()).unwrap();
     let of = fund.specification().fund.clone().unwrap();
     let (state, _) = held.compose(&fund, &of, 0, &state);
@@ -430,17 +478,17 @@ fn what_is_traded_within_the_fund_is_paid_for() {
     let (advisor, dear) = (costly(1e-6), costly(0.1));
     let of = advisor.specification().fund.as_deref().unwrap();
     let state = |fund: &Fund| State::new(&fund.returns(), 100.0, Learning::default()).unwrap();
-    let mut held = Fund::at(rows(), vec![0.0; 3]);
+    let mut held = Fund::at(rows(), MeansRule::default(), vec![0.0; 3]);
     let even = held.composition.clone();
     held.compose(&advisor, of, 0, &state(&held));
     assert_ne!(held.composition, even);
-    let mut stayed = Fund::at(rows(), even.iter().map(|share| 0.5 * share).collect());
+    let mut stayed = Fund::at(rows(), MeansRule::default(), even.iter().map(|share| 0.5 * share).collect());
     let start = state(&stayed).with_holding(0.5).unwrap();
     stayed.compose(&dear, dear.specification().fund.as_deref().unwrap(), 0, &start);
     assert_eq!(stayed.composition, even);
 
     // From a half in stocks to a half in bonds all of it is sold and bought: of 100 there are 99.8 left at 0.2 %.
-    let stocks = Fund::at(rows(), vec![0.5, 0.0, 0.0]);
+    let stocks = Fund::at(rows(), MeansRule::default(), vec![0.5, 0.0, 0.0]);
     let executed = [0.0, 0.5, 0.0];
     let dynamics = Dynamics::plain(0.0, 0.002);
     let realised = PeriodOutcome { traded: Some(stocks.traded(&executed)), ..PeriodOutcome::of(0.5, 0.0) };
@@ -512,7 +560,7 @@ fn the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard() {
         composition,
         ..advisor.specification().fund.as_deref().unwrap().clone()
     };
-    let mut start = Fund::at(rows, vec![0.0; 3]);
+    let mut start = Fund::at(rows, MeansRule::default(), vec![0.0; 3]);
     start.composition = vec![0.5, 0.5, 0.0];
     let state = State::new(&start.returns(), 100.0, Learning::default()).unwrap();
     let promise = advisor.advise(0, &state, AdviceMode::Resolve);

@@ -25,6 +25,7 @@ mod futures;
 mod gp;
 mod hostile_declarations;
 mod learning;
+mod means;
 mod parametric;
 mod sensitivity;
 mod streams;

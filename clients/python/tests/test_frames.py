@@ -88,7 +88,11 @@ def test_allocations_have_the_names_of_the_assets(ballast: Ballast) -> None:
     assert one["allocation"] >= 0.0 and "certainty_equivalent" in one and "without_crash" not in one
     means = frames.worst_means(advised)
     assert means.loc["stocks", "seen"] == pytest.approx(table["stocks"].mean())
-    assert (means["worst"] <= means["seen"] + 1e-12).all()
+    assert (means["worst"] <= means["seen"] + 1e-12).all() and list(means) == ["seen", "worst"]
+    equal = ballast.advise_assets(table, kind="log", rate_per_step=0.0, means={"kind": "shrunk", "intensity": 1.0})
+    believed = frames.worst_means(equal)["believed"]
+    simple = np.exp(table - table.mean() + believed).mean()
+    assert simple["stocks"] == pytest.approx(simple["bonds"], rel=1e-12)
 
 
 def test_a_session_of_several_assets_is_a_frame_for_each_figure(ballast: Ballast, session: Session) -> None:

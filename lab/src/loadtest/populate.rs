@@ -114,7 +114,7 @@ impl LoadFixture {
             account: Some(InitialAccount { wealth: problem.initial_wealth, holding: 0.0 }),
             initial_history: problem.history.clone(),
             horizon: self.horizon,
-            plan_json: SessionPlan::once(problem).json()?,
+            plan_json: SessionPlan::once(&self.specification).json()?,
             due: None,
             assets: 0,
             created_ms: 0,

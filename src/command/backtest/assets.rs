@@ -72,6 +72,7 @@ impl BacktestArgs {
             count: self.count,
             alpha,
             support: self.support.unwrap_or(usual.support),
+            means: self.means.unwrap_or_default(),
             risk_aversion: self.risk_aversion,
             trading_cost: self.trading_cost()?,
             seed: self.seed,

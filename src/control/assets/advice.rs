@@ -67,6 +67,9 @@ pub struct OneStep {
 pub struct WorstMean {
     /// The mean of the log-returns seen.
     pub seen: f64,
+    /// The mean under the law at the centre of the ball, if `problem.means` moves it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub believed: Option<f64>,
     /// The mean under the worst law.
     pub worst: f64,
 }
@@ -76,11 +79,19 @@ pub fn named<T: Copy>(names: &[String], values: &[T]) -> BTreeMap<String, T> {
     names.iter().cloned().zip(values.iter().copied()).collect()
 }
 
-/// Returns the mean of each asset, as seen and under the law behind the bound of a solution.
-pub fn worst_means(names: &[String], rows: &[Vec<f64>], solution: &AssetsSolution) -> BTreeMap<String, WorstMean> {
+/// Returns the mean of each asset: over the log-returns `seen`, over those of the law at the centre, and under the law
+/// behind the bound of a solution.
+pub fn worst_means(
+    names: &[String],
+    seen: &[Vec<f64>],
+    centre: &[Vec<f64>],
+    solution: &AssetsSolution,
+) -> BTreeMap<String, WorstMean> {
+    let mean = |rows: &[Vec<f64>], asset: usize| rows.iter().map(|row| row[asset]).sum::<f64>() / rows.len() as f64;
     let of = |(asset, (name, moved)): (usize, (&String, &f64))| {
-        let seen = rows.iter().map(|row| row[asset]).sum::<f64>() / rows.len() as f64;
-        (name.clone(), WorstMean { seen, worst: seen + moved })
+        let (seen, believed) = (mean(seen, asset), mean(centre, asset));
+        let worst = WorstMean { seen, believed: (believed != seen).then_some(believed), worst: believed + moved };
+        (name.clone(), worst)
     };
     names.iter().zip(&solution.mean_moves).enumerate().map(of).collect()
 }

@@ -103,7 +103,8 @@ impl AssetsAdvice {
         holdings: &[f64],
         fund: &OnePeriod,
     ) -> Result<(Self, Option<WhyNothing>), FieldError> {
-        let (rows, names, cost) = (&problem.history, &problem.assets, problem.trading_cost);
+        let (seen, names, cost) = (&problem.history, &problem.assets, problem.trading_cost);
+        let rows = &problem.means.applied(seen);
         let ball = FundsBall::of(problem, fund)?;
         let fund = fund.problem();
         let radius = ball.radius_at(fund.caution_level().unwrap_or(CautionLevel::Paper));
@@ -132,7 +133,7 @@ impl AssetsAdvice {
             radius,
             radius_factor: ball.radius_factor,
             sample_size: rows.len(),
-            worst_means: worst_means(names, rows, &solution),
+            worst_means: worst_means(names, seen, rows, &solution),
             levels: followed.map(|(followed, found)| LevelsAdvised::of(found, followed, level)),
             caution: Caution::short_record(rows.len(), rows.len() as f64)
                 .into_iter()

@@ -12,6 +12,8 @@
 //! it is spread equally over the periods left. One period's part must exceed the extra cost of the trade compared with
 //! staying.
 
+use std::borrow::Cow;
+
 use super::advice::{OneStep, named, worst_means};
 use super::advising::floors;
 use super::composition::accept_if_no_worse;
@@ -24,6 +26,7 @@ use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
+use crate::control::request::means::MeansRule;
 use crate::control::request::specification::{DesignSpecification, InitialLaws, Specification, SurrogateSpecification};
 use crate::numerics::bridge::funds::fund_returns;
 use crate::numerics::transport::water_filling::inverse_volatility;
@@ -33,6 +36,8 @@ use crate::numerics::transport::water_filling::inverse_volatility;
 pub struct Fund {
     /// Log-returns that make up the law, date by date.
     pub rows: Vec<Vec<f64>>,
+    /// The means that the law gives the assets.
+    pub means: MeansRule,
     /// Share of each asset in the fund; they sum to 1.
     pub composition: Vec<f64>,
     /// The composition held before this one was chosen.
@@ -57,6 +62,7 @@ impl AssetsProblem {
             assets: self.assets.clone(),
             ground_norm: self.ground_norm,
             composition: self.composition.clone(),
+            means: self.means,
             radius_factor: None,
             history: self.history.clone(),
         };
@@ -72,6 +78,7 @@ impl AssetsProblem {
             assets: fund.assets.clone(),
             ground_norm: fund.ground_norm,
             composition: fund.composition.clone(),
+            means: fund.means,
             horizon: Some(problem.horizon),
             rate_per_step: problem.rate_per_step,
             periods_per_year: problem.periods_per_year,
@@ -96,9 +103,9 @@ fn total(shares: &[f64]) -> f64 {
 
 impl Fund {
     /// Starts a fund from the returns `rows` and these shares of wealth, before a composition is chosen.
-    pub fn at(rows: Vec<Vec<f64>>, holdings: Vec<f64>) -> Self {
+    pub fn at(rows: Vec<Vec<f64>>, means: MeansRule, holdings: Vec<f64>) -> Self {
         let composition = inverse_volatility(&rows);
-        Fund { rows, before: composition.clone(), composition, holdings }
+        Fund { rows, means, before: composition.clone(), composition, holdings }
     }
 
     /// Returns the state at the start of a session with this fund; `wealth` defaults to that of the policy.
@@ -109,7 +116,8 @@ impl Fund {
         advisor.initial_state(Some(&self.returns()), wealth)?.with_holding(self.holding())
     }
 
-    /// Makes `rows` the returns of the law, as a renewal does, and returns the state with the law of the fund.
+    /// Makes `rows` with these means the returns of the law, as a renewal does, and returns the state with the law of the
+    /// fund.
     pub fn renew(&mut self, rows: Vec<Vec<f64>>, learning: Learning, wealth: f64, holding: f64) -> State {
         self.rows = rows;
         State { law: learning.law(&self.returns()), wealth, holding }
@@ -125,9 +133,14 @@ impl Fund {
         self.before = std::mem::replace(&mut self.composition, composition);
     }
 
+    /// Returns the log-returns with the means that the law gives the assets.
+    fn centred(&self) -> Cow<'_, [Vec<f64>]> {
+        self.means.applied(&self.rows)
+    }
+
     /// Returns the log-returns of the fund, date by date.
     pub fn returns(&self) -> Vec<f64> {
-        fund_returns(&self.rows, &self.composition)
+        fund_returns(&self.centred(), &self.composition)
     }
 
     /// Returns the log-return of the holdings in a period of these log-returns, if the shares of wealth are `executed`.
@@ -178,7 +191,7 @@ impl Fund {
 
     /// Returns the state of a fund with another composition.
     fn state(&self, advisor: &Advisor, state: &State, composition: &[f64]) -> State {
-        let returns = fund_returns(&self.rows, composition);
+        let returns = fund_returns(&self.centred(), composition);
         let law = advisor.specification().problem.learning.law(&returns);
         State { wealth: state.wealth, holding: state.holding, law }
     }
@@ -206,11 +219,12 @@ impl Fund {
         let problem = &advisor.specification().problem;
         let mut solution = None;
         let proposed = fund.composition.composition(&self.rows, || {
+            let rows = self.centred();
             let even = self.state(advisor, state, &inverse_volatility(&self.rows));
             let law = ReturnScenarios {
-                returns: &self.rows,
+                returns: &rows,
                 radius: advisor.radius(&even),
-                floors: floors(problem.support_rule(), &self.rows),
+                floors: floors(problem.support_rule(), &rows),
             };
             let utility = RelativeUtility::new(problem.utility, state.wealth * (1.0 + problem.rate_per_step));
             let [lowest, highest] = problem.action_interval;
@@ -222,7 +236,7 @@ impl Fund {
         let left = (problem.horizon - step) as f64;
         // The policy's value of the fund, and that value less the cost of the trade.
         let value = |composition: &[f64]| {
-            let varies = problem.learning.check_deviation("fund", &fund_returns(&self.rows, composition)).is_ok();
+            let varies = problem.learning.check_deviation("fund", &fund_returns(&self.centred(), composition)).is_ok();
             let (total, gain) = advisor.surrogate(step, &self.state(advisor, state, composition));
             let executed: Vec<f64> = composition.iter().map(|share| total * share).collect();
             let net = gain / left - problem.trading_cost * self.traded(&executed);
@@ -239,7 +253,7 @@ impl Fund {
             allocation: named(names, &solution.allocation),
             certainty_equivalent: floor * solution.value.exp(),
             bound: floor * solution.bound.exp(),
-            worst_means: worst_means(names, &self.rows, solution),
+            worst_means: worst_means(names, &self.rows, &self.centred(), solution),
             caution: solution.caution().into_iter().collect(),
         }
     }

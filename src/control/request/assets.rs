@@ -12,6 +12,7 @@ use super::contributions::Contributions;
 use super::framework::Framework;
 use super::fund::{CompositionRule, FundSpecification, GroundNorm};
 use super::learning::Learning;
+use super::means::MeansRule;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::{InitialLaws, ProblemSpecification, Specification, UtilitySpecification, defaults};
@@ -43,6 +44,9 @@ pub struct AssetsProblem {
     /// How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`.
     #[serde(default)]
     pub composition: CompositionRule,
+    /// The means of the assets under the law at the centre. Default: `sample`.
+    #[serde(default)]
+    pub means: MeansRule,
     /// Number of allocation decisions that a policy is trained for, 1 to 520. Default: 10 for a policy; always 1 for
     /// advice.
     #[serde(default)]
@@ -112,7 +116,7 @@ impl AssetsProblem {
 
     /// Returns the investor's problem with the inverse-volatility fund as the only asset.
     pub fn of_fund(&self) -> ProblemSpecification {
-        let returns = fund_returns(&self.history, &inverse_volatility(&self.history));
+        let returns = fund_returns(&self.means.applied(&self.history), &inverse_volatility(&self.history));
         ProblemSpecification {
             horizon: self.horizon.unwrap_or_else(defaults::horizon),
             periods_per_year: self.periods_per_year,
@@ -140,6 +144,7 @@ impl AssetsProblem {
             let allowed = "must be bridge, calibrated, root_n or fixed: what the rule promises holds for one asset";
             return Err(FieldError::new("problem.radius.rule", rule.name(), allowed));
         }
+        self.means.check("problem.means", self.support)?;
         check_composition("problem.composition", &self.composition, self.assets.len())
     }
 }
@@ -276,11 +281,12 @@ pub(super) fn check_fund(
     }
     check_names("fund.assets", &fund.assets)?;
     check_rows("fund.history", &fund.history, &fund.assets, problem.support)?;
+    fund.means.check("fund.means", problem.support)?;
     check_composition("fund.composition", &fund.composition, fund.assets.len())?;
     if let Some(factor) = fund.radius_factor {
         rules::within("fund.radius_factor", factor, FACTOR.0, FACTOR.1)?;
     }
-    let returns = fund_returns(&fund.history, &inverse_volatility(&fund.history));
+    let returns = fund_returns(&fund.means.applied(&fund.history), &inverse_volatility(&fund.history));
     let differs = |(index, (given, of_fund)): (usize, (&f64, f64))| {
         ((given - of_fund).abs() > ROUNDING).then_some((index, *given, of_fund))
     };

@@ -12,6 +12,7 @@ use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, fre
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::declared_backtest::DeclaredBacktest;
 use super::frequency::Frequency;
+use super::means::MeansRule;
 use super::own_weights::OwnAssetsWeights;
 use super::radius_rules::ALPHA;
 use super::rules::{
@@ -90,6 +91,9 @@ pub struct AssetsBacktestRequest {
     /// The log-returns of each asset that the adversary may use. Default: `worst_seen`.
     #[serde(default)]
     pub support: Support,
+    /// The means that policies and the one-step problem give the assets. Default: `sample`.
+    #[serde(default)]
+    pub means: MeansRule,
     /// Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3.
     #[serde(default = "defaults::risk_aversion")]
     pub risk_aversion: f64,

@@ -13,6 +13,7 @@ use super::contributions::Contributions;
 use super::framework::Framework;
 use super::fund::{CompositionRule, GroundNorm};
 use super::learning::Learning;
+use super::means::MeansRule;
 use super::rules;
 use super::specification::{ProblemSpecification, Specification, default_seed};
 use super::support::Interval;
@@ -239,6 +240,7 @@ pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSp
     AssetsProblem {
         assets,
         ground_norm: GroundNorm::default(),
+        means: MeansRule::default(),
         composition: CompositionRule::default(),
         horizon: None,
         trading_cost: 0.0,

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::means::MeansRule;
 use crate::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
 
 /// The data of a policy for several assets, beside the problem of their fund. The shares of that fund are proportional
@@ -16,6 +17,9 @@ pub struct FundSpecification {
     pub ground_norm: GroundNorm,
     /// How the shares of the assets within the risky holdings are chosen.
     pub composition: CompositionRule,
+    /// The means of the assets under the law at the centre. Default: `sample`.
+    #[serde(default)]
+    pub means: MeansRule,
     /// Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100; the
     /// training finds it if it is left out. The scale of the problem's radius includes it. It is 1 under rules that depend
     /// on the sample size alone.

@@ -22,6 +22,8 @@ pub mod frequency;
 pub mod frontier;
 pub mod fund;
 pub mod learning;
+pub mod means;
+pub mod means_rules;
 pub mod own_weights;
 pub mod radius_rule;
 pub mod radius_rules;

@@ -5,7 +5,8 @@ use utoipa::ToSchema;
 
 use super::contributions::Contributions;
 use super::learning::Learning;
-use super::specification::ProblemSpecification;
+use super::means::MeansRule;
+use super::specification::Specification;
 use crate::control::problem::dynamics::Dynamics;
 
 /// Rate, cost and flows of the periods in which a policy is followed, and how its law is learned.
@@ -24,11 +25,15 @@ pub struct Terms {
     /// Number of periods in a year. A period reported without a date gets the next due date, found from this number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<f64>,
+    /// The means that the law of several assets has.
+    #[serde(default, skip_serializing_if = "MeansRule::is_sample")]
+    pub means: MeansRule,
 }
 
 impl Terms {
     /// Returns the terms of a completed specification.
-    pub fn of(problem: &ProblemSpecification) -> Self {
+    pub fn of(specification: &Specification) -> Self {
+        let problem = &specification.problem;
         Terms {
             horizon: problem.horizon,
             rate_per_step: problem.rate_per_step,
@@ -36,6 +41,7 @@ impl Terms {
             contributions: problem.contributions.clone(),
             learning: problem.learning,
             periods_per_year: problem.periods_per_year,
+            means: specification.means(),
         }
     }
 

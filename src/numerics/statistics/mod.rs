@@ -3,5 +3,6 @@
 pub mod block_bootstrap;
 pub mod exchangeability;
 pub mod long_run_mean;
+pub mod shrinkage;
 pub mod summary;
 pub mod tail_index;

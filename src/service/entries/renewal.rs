@@ -151,7 +151,7 @@ struct Continuation {
 
 /// Returns the state and the terms that the renewal of an investor's session leads to.
 fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -> Result<Continuation, ServiceError> {
-    plan.renew.map_or(Ok(()), |every| every.check(&Terms::of(&onto.specification().problem)))?;
+    plan.renew.map_or(Ok(()), |every| every.check(&Terms::of(onto.specification())))?;
     let (observed, window) = (periods.all.len(), renew.window);
     let Replay { standing, mut record, .. } = periods.replay()?;
     let change = AssetChange::new((standing.names(), assets_of(onto)), renew, observed)?;
@@ -161,7 +161,7 @@ fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -
     let dates = record.last(window).len() / record.assets();
     let terms = plan.terms(onto, dates, observed);
     let terms = terms.map_err(|rule| FieldError::new("policy", &renew.policy, rule))?;
-    let standing = standing.account()?.renewed(&record, window, terms.learning, change.as_ref())?;
+    let standing = standing.account()?.renewed(&record, window, &terms, change.as_ref())?;
     accepts(onto, record.last(window), &standing)?;
     let standing = SessionState::Account(standing.into());
     Ok(Continuation { standing, terms, next: NextPolicy::Account(change) })

@@ -10,6 +10,7 @@ use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::request::assets::check_rows;
 use crate::control::request::learning::Learning;
 use crate::control::request::rules;
+use crate::control::request::terms::Terms;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
@@ -69,7 +70,7 @@ impl AccountState {
         let columns = plan.assets.as_ref().map_or(1, |assets| assets.names.len());
         let record = SessionRecord::new(columns, row.initial_history.clone());
         let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed }| {
-            Assets::with_composition(names, record.rows_of(record.all()), composed).map(Box::new)
+            Assets::with_composition(names, record.rows_of(record.all()), plan.terms.means, composed).map(Box::new)
         });
         let assets = assets.transpose()?;
         let learning = plan.terms.learning;
@@ -97,8 +98,8 @@ impl AccountState {
         }
     }
 
-    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns, and with
-    /// changed assets if there is a change.
+    /// Returns the state with the law of the last `window` dates of `record`, which holds all observed returns, as the
+    /// next policy with these terms learns it, and with changed assets if there is a change.
     ///
     /// # Errors
     /// They are not a valid history.
@@ -106,7 +107,7 @@ impl AccountState {
         &self,
         record: &SessionRecord,
         window: Option<usize>,
-        learning: Learning,
+        terms: &Terms,
         change: Option<&AssetChange>,
     ) -> Result<Self, FieldError> {
         let last = record.last(window);
@@ -125,9 +126,10 @@ impl AccountState {
                     **assets = change.assets(assets, &rows);
                     holding = assets.fund.holding();
                 }
-                assets.fund.renew(rows, learning, self.state.wealth, holding)
+                assets.fund.means = terms.means;
+                assets.fund.renew(rows, terms.learning, self.state.wealth, holding)
             }
-            None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
+            None => State::new(last, self.state.wealth, terms.learning)?.with_holding(self.state.holding)?,
         };
         let seen = match &assets {
             Some(_) => Some(Assets::means(&record.rows_of(record.all()))),

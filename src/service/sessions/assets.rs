@@ -13,6 +13,7 @@ use crate::control::policy::advisor::Advisor;
 use crate::control::problem::state::State;
 use crate::control::request::by_name::by_name;
 use crate::control::request::fund::CompositionRule;
+use crate::control::request::means::MeansRule;
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::numerics::law::empirical::EmpiricalDistribution;
@@ -76,13 +77,14 @@ pub struct ObservedAssets {
 }
 
 impl Assets {
-    /// Builds the assets from the observed `rows` and the shares of wealth held, 0 by default.
+    /// Builds the assets from the observed `rows`, whose law has these means, and the shares of wealth held, 0 by default.
     ///
     /// # Errors
     /// The holdings are not shares of wealth in these assets.
     pub(in crate::service) fn at(
         names: &[String],
         rows: Vec<Vec<f64>>,
+        means: MeansRule,
         holdings: Option<&BTreeMap<String, f64>>,
     ) -> Result<Self, FieldError> {
         let holdings = match holdings {
@@ -90,7 +92,7 @@ impl Assets {
             None => vec![0.0; names.len()],
         };
         let (prices, waiting) = (vec![None; names.len()], vec![false; names.len()]);
-        let (fund, leaving) = (Fund::at(rows, holdings), BTreeMap::new());
+        let (fund, leaving) = (Fund::at(rows, means, holdings), BTreeMap::new());
         Ok(Assets { names: names.into(), fund, one_step: None, prices, waiting, leaving })
     }
 
@@ -101,9 +103,10 @@ impl Assets {
     pub(in crate::service) fn with_composition(
         names: &[String],
         rows: Vec<Vec<f64>>,
+        means: MeansRule,
         reported: &Composition,
     ) -> Result<Self, FieldError> {
-        let mut assets = Assets::at(names, rows, Some(&reported.holdings))?;
+        let mut assets = Assets::at(names, rows, means, Some(&reported.holdings))?;
         assets.take(reported)?;
         Ok(assets)
     }

@@ -123,7 +123,7 @@ impl SessionStart {
         };
         check_rows("history", &rows, &fund.assets, None)?;
         let history = rows.concat();
-        let assets = Assets::at(&fund.assets, rows, holdings.as_ref())?;
+        let assets = Assets::at(&fund.assets, rows, fund.means, holdings.as_ref())?;
         let state = assets.fund.begin(advisor, wealth)?;
         Ok(Beginning { state, assets: Some(assets.into()), history })
     }

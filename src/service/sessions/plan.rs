@@ -13,8 +13,9 @@ use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::by_name::distinct;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::declared::DeclaredProblem;
+use crate::control::request::means::MeansRule;
 use crate::control::request::rules;
-use crate::control::request::specification::ProblemSpecification;
+use crate::control::request::specification::Specification;
 use crate::control::request::terms::Terms;
 use crate::service::error::ServiceError;
 use crate::service::sessions::assets::{Composition, PlannedAssets};
@@ -183,6 +184,7 @@ pub(in crate::service) fn terms_of(problem: &DeclaredProblem) -> Terms {
         trading_cost: 0.0,
         contributions: Contributions::default(),
         periods_per_year: None,
+        means: MeansRule::default(),
     }
 }
 
@@ -194,8 +196,8 @@ pub(in crate::service) fn check_window(field: &str, window: Option<usize>) -> Re
 
 impl SessionPlan {
     /// Returns the plan of a session that runs through the horizon of a policy and ends.
-    pub fn once(problem: &ProblemSpecification) -> Self {
-        SessionPlan { terms: Terms::of(problem), renew: None, rolling: false, assets: None, problem: None }
+    pub fn once(specification: &Specification) -> Self {
+        SessionPlan { terms: Terms::of(specification), renew: None, rolling: false, assets: None, problem: None }
     }
 
     /// Returns the plan of a session that starts a policy from `returns` returns.
@@ -203,13 +205,13 @@ impl SessionPlan {
     /// # Errors
     /// Sessions with this policy cannot renew themselves as `renew` says, or cannot roll.
     pub fn new(advisor: &Advisor, returns: usize, renew: Option<Renewing>, rolling: bool) -> Result<Self, FieldError> {
-        let problem = &advisor.specification().problem;
-        renew.map_or(Ok(()), |renew| renew.check(&Terms::of(problem)))?;
+        let specification = advisor.specification();
+        renew.map_or(Ok(()), |renew| renew.check(&Terms::of(specification)))?;
         if rolling && renew.is_some() {
             let rule = "must be false if renew is given: a rolling session continues without renewals";
             return Err(FieldError::new("rolling", rolling, rule));
         }
-        let plan = SessionPlan { renew, rolling, ..SessionPlan::once(problem) };
+        let plan = SessionPlan { renew, rolling, ..SessionPlan::once(specification) };
         let terms = plan.terms(advisor, returns, 0).map_err(|rule| FieldError::new("rolling", rolling, rule))?;
         Ok(SessionPlan { terms, ..plan })
     }
@@ -238,7 +240,7 @@ impl SessionPlan {
         returns: usize,
         observed: usize,
     ) -> Result<Terms, String> {
-        let (terms, left) = (Terms::of(&advisor.specification().problem), MOST_PERIODS.saturating_sub(observed));
+        let (terms, left) = (Terms::of(advisor.specification()), MOST_PERIODS.saturating_sub(observed));
         let horizon = if self.rolling { left } else { terms.horizon };
         if horizon > left || left == 0 {
             return Err(format!(

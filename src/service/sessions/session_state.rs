@@ -271,7 +271,7 @@ impl SessionState {
             }
             (_, next) => {
                 let change = next.asset_change();
-                let renewed = self.account()?.renewed(record, tenure.window, tenure.terms.learning, change)?;
+                let renewed = self.account()?.renewed(record, tenure.window, &tenure.terms, change)?;
                 Ok(SessionState::Account(renewed.into()))
             }
         }

@@ -192,9 +192,11 @@ def figures(advised: Explained | wire.AssetsAdvised | wire.AssetsAction | wire.A
 def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
     """Returns the mean log-return of each asset, as ``seen`` and under the ``worst`` law, with a row for each asset.
 
+    If ``problem.means`` moves the means, the column ``believed`` has those at the centre of the ball.
     Raises ``ImportError`` without pandas.
     """
-    return require_pandas().DataFrame.from_dict(advised["worst_means"], orient="index", columns=["seen", "worst"])
+    table = require_pandas().DataFrame.from_dict(advised["worst_means"], orient="index")
+    return table[[name for name in ("seen", "believed", "worst") if name in table]]
 
 
 def sessions(entries: Iterable[wire.SessionEntry]) -> pd.DataFrame:

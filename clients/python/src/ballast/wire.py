@@ -809,6 +809,33 @@ class MapPoint(TypedDict):
     """The reason why nothing can be decided here: an action that the solver tries may lead a state out of its range."""
 
 
+class MeansRule1(TypedDict):
+    """The means of the returns seen."""
+
+    kind: Literal["sample"]
+
+
+class MeansRule2(TypedDict):
+    """The means moved towards their average over the assets."""
+
+    intensity: float
+    """Share of the way, 0 to 1. At 0 the means are those of `sample`, at 1 all assets have one mean."""
+    kind: Literal["shrunk"]
+
+
+class MeansRule3(TypedDict):
+    """The means moved towards that of the minimum-variance portfolio, as far as the record's noise says (Jorion 1986)."""
+
+    kind: Literal["bayes_stein"]
+
+
+MeansRule: TypeAlias = MeansRule1 | MeansRule2 | MeansRule3
+"""
+The means of the assets under the law at the centre of the ball. Shrunk means move every return of an asset by the same
+factor; risks and correlations stay. They are found anew with each return. Default: `sample`.
+"""
+
+
 class MixtureComponent(TypedDict):
     """One normal law of a mixture, of log-returns per step."""
 
@@ -1424,6 +1451,8 @@ class Terms(TypedDict):
     """Weights of older returns in the learned law."""
     periods_per_year: NotRequired[float | None]
     """Number of periods in a year. A period reported without a date gets the next due date, found from this number."""
+    means: NotRequired[MeansRule]
+    """The means that the law of several assets has."""
 
 
 class TextPosition(TypedDict):
@@ -1638,6 +1667,8 @@ class WorstMean(TypedDict):
 
     seen: float
     """The mean of the log-returns seen."""
+    believed: NotRequired[float | None]
+    """The mean under the law at the centre of the ball, if `problem.means` moves it."""
     worst: float
     """The mean under the worst law."""
 
@@ -1745,6 +1776,8 @@ class AssetsBacktestRequest(TypedDict):
     """Miscoverage of the radius, 0.001 to 0.999: the probability that the ball misses the true law. Default 0.1."""
     support: NotRequired[Support]
     """The log-returns of each asset that the adversary may use. Default: `worst_seen`."""
+    means: NotRequired[MeansRule]
+    """The means that policies and the one-step problem give the assets. Default: `sample`."""
     risk_aversion: NotRequired[float]
     """Relative risk aversion, 1 to 100: log utility at 1, power utility above. Default 3."""
     trading_cost: NotRequired[float]
@@ -1782,6 +1815,8 @@ class AssetsChoices(TypedDict):
     """Miscoverage of the radius."""
     support: Support
     """The log-returns of each asset that the adversary may use."""
+    means: MeansRule
+    """The means that policies and the one-step problem give the assets."""
     risk_aversion: float
     """Relative risk aversion."""
     trading_cost: float
@@ -1815,6 +1850,8 @@ class AssetsProblem(TypedDict):
     """Distance that sets the adversary's cost of moving a law. Default: `scaled_one`."""
     composition: NotRequired[CompositionRule]
     """How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`."""
+    means: NotRequired[MeansRule]
+    """The means of the assets under the law at the centre. Default: `sample`."""
     horizon: NotRequired[int | None]
     """
     Number of allocation decisions that a policy is trained for, 1 to 520. Default: 10 for a policy; always 1 for
@@ -2180,6 +2217,8 @@ class FundSpecification(TypedDict):
     """Distance that sets the adversary's cost of moving a law."""
     composition: CompositionRule
     """How the shares of the assets within the risky holdings are chosen."""
+    means: NotRequired[MeansRule]
+    """The means of the assets under the law at the centre. Default: `sample`."""
     radius_factor: NotRequired[float | None]
     """
     Factor on the radius of one fund, so that the laws of all funds lie in their balls at once, 1 to 100; the

@@ -6,6 +6,7 @@ use crate::control::request::assets::DATES;
 use crate::control::request::backtest::{defaults, usual_window};
 use crate::control::request::backtest_assets::{MOST_FAMILIES, MOST_WINDOWS, StrategyFamily};
 use crate::control::request::caution_rules::check_support;
+use crate::control::request::means::MeansRule;
 use crate::control::request::radius_rules::ALPHA;
 use crate::control::request::rules::{COUNT, HORIZON, RELATIVE_RISK_AVERSION, TRADING_COST, whole, within};
 use crate::control::request::specification::default_seed;
@@ -33,6 +34,7 @@ impl AssetsChoices {
             alpha: 0.1,
             risk_aversion: defaults::risk_aversion(),
             support: Support::default(),
+            means: MeansRule::default(),
             trading_cost: 0.0,
             seed: default_seed(),
         }
@@ -54,6 +56,7 @@ impl AssetsChoices {
         self.check_families()?;
         within("alpha", self.alpha, ALPHA.0, ALPHA.1)?;
         check_support("support", self.support)?;
+        self.means.check("means", Some(self.support))?;
         within("risk_aversion", self.risk_aversion, RELATIVE_RISK_AVERSION.0, RELATIVE_RISK_AVERSION.1)?;
         within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)
     }

@@ -36,6 +36,7 @@ impl AssetsBacktest {
             count: request.count,
             alpha: request.alpha.unwrap_or(usual.alpha),
             support: request.support,
+            means: request.means,
             risk_aversion: request.risk_aversion,
             trading_cost: request.trading_cost,
             seed: request.seed,
@@ -98,11 +99,12 @@ impl AssetsBacktest {
     /// decided. Fields are named as in `request`.
     pub fn warnings(&self, request: &AssetsBacktestRequest) -> Vec<Warning> {
         let rows = self.record.known(self.first, self.choices.windows.iter().copied().flatten().max());
+        let returns = fund_returns(&self.choices.means.applied(rows), &inverse_volatility(rows));
         let problem = ProblemSpecification {
             periods_per_year: Some(self.record.periods_per_year as f64),
             trading_cost: self.choices.trading_cost,
             support: Some(self.choices.support),
-            ..ProblemSpecification::of(fund_returns(rows, &inverse_volatility(rows)), self.record.bank[self.first - 1])
+            ..ProblemSpecification::of(returns, self.record.bank[self.first - 1])
         };
         problem.warnings().into_iter().map(|warning| warning.of_walk(request.returns().0)).collect()
     }

@@ -294,7 +294,8 @@ impl AssetsBacktest {
             support: Some(self.choices.support),
             ..ProblemSpecification::of(Vec::new(), self.record.bank[period - 1])
         };
-        asked_of(self.record.assets.clone(), self.record.known(period, window).to_vec(), &specification)
+        let rows = self.record.known(period, window).to_vec();
+        AssetsProblem { means: self.choices.means, ..asked_of(self.record.assets.clone(), rows, &specification) }
     }
 
     /// Returns the decisions of a strategy in every period, given the balls.

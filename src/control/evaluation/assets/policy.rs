@@ -96,7 +96,8 @@ impl WalkState {
     /// Returns the fund and the state, renewed with the returns `rows`.
     fn renewed(&self, rows: Vec<Vec<f64>>) -> (Fund, State) {
         let (composition, holdings) = (self.composition.clone(), self.holdings.clone());
-        let mut fund = Fund { rows: Vec::new(), before: composition.clone(), composition, holdings };
+        let means = self.specification.means();
+        let mut fund = Fund { rows: Vec::new(), means, before: composition.clone(), composition, holdings };
         let state = fund.renew(rows, self.specification.problem.learning, self.wealth, self.holding);
         (fund, state)
     }
@@ -155,12 +156,12 @@ impl FundWalk<'_> {
         let (mut fund, mut state) = match before {
             Some(before) => before.renewed(rows),
             None => {
-                let fund = Fund::at(rows, vec![0.0; self.record.assets.len()]);
+                let fund = Fund::at(rows, advisor.specification().means(), vec![0.0; self.record.assets.len()]);
                 let state = fund.begin(&advisor, None)?;
                 (fund, state)
             }
         };
-        let terms = Terms::of(&advisor.specification().problem);
+        let terms = Terms::of(advisor.specification());
         let mut periods = Vec::with_capacity(self.every);
         (state, _) = fund.enter(&advisor, 0, &state);
         for (step, period) in (start..self.record.rows.len().min(start + self.every)).enumerate() {

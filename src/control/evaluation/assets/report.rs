@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 use crate::control::evaluation::names::StrategyKind;
 use crate::control::request::backtest_assets::StrategyFamily;
+use crate::control::request::means::MeansRule;
 use crate::control::request::support::Support;
 
 /// Name and version of the report format.
@@ -60,6 +61,8 @@ pub struct AssetsChoices {
     pub alpha: f64,
     /// The log-returns of each asset that the adversary may use.
     pub support: Support,
+    /// The means that policies and the one-step problem give the assets.
+    pub means: MeansRule,
     /// Relative risk aversion.
     pub risk_aversion: f64,
     /// Share of each trade that is lost.

@@ -188,6 +188,7 @@ fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: Groun
     let rate = backtest.record.bank[period - 1];
     // Under power and log utility the solution does not depend on wealth.
     let utility = RelativeUtility::new(backtest.utility(), 1.0 + rate);
+    let rows = &backtest.choices.means.applied(rows);
     let law = ReturnScenarios { returns: rows, radius, floors: floors(backtest.choices.support, rows) };
     PortfolioStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
 }

@@ -71,15 +71,17 @@ export function severalWorst(action, assets, { unit }) {
   );
   if (!means) return section("How it was found", quant);
   const row = (name) => {
-    const [seen, worst] = [means[name].seen, means[name].worst].map(Math.expm1);
-    return { name, seen, worst, less: seen - worst };
+    const { seen, believed = seen, worst } = means[name];
+    const of = [seen, believed, worst].map(Math.expm1);
+    return { name, seen: of[0], believed: of[1], worst: of[2], less: of[1] - of[2] };
   };
   const rows = assets.map(row);
+  const moved = rows.some(({ seen, believed }) => believed !== seen);
   const most = rows.reduce((one, other) => (other.less > one.less ? other : one));
   const words =
     most.less < 5e-6
       ? `It assumes that every asset keeps its average return, because no allowed market is worse for this advice.`
-      : `It takes most from ${most.name}: ${percent(most.worst, 2)} a ${unit} on average, compared with ${percent(most.seen, 2)} seen.`;
+      : `It takes most from ${most.name}: ${percent(most.worst, 2)} a ${unit} on average, compared with ${percent(most.believed, 2)} ${moved ? "believed" : "seen"}.`;
   const number = (name, cell) => ({ name, numeric: true, cell });
   return section(
     "The worst market it guards against",
@@ -87,6 +89,7 @@ export function severalWorst(action, assets, { unit }) {
     table(`Average return of each asset a ${unit}`, [
       { name: "Asset", cell: ({ name }) => name },
       number(`Seen, a ${unit}`, ({ seen }) => percent(seen, 2)),
+      ...(moved ? [number("Believed", ({ believed }) => percent(believed, 2))] : []),
       number("In the worst market", ({ worst }) => percent(worst, 2)),
       number("Lower by", ({ less }) => points(less, 3)),
     ], rows),
