@@ -67,6 +67,11 @@ export async function browser() {
       // The example's returns stand elsewhere.
       return existsSync(path) ? route.fulfill({ path }) : route.continue();
     });
+    await context.route(({ pathname }) => pathname === "/", async (route) => {
+      if (route.request().resourceType() !== "document") return route.continue();
+      const response = await route.fetch().catch(() => null);
+      return response ? route.fulfill({ response, path: join(FILES, "index.html") }) : route.abort();
+    });
     await context.route(/\/docs(\/(page\.css|start\.js))?$/, (route) => {
       const name = basename(new URL(route.request().url()).pathname);
       return route.fulfill({ path: join(FILES, "../../description/documentation", name === "docs" ? "index.html" : name) });

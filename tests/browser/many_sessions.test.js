@@ -76,3 +76,12 @@ test("those that need care are counted among all, and shown without a wait", asy
   assert.equal(await page.getByText(/^overdue by \d+ days$/).count(), 100);
   assert.equal(await page.getByLabel("State").inputValue(), "care");
 });
+
+test("the trades of ten thousand are added up when somebody asks for it", async (t) => {
+  await visitQuiet(page, `${ballast.url}/#/`);
+  assert.doesNotMatch(await page.locator(".work").innerText(), /have a trade/);
+  const start = performance.now();
+  await page.getByRole("button", { name: "Add up the trades of the 10,000 sessions" }).click();
+  await page.locator(".work").getByText(/of 10,000 sessions? (has|have) a trade/).waitFor({ timeout: 300_000 });
+  t.diagnostic(`${(performance.now() - start).toFixed(0)} ms`);
+});

@@ -31,6 +31,7 @@ macro_rules! assets {
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     let files = assets! {
         "index.html": HTML,
+        "lists.css": STYLE,
         "print.css": STYLE,
         "style.css": STYLE,
         "icon.svg": "image/svg+xml",
@@ -114,11 +115,13 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "surface_view.js": SCRIPT,
         "ticking.js": SCRIPT,
         "track.js": SCRIPT,
+        "trades.js": SCRIPT,
         "train.js": SCRIPT,
         "train_fields.js": SCRIPT,
         "verdict.js": SCRIPT,
         "welcome.js": SCRIPT,
         "what_if.js": SCRIPT,
+        "worklist.js": SCRIPT,
         "worst_market.js": SCRIPT,
     };
     let example: (_, _, &[u8]) =

@@ -3,6 +3,8 @@
 import { standing } from "./flows.js";
 
 const DAY = 86_400_000;
+/** A day less than so many days away needs no year. */
+const NEAR = 200;
 /** The units of time: the least and most days between two last days, and the unit's months or days. */
 const UNITS = [
   { unit: "day", least: 1, most: 4 },
@@ -37,7 +39,10 @@ export function dayOf(text) {
 /** Formats a day as 30 Sep 2008. */
 export const day = (date) => told(parsed(date), { day: "numeric", month: "short", year: "numeric" });
 
-/** Formats a day as above, a month as September 2008, and leaves a year as it is. */
+/** Formats a day as above, without the year if it is near `today`. */
+export const nearDay = (date, today) => (Math.abs(parsed(date) - parsed(today)) < NEAR * DAY ? told(parsed(date), { day: "numeric", month: "short" }) : day(date));
+
+/** Formats a day with its year, a month as September 2008, and leaves a year as it is. */
 export const dated = (date) => (date.length > 7 ? day(date) : date.length > 4 ? told(parsed(`${date}-01`), { month: "long", year: "numeric" }) : date);
 
 /** Returns the time some months later; the last day of a month stays the last day. */

@@ -1,26 +1,27 @@
-// Sessions, one investor a row: their state, their last report, what to do for them now, and what needs care.
+// Sessions, one investor a row: who must trade and how much, whose report is due, who needs care, and where each stands.
 
 import { advised } from "./advised.js";
 import { get, remove } from "./api.js";
 import { care, careWords } from "./care.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
-import { allocation, count, counted, moment, percent, wealth } from "./format.js";
+import { allocation, count, counted, percent, wealth } from "./format.js";
 import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
-import { day } from "./periods.js";
+import { isoDay, nearDay } from "./periods.js";
 import { ticking } from "./ticking.js";
+import { smallestField } from "./trades.js";
 import { welcome } from "./welcome.js";
+import { isWork, orderOf, WORK, worklist } from "./worklist.js";
 
 /** Rows shown at a time: the advice of each needs a call of its own. */
 const PAGE = 50;
 /** Pause in typing before the search is sent, in milliseconds. */
 const PAUSE = 250;
-const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Market has changed", ending: "Completed, or in the last period" };
-const NEWEST = "-created";
+const STATES = { "": "All", ...WORK, active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Market has changed", ending: "Completed, or in the last period" };
 /** The parameters of the address, with their defaults. */
-const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
+const CHOICES = { search: "", tag: "", state: "", sort: "" };
 
 export async function view(_, leaving) {
   const said = new URLSearchParams(location.hash.split("?")[1] ?? "");
@@ -28,9 +29,9 @@ export async function view(_, leaving) {
   if (!(chosen.state in STATES)) chosen.state = "";
   const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
   const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
-  const first = await read(chosen, null, leaving);
+  const first = isWork(chosen) ? null : await read(chosen, null, leaving);
   const title = "Overview";
-  if (isEmpty(first) && !filtered(chosen)) {
+  if (first && isEmpty(first) && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
     const who = await holderWords(leaving);
     if (policies.length > 0) return { title, actions, body: [lead(), who] };
@@ -68,10 +69,22 @@ async function readTotal({ sort, ...which }, signal) {
   return total;
 }
 
+/** `first` is the first page, or null if the page must read all sessions for it. */
 function overview(chosen, first, leaving) {
   const needs = h("p", { class: "note needs", role: "status" });
   const beyond = h("span", {});
-  const advice = advised(leaving, () => tellBeyond());
+  const smallest = smallestField(() => {
+    advice.redraw();
+    work.redraw();
+    if (isWork(chosen)) ask({});
+  });
+  const advice = advised(leaving, { changed: () => tellBeyond(), smallest: smallest.smallest });
+  const choose = (state) => {
+    control.value = state;
+    ask({ state, sort: "" });
+  };
+  const progress = (done, all) => (line.textContent = done < all ? `Reading the advice: ${count(done)} of ${count(all)}\u2026` : "");
+  const work = worklist({ advice, size: PAGE, show: choose, progress, leaving });
   const ticks = ticking("sessions", {
     links: [
       { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` },
@@ -96,7 +109,7 @@ function overview(chosen, first, leaving) {
     const kept = holder.contains(document.activeElement);
     const down = column !== "name";
     const [one, other] = down ? [`-${column}`, column] : [column, `-${column}`];
-    ask({ sort: chosen.sort === one ? other : one }).then(() => kept && holder.querySelector("[aria-sort] button")?.focus());
+    ask({ sort: orderOf(chosen) === one ? other : one }).then(() => kept && holder.querySelector("[aria-sort] button")?.focus());
   };
   const add = (now) => {
     page = now;
@@ -104,7 +117,8 @@ function overview(chosen, first, leaving) {
     damaged.push(...page.damaged);
     for (const tag of page.sessions.flatMap(({ tags }) => tags)) known.add(tag);
     tags.replaceChildren(...[...known].sort().map((value) => h("option", { value })));
-    holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: chosen.sort, sort }) : h("p", {}, "No session matches."));
+    holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: orderOf(chosen), sort }) : h("p", {}, "No session matches."));
+    ticks.drawn(entries.map(({ session }) => session));
     more.hidden = page.next === null;
     tellBeyond();
     tellTotal();
@@ -113,16 +127,21 @@ function overview(chosen, first, leaving) {
     if (total !== null) more.hidden ||= entries.length + damaged.length >= total;
     line.textContent = `${count(entries.length)} of ${total === null ? "\u2026" : count(total)}${damagedWords(damaged)}`;
   };
-  const countAll = (signal) =>
-    readTotal(chosen, signal).then((all) => {
-      total = all;
+  const countAll = async (signal) => {
+    try {
+      total = page.total ?? (await readTotal(chosen, signal));
       tellTotal();
-    }, failed);
+    } catch (error) {
+      failed(error);
+    }
+  };
   const failed = (error) => {
     if (error.name !== "AbortError") line.textContent = error.message;
   };
+  const source = (after, signal) => (isWork(chosen) ? work.page(chosen, after, signal) : read(chosen, after, signal));
   /** Reads the list again with the changed parameters. */
   const ask = async (changed) => {
+    const isOther = ["search", "tag"].some((name) => name in changed);
     Object.assign(chosen, changed);
     asking.abort();
     asking = new AbortController();
@@ -130,11 +149,12 @@ function overview(chosen, first, leaving) {
     const query = new URLSearchParams(differing(chosen)).toString();
     history.replaceState(null, "", query ? `#/sessions?${query}` : "#/");
     try {
-      const now = await read(chosen, null, signal);
+      const now = await source(null, signal);
       advice.forget();
       [entries, damaged, total] = [[], [], null];
       add(now);
-      countAll(signal);
+      await countAll(signal);
+      if (isOther) await lookAll();
     } catch (error) {
       failed(error);
     }
@@ -142,31 +162,37 @@ function overview(chosen, first, leaving) {
   more.addEventListener("click", async () => {
     more.disabled = true;
     const { signal } = asking;
-    await read(chosen, page.next, signal).then((now) => signal.aborted || add(now), failed);
+    await source(page.next, signal).then((now) => signal.aborted || add(now), failed);
     more.disabled = false;
   });
-  add(first);
-  const { element, state } = filters(chosen, ask, tags);
-  const show = () => {
-    state.control.value = "care";
-    ask({ state: "care" });
-  };
+  const { element, state: { control } } = filters(chosen, ask, tags, smallest);
   const judge = (counts) => {
-    const all = counts.any > 0 ? h("button", { class: "link", onclick: show }, "Show them") : "";
+    const all = counts.any > 0 ? h("button", { class: "link", onclick: () => choose("care") }, "Show them") : "";
     needs.replaceChildren(careWords(counts), " ", all, " ", beyond);
   };
   // The counts of all sessions, independent of the search.
-  const judgeAll = () => get("/sessions?limit=1&count=care", leaving).then(({ care }) => judge(care), failed);
-  // One after the other, because each reads all sessions.
-  countAll(asking.signal).then(judgeAll);
-  return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
+  const judgeAll = async () => {
+    const { care } = await get("/sessions?limit=1&count=care", leaving);
+    judge(care);
+    await lookAll();
+  };
+  const lookAll = async () => work.look(chosen, await readTotal({ ...chosen, state: "" }, leaving));
+  const start = async () => {
+    if (first) add(first);
+    else await ask({});
+    // One after the other, because each reads all sessions.
+    if (first) await countAll(asking.signal);
+    await judgeAll();
+  };
+  start().catch(failed);
+  return [work.element, needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
 }
 
 /** Says how many of the sessions shown are outside what their policies were trained for; the list itself does not contain that. */
 const outsideWords = (count) => (count === 0 ? "" : `Of the sessions shown, ${counted(count, "is", "are")} in a situation that the policy was not trained for.`);
 
 /** Returns `{element, state}`: the search and the filters, and the filter by state; calls `ask(changed)` at every change. */
-function filters(chosen, ask, tags) {
+function filters(chosen, ask, tags, smallest) {
   let typing = 0;
   const soon = (changed) => {
     clearTimeout(typing);
@@ -177,7 +203,7 @@ function filters(chosen, ask, tags) {
   const tag = input({ ...text, name: "tag", label: "Tag", value: chosen.tag, placeholder: "All", list: "tags", changed: (text) => soon({ tag: text.trim() }) });
   const state = select({ name: "state", label: "State", choices: STATES, changed: (value) => ask({ state: value }) });
   state.control.value = chosen.state;
-  const fields = h("div", { class: "fields" }, search.element, tag.element, tags, state.element);
+  const fields = h("div", { class: "fields" }, search.element, tag.element, tags, state.element, smallest.element);
   const element = h("form", { role: "search", class: "filters", onsubmit: (event) => event.preventDefault() }, fields);
   return { element, state };
 }
@@ -189,6 +215,8 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     const button = h("button", { class: "link sorting", onclick: () => sort(column) }, words, h("span", { "aria-hidden": "true" }, ` ${mark}`));
     return { name: button, label: words, sorted: up ? "ascending" : down ? "descending" : null };
   };
+  // The identifier tells apart those of one name.
+  const isAlone = (name) => name !== "" && entries.filter((other) => other.name === name).length === 1;
   return table("Sessions", [
     {
       ...by("Session", "name"),
@@ -197,7 +225,7 @@ function listed(entries, { ticks, advice, sorted, sort }) {
           "div",
           { class: "ticked" },
           ticks.box(session, `session ${called(session, name)}`),
-          h("div", {}, headed(`#/sessions/${session}`, session, name), tagList(tags)),
+          h("div", {}, isAlone(name) ? h("a", { href: `#/sessions/${session}` }, name) : headed(`#/sessions/${session}`, session, name), " ", tagList(tags)),
         ),
     },
     { ...by("Wealth", "wealth"), numeric: true, cell: ({ wealth: now }) => (now === null ? "\u2013" : wealth(now)) },
@@ -205,9 +233,9 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     { name: "Last period", numeric: true, cell: change },
     { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, care(entry)) },
     { name: "To hold", numeric: true, cell: (entry) => advice.of(entry).hold },
-    { name: "To trade", numeric: true, cell: (entry) => advice.of(entry).trade },
+    { ...by("To trade", "trade"), numeric: true, cell: (entry) => advice.of(entry).trade },
     { name: "State", cell: (entry) => standing(entry) },
-    { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [moment(created_ms).split(",")[0], h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
+    { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [nearMoment(created_ms), " ", h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
   ], entries);
 }
 
@@ -217,22 +245,25 @@ function change({ wealth_change }) {
   return `${wealth_change > 0 ? "+" : ""}${wealth(wealth_change)}`;
 }
 
+const near = (date) => nearDay(date, isoDay(new Date()));
+const nearMoment = (milliseconds) => near(isoDay(new Date(milliseconds)));
+
 /** Shows the last day reported, and when the next report is due or how late it is. */
 function lastReport({ date, last_report_ms }, { next, late }) {
-  const under = (words, wrong) => h("span", { class: wrong ? "under wrong" : "under" }, words);
-  const reported = date ? day(date) : last_report_ms ? moment(last_report_ms).split(",")[0] : "None yet";
-  const coming = late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : next === null ? null : under(`next ${date ? "" : "about "}${day(next)}`);
+  const under = (words, wrong) => [" ", h("span", { class: wrong ? "under wrong" : "under" }, words)];
+  const reported = date ? near(date) : last_report_ms ? nearMoment(last_report_ms) : "None yet";
+  const coming = late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : next === null ? null : under(`next ${date ? "" : "about "}${near(next)}`);
   return [reported, last_report_ms && !date ? under("without a date") : null, coming];
 }
 
 /** Shows the state of a session, its progress, and what needs care. */
 function standing({ state, period, horizon, drift, care }) {
   const drifting = { warning: "Market may have changed", alarm: "Market has changed" }[drift];
+  const wrong = [state === "waiting" && "for its next policy", care.includes("ending") && state === "active" && "In its last period", drifting].filter(Boolean);
   return [
     h("span", { class: `state ${state}` }, state),
+    " ",
     h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),
-    state === "waiting" ? h("span", { class: "under wrong" }, "for its next policy") : null,
-    care.includes("ending") && state === "active" ? h("span", { class: "under wrong" }, "In its last period") : null,
-    drifting ? h("span", { class: "under wrong" }, drifting) : null,
+    wrong.map((words) => [" ", h("span", { class: "under wrong" }, words)]),
   ];
 }

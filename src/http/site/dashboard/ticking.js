@@ -8,8 +8,8 @@ import { count } from "./format.js";
 const NAMED = 20;
 
 /**
- * Returns `{box(id, name), link}` for a list of `kind`, "sessions" or "policies": the checkbox of a row, and the actions for the ticked rows. Two
- * rows may be ticked, or any number if `many` is given: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, with links to
+ * Returns `{box(id, name), link, drawn()}` for a list of `kind`, "sessions" or "policies": the checkbox of a row, the actions for the ticked
+ * rows, and what to call with the rows that are shown. Two rows may be ticked, or any number if `many` is given: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, with links to
  * the addresses `at`, the question before a deletion, the deletion of one row, and what to do afterwards.
  */
 export function ticking(kind, many = null) {
@@ -18,14 +18,21 @@ export function ticking(kind, many = null) {
   const note = h("span", { class: "note", role: "status", tabindex: -1 });
   const go = h("a", { class: "button quiet", hidden: true }, "Compare the two");
   const links = (many?.links ?? []).map((link) => ({ ...link, element: h("a", { class: "button quiet", hidden: true }) }));
+  let shown = [];
+  const every = many && h("button", { type: "button", class: "link", onclick: () => ((ticked = ticked.length > 0 ? [] : [...shown]), tell(), every.focus()) });
   const deletion = many && h("button", { class: "quiet danger", hidden: true, "data-needs": "operate" });
   const tell = () => {
     for (const [id, box] of boxes) box.checked = ticked.includes(id);
     const query = `${kind}=${ticked.map(encodeURIComponent).join(",")}`;
     go.hidden = ticked.length !== 2;
     go.href = `#/compare?${query}`;
-    note.textContent = ["Tick two to compare them.", "Tick one more to compare the two."][ticked.length] ?? "";
+    const unseen = ticked.filter((id) => !shown.includes(id)).length;
+    const which = many && ticked.length > 0 ? `${count(ticked.length)} ticked${unseen > 0 ? `, ${count(unseen)} of them not shown here` : ""}. ` : "";
+    note.textContent = `${which}${["Tick two to compare them.", "Tick one more to compare the two."][ticked.length] ?? ""}`;
     if (!many) return;
+    link.toggleAttribute("data-ticked", ticked.length > 0);
+    every.textContent = ticked.length > 0 ? "Untick all" : `Tick all ${count(shown.length)}`;
+    every.hidden = ticked.length === 0 && shown.length < 2;
     deletion.hidden = ticked.length === 0;
     for (const { element, at, words } of links) {
       element.hidden = ticked.length === 0;
@@ -66,6 +73,7 @@ export function ticking(kind, many = null) {
     const listed = ticked.slice(0, NAMED).map((id) => names.get(id)).join(", ");
     if (confirm(`${many.asked(ticked.length)}\n\n${listed}${rest > 0 ? ` and ${count(rest)} more` : ""}`)) pressed(deletion, removeAll);
   });
+  const link = h("div", { class: "comparing" }, note, every, go, links.map(({ element }) => element), deletion);
   tell();
-  return { box, link: h("span", { class: "comparing" }, note, go, links.map(({ element }) => element), deletion) };
+  return { box, link, drawn: (ids) => ((shown = ids), tell()) };
 }

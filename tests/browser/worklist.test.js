@@ -1,0 +1,189 @@
+// The morning of an adviser: who trades, how much in all, as a file of orders, and whose report is due.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
+import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
+
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002, 0.14, -0.12];
+const BONDS = HISTORY.map((_, k) => 0.003 + 0.01 * Math.cos(2.3 * k));
+const COST = 0.001;
+const DAY = 86_400_000;
+/** What each client has and holds; the fund is of two assets. */
+const CLIENTS = [
+  { name: "Little", wealth: 100, holding: 0.1 },
+  { name: "Large", wealth: 900_000, holding: 0 },
+  { name: "Mid, of \"quotes\"", wealth: 40_000, holding: 0.02 },
+  { name: "All in", wealth: 5000, holding: 1 },
+  { name: "Content", wealth: 5000, holding: 0.45 },
+];
+
+let policy, fund, sessions;
+const isoDay = (ago) => new Date(Date.now() - ago * DAY).toISOString().slice(0, 10);
+const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
+const names = () => page.locator("tbody th a").allInnerTexts();
+const work = async () => plain(await page.locator(".work").innerText());
+const shown = (line) => page.locator(".foot").getByText(line, { exact: true }).waitFor();
+
+before(async () => {
+  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 52, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  policy = await trained(ballast.url, { problem: { ...problem, history: HISTORY }, design: { count: 40 }, name: "World, weekly" });
+  fund = await trained(ballast.url, { problem: { ...problem, trading_cost: 0, assets: ["Stocks", "Bonds"], history: HISTORY.map((back, k) => [back, BONDS[k]]) }, design: { count: 20 }, name: "Fund" });
+  sessions = [];
+  for (const client of CLIENTS) sessions.push({ ...client, ...(await call(ballast.url, "/sessions", { policy, ...client })) });
+  const of = { name: "Two assets", wealth: 2000, holdings: { Stocks: 0.9, Bonds: 0.05 } };
+  sessions.push({ ...of, ...(await call(ballast.url, "/sessions", { policy: fund, ...of })) });
+});
+
+/** The trades of every session by the service's own answers, in money. */
+async function trades() {
+  const found = [];
+  for (const { session, name } of sessions) {
+    const now = await call(ballast.url, `/sessions/${session}`);
+    const action = await call(ballast.url, `/action?session=${session}`);
+    const isFund = typeof action.allocation === "object";
+    const [held, advised, trade] = isFund ? [action.holdings, action.allocation, action.trade] : [{ "": action.holding }, { "": action.allocation }, { "": action.trade }];
+    const turned = Object.values(trade).reduce((sum, part) => sum + Math.abs(part), 0);
+    const whole = now.wealth * (1 - (isFund ? 0 : COST) * turned);
+    for (const asset of Object.keys(trade)) if (Math.abs(trade[asset]) >= 0.0005) found.push({ name, session, asset, amount: advised[asset] * whole - held[asset] * now.wealth, held: held[asset] * now.wealth, kept: advised[asset] * whole });
+  }
+  return found;
+}
+
+const sum = (found, sign) => found.reduce((all, { amount }) => all + Math.max(0, sign * amount), 0);
+const number = (text) => Number(text.replaceAll(",", ""));
+const near = (one, other, why) => assert.ok(Math.abs(one - other) <= 0.51, `${why}: ${one} for ${other}`);
+
+test("how many have a trade, and what is bought and sold in all", async () => {
+  const found = await trades();
+  const clients = new Set(found.map(({ session }) => session)).size;
+  assert.ok(clients === 5, `${clients}`);
+  await go("");
+  const told = await work();
+  const [, some, all] = /^(\d+) of (\d+) sessions have a trade/.exec(told);
+  assert.deepEqual([some, all], [String(clients), "6"]);
+  near(number(/buy ([\d,.]+) in/.exec(told)[1]), sum(found, 1), "bought");
+  near(number(/sell ([\d,.]+) in/.exec(told)[1]), sum(found, -1), "sold");
+});
+
+test("those with a trade stand with the biggest first, also where the address leads there", async () => {
+  const found = await trades();
+  const size = (name) => found.filter((one) => one.name === name).reduce((all, { amount }) => all + Math.abs(amount), 0);
+  const wanted = [...new Set(found.map(({ name }) => name))].sort((one, other) => size(other) - size(one));
+  await go("");
+  await page.getByRole("button", { name: "Show the trades" }).click();
+  await shown(`${wanted.length} of ${wanted.length}`);
+  assert.deepEqual(await names(), wanted);
+  assert.equal(await page.getByRole("columnheader", { name: "To trade" }).getAttribute("aria-sort"), "descending");
+  assert.match(page.url(), /state=trade/);
+  await go(new URL(page.url()).hash);
+  assert.deepEqual(await names(), wanted);
+  await page.getByRole("button", { name: "To trade" }).click();
+  await page.waitForFunction(() => document.querySelector("[aria-sort=ascending]"));
+  assert.deepEqual(await names(), [...wanted].reverse());
+  await page.getByLabel("Search").fill("large");
+  await shown("1 of 1");
+  await page.locator(".work").getByText("1 of 1 session has a trade", { exact: false }).waitFor();
+});
+
+test("a trade below the smallest counts as none, and the browser keeps what is smallest", async () => {
+  await go("#/sessions?state=trade");
+  const before = await names();
+  await page.getByLabel("Smallest trade").fill("150");
+  await page.waitForFunction((count) => document.querySelectorAll("tbody tr").length < count, before.length);
+  assert.ok(!(await names()).includes("Little"));
+  assert.match(await work(), /\d trades? (is|are) too small and left out\./);
+  await go("");
+  assert.equal(await page.getByLabel("Smallest trade").inputValue(), "150");
+  const little = page.getByRole("row").filter({ has: page.getByRole("link", { name: "Little", exact: true }) });
+  assert.match(plain(await little.locator('[data-name="To trade"]').innerText()), /^Nothing\s+Buy [\d.]+: too small$/);
+  await page.getByLabel("Smallest trade").fill("1,000");
+  assert.equal(await page.getByLabel("Smallest trade").getAttribute("aria-invalid"), "true");
+  await page.getByLabel("Smallest trade").fill("");
+  await page.waitForFunction(() => !document.querySelector(".work").textContent.includes("too small"));
+});
+
+test("the smallest trade is an amount or a share of wealth", async () => {
+  const { smallestOf, sums, tradesOf } = await dashboardModule("trades.js");
+  assert.deepEqual(["", "500", "1 %", "0,5%", "1,000", "x", "-3"].map(smallestOf), [null, { money: 500 }, { share: 0.01 }, { share: 0.005 }, undefined, undefined, undefined]);
+  const action = { allocation: 0.52, holding: 0.5, trade: 0.02 };
+  const size = (smallest, cost = 0) => sums(tradesOf(action, { wealth: 1000, cost }, smallest)).size;
+  assert.deepEqual([null, { money: 20 }, { money: 21 }, { share: 0.02 }, { share: 0.03 }].map((smallest) => Math.round(size(smallest))), [20, 20, 0, 20, 0]);
+  assert.ok(Math.abs(size(null, 0.01) - 0.52 * 1000 * (1 - 0.01 * 0.02) + 500) < 1e-9);
+  assert.equal(tradesOf({ ...action, allocation: 0.5004, trade: 0.0004 }, { wealth: 1e9, cost: 0 }).length, 0);
+});
+
+test("the orders are saved as a file, and a line tells how many", async () => {
+  const found = await trades();
+  await go("");
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Save orders as CSV" }).click()]);
+  assert.match(download.suggestedFilename(), /^orders-\d{4}-\d\d-\d\d\.csv$/);
+  const { csvRows } = await dashboardModule("csv.js");
+  const [head, ...rows] = csvRows(await readFile(await download.path(), "utf8"), ",").map(({ cells }) => cells);
+  assert.deepEqual(head.slice(0, 8), ["Client", "Session", "Policy", "Asset", "Order", "Amount", "Held", "To hold"]);
+  assert.equal(rows.length, found.length);
+  for (const { name, session, asset, amount, held, kept } of found) {
+    const row = rows.find((cells) => cells[1] === session && cells[3] === asset);
+    assert.deepEqual([row[0], row[4]], [name, amount > 0 ? "buy" : "sell"]);
+    for (const [index, value] of [[5, Math.abs(amount)], [6, held], [7, kept]]) assert.ok(Math.abs(Number(row[index]) - value) <= 0.0051, `${name}: ${row[index]} for ${value}`);
+  }
+  const sizes = rows.filter((cells) => cells[3] === "").map((cells) => Number(cells[5]));
+  assert.deepEqual(sizes, [...sizes].sort((one, other) => other - one));
+  await page.getByText(`Saved ${found.length} orders of ${new Set(found.map(({ session }) => session)).size} sessions.`).waitFor();
+});
+
+test("whose report is due is told, and a link has their lines ready", async () => {
+  await call(ballast.url, "/observe", { session: sessions[1].session, period: 1, simple_return: 0.01, date: isoDay(8) });
+  await call(ballast.url, "/observe", { session: sessions[2].session, period: 1, simple_return: 0.01, date: isoDay(2) });
+  await go("");
+  assert.match(await work(), /1 of these sessions lacks the report that is due, so the trade may change\./);
+  assert.match(await work(), /The report to \d+ \w+ \d{4} of 1 session is due\./);
+  await page.getByRole("button", { name: "Show whose" }).click();
+  await shown("1 of 1");
+  assert.deepEqual(await names(), ["Large"]);
+  await page.getByRole("link", { name: "Report for the 1" }).click();
+  await page.getByRole("heading", { level: 1, name: "Report for several" }).waitFor();
+  assert.match(await page.getByLabel("Sessions and their returns, %").inputValue(), /^Large/);
+});
+
+test("a session without advice is left out of the sums and named", async () => {
+  const refused = { type: "/problems/overloaded", title: "The service cannot answer now", status: 503, detail: "too busy" };
+  await page.route(`**/action?session=${sessions[1].session}`, (route) => route.fulfill({ status: 503, contentType: "application/problem+json", body: JSON.stringify(refused) }));
+  await go("");
+  assert.match(await work(), /1 session has no advice now and is left out: Large\./);
+  assert.doesNotMatch(await work(), /buy \d{3},\d{3} in/);
+  await page.unrouteAll();
+});
+
+test("a row is one line, and what to do with ticked rows stays in sight", async () => {
+  for (let k = 0; k < 30; k++) await call(ballast.url, "/sessions", { policy, name: `Client ${k}` });
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await go("");
+  const heights = await page.locator("tbody tr").evaluateAll((rows) => rows.map(({ offsetHeight }) => offsetHeight));
+  assert.ok(heights.filter((height) => height <= 34).length >= 33, `${heights}`);
+  await page.getByRole("button", { name: "Tick all 36" }).click();
+  await page.getByText("36 ticked.").waitFor();
+  await page.mouse.wheel(0, 5000);
+  await page.waitForFunction(() => scrollY > 300);
+  for (const [width, height] of [[1440, 900], [390, 844]]) {
+    await page.setViewportSize({ width, height });
+    await page.locator(".foot").scrollIntoViewIfNeeded();
+    const { y } = await page.getByRole("link", { name: "Report for the 36" }).boundingBox();
+    assert.ok(y >= 0 && y < height / 2, `at ${width} the link stands at ${y}`);
+  }
+  await page.setViewportSize({ width: 1280, height: 900 });
+  await page.getByLabel("Search").fill("client 1");
+  await page.getByText(/36 ticked, \d+ of them not shown here\./).waitFor();
+  await page.getByRole("button", { name: "Untick all" }).click();
+  assert.equal(await page.getByRole("link", { name: /^Report for the/ }).count(), 0);
+});
+
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
+  await usable(page, async (place) => {
+    await go(place);
+    await page.getByLabel("Tick session Large").check();
+  }, ["#/sessions?state=trade"]);
+});
