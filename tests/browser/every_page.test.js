@@ -22,7 +22,7 @@ after(async () => {
 const visit = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const nothing = `session_${"0".repeat(32)}`;
 /** Views that need nothing to be there. */
-const BARE = ["#/", "#/jobs", "#/train", "#/declare", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/key", "#/nowhere", `#/sessions/${nothing}`];
+const BARE = ["#/", "#/advise", "#/jobs", "#/train", "#/declare", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/key", "#/nowhere", `#/sessions/${nothing}`];
 
 test("every view where there is nothing yet", () => usable(page, visit, BARE));
 

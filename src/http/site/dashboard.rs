@@ -38,6 +38,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "inter.woff2": "font/woff2",
         "inter-LICENSE.txt": TEXT,
         "advice.js": SCRIPT,
+        "advise.js": SCRIPT,
         "advised.js": SCRIPT,
         "api.js": SCRIPT,
         "backtest.js": SCRIPT,

@@ -26,3 +26,50 @@ export function draft(place) {
     h("p", { class: "note", role: "status" }, "This is what you typed here before. ", h("button", { type: "button", class: "link", onclick: () => (drop(), again()) }, "Start again"));
   return { read, keep, drop, note };
 }
+
+/** The training that goes on with an advice, and the form that opens a session. */
+export const FOLLOWING = "#/train?follow=advice";
+export const OPENING = "#/sessions/new";
+
+const TEXTS = "input[name]:not([type=file], [type=checkbox], [type=radio]), textarea[name]";
+const fieldsOf = (form) => [...form.querySelectorAll(TEXTS)].filter((field) => field.closest("[hidden]") === null);
+
+/** Keeps the texts of a form's fields at `place` while the tab is open. Returns `{restore(), keep(), settle(), drop(), isKept,
+ * note(again)}`: `restore` fills the fields that are there, and is called again once the form has more; `keep` is called after the form
+ * changed its own fields, `settle` after all of them were sent, and `drop` if the form is over. */
+export function keptFields(form, place) {
+  const drafts = draft(place);
+  const known = drafts.read() ?? {};
+  const initial = new Map();
+  const note = () => fieldsOf(form).forEach(({ name, value }) => initial.has(name) || initial.set(name, value));
+  let isOver = false;
+  const keep = () => {
+    if (isOver) return;
+    note();
+    for (const { name, value } of fieldsOf(form)) {
+      if (value === initial.get(name)) delete known[name];
+      else known[name] = value;
+    }
+    if (Object.keys(known).length > 0) drafts.keep(known);
+    else drafts.drop();
+  };
+  form.addEventListener("input", keep);
+  const restore = () => {
+    note();
+    for (const field of fieldsOf(form).filter(({ name, value }) => name in known && value !== known[name])) {
+      field.value = known[field.name];
+      field.dispatchEvent(new Event("input"));
+      field.closest("details")?.setAttribute("open", "");
+    }
+  };
+  const settle = () => {
+    for (const { name, value } of fieldsOf(form)) initial.set(name, value);
+    for (const name of Object.keys(known)) delete known[name];
+    drafts.drop();
+  };
+  const drop = () => {
+    isOver = true;
+    drafts.drop();
+  };
+  return { restore, keep, settle, drop, isKept: Object.keys(known).length > 0, note: drafts.note };
+}

@@ -17,13 +17,17 @@ const POLL = 1000;
 const REPORTS = { evaluate: "evaluations", backtest: "backtests", frontier: "frontiers" };
 const named = (job) => `${KINDS[job.kind]}${byDay(job)}`;
 
-export async function view(_, leaving) {
+/** `query`: `follow=JOB` leads on to the form that opens a session, once the job has trained its policy. */
+export async function view(query, leaving) {
+  const followed = new URLSearchParams(query ?? "").get("follow");
   const pages = new Pages("/jobs", "jobs", leaving);
   const entries = await pages.next();
   const actions = h("a", { class: "button", href: "#/train" }, "Train a policy");
   if (entries.length === 0) return { title: "Jobs", body: welcome() };
-  const jobs = jobList(entries, leaving);
-  return { title: "Jobs", actions, body: [jobs.element, foot(pages, ["job", "jobs"], entries.length, jobs.add)] };
+  const ahead = ({ job, policy }) => job === followed && policy && location.replace(`#/sessions/new?policy=${policy}`);
+  const jobs = jobList(entries, leaving, ahead);
+  const lead = entries.some(({ job, state }) => job === followed && !["failed", "cancelled"].includes(state)) ? h("p", { class: "lead" }, "Once the policy is trained, the form that opens the session comes by itself.") : "";
+  return { title: "Jobs", actions, body: [lead, jobs.element, foot(pages, ["job", "jobs"], entries.length, jobs.add)] };
 }
 
 /** Shows a job until it succeeds; then the page reloads and shows its report. */

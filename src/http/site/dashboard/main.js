@@ -2,6 +2,7 @@
 
 import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
+import * as advise from "./advise.js";
 import * as backtestAsking from "./backtest_asking.js";
 import * as compare from "./compare.js";
 import * as declare from "./declare.js";
@@ -22,7 +23,8 @@ import * as train from "./train.js";
 
 /** Address, view, navigation entry, and the role that the view needs, if any. A view is `async (id, leaving) => {title, body}`. */
 const ROUTES = [
-  [/^#\/jobs$/, jobs.view, "jobs"],
+  [/^#\/jobs(?:\?(.*))?$/, jobs.view, "jobs"],
+  [/^#\/advise$/, advise.view, "sessions"],
   [/^#\/train(?:\?(.*))?$/, train.view, "jobs", "train"],
   [/^#\/declare(?:\?(.*))?$/, declare.view, "jobs", "train"],
   [/^#\/policies$/, policies.view, "policies"],

@@ -4,6 +4,7 @@
 import { advised } from "./advised.js";
 import { get, post } from "./api.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
+import { keptFields } from "./draft.js";
 import { doubtWords, missingDays, UNCONFIRMED } from "./doubts.js";
 import { fileDrop } from "./file_drop.js";
 import { area, fieldset, input, pressed, refusal, select } from "./form.js";
@@ -24,7 +25,7 @@ export async function view(query, leaving) {
   const asked = (new URLSearchParams(query ?? "").get("sessions") ?? "").split(",");
   const chosen = sessions.filter(({ session }) => asked.includes(session));
   const trail = h("p", { class: "trail" }, h("a", { href: "#/" }, "Overview"));
-  return { title: "Report for several", trail, body: reporting(sessions, chosen, leaving) };
+  return { title: "Report for several", trail, body: reporting(sessions, chosen, leaving, `#/report?${query ?? ""}`) };
 }
 
 /** The units of returns without a percent sign, if the page asks. */
@@ -50,7 +51,7 @@ function deviationOf(returns) {
   return Math.sqrt(returns.reduce((sum, value) => sum + (value - mean) ** 2, 0) / returns.length);
 }
 
-function reporting(sessions, chosen, leaving) {
+function reporting(sessions, chosen, leaving, place) {
   const find = finder(sessions);
   const policies = policiesRead(leaving);
   let [rows, header, isOpen] = [[], null, false];
@@ -147,6 +148,8 @@ function reporting(sessions, chosen, leaving) {
       meant.checked = false;
       for (const { entry, report, answer } of told) if (answer.problem?.type === UNCONFIRMED) doubted.set(entry.session, said(report));
       look();
+      if (left.length > 0) drafts.keep();
+      else drafts.settle();
     }
     const failed = told.filter(({ answer }) => answer.status !== 200);
     const words = `${counted(told.length - failed.length, "return is", "returns are")} recorded${rows.length > 0 ? `, and ${count(rows.length)} left above to try again` : ""}.`;
@@ -198,8 +201,11 @@ function reporting(sessions, chosen, leaving) {
     });
     button.disabled = isOpen || !rows.some(({ trouble }) => trouble === null);
   });
+  const drafts = keptFields(form, place);
   look();
-  return [form, outcome];
+  drafts.restore();
+  const anew = () => dispatchEvent(new HashChangeEvent("hashchange"));
+  return [drafts.isKept ? drafts.note(anew) : "", form, outcome];
 }
 
 /** The reasons to ask for the unit. */

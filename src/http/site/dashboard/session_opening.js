@@ -2,6 +2,7 @@
 
 import { get, post } from "./api.js";
 import { h } from "./dom.js";
+import { keptFields, OPENING } from "./draft.js";
 import { fieldset, input, refusal, select, sending, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
 import { labelFields } from "./naming.js";
@@ -86,6 +87,7 @@ function opening(policies, asked, leaving) {
     holding.element.hidden = assets !== null;
     const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held already, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
     shares.replaceChildren(...(assets ?? []).map((name, index) => field(name, index).element));
+    drafts.restore();
   };
   let choosing = null;
   const failed = (error) => leaving.aborted || showProblem(form, message, { field: policy.name, message: error.message });
@@ -133,9 +135,13 @@ function opening(policies, asked, leaving) {
     if (going.control.value === "renews")
       request.renew = { every: typed(every.control.value), window: typed(window.control.value) };
     const { session } = await post("/sessions", request);
+    drafts.drop();
     location.hash = `#/sessions/${session}`;
   });
-  return form;
+  const drafts = keptFields(form, OPENING);
+  drafts.restore();
+  const again = () => dispatchEvent(new HashChangeEvent("hashchange"));
+  return drafts.isKept ? [drafts.note(again), form] : form;
 }
 
 /** Arranges returns date by date, in the order of `assets`, or in that of the columns if their names are not those of the assets. */

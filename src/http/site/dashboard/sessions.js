@@ -1,11 +1,12 @@
 // Sessions, one investor a row: who must trade and how much, whose report is due, who needs care, and where each stands.
 
+import { advising } from "./advise.js";
 import { advised } from "./advised.js";
 import { get, remove } from "./api.js";
 import { care, careWords } from "./care.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
-import { allocation, count, counted, percent, wealth } from "./format.js";
+import { allocation, count, counted, short, wealth } from "./format.js";
 import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
@@ -28,14 +29,15 @@ export async function view(_, leaving) {
   const chosen = Object.fromEntries(Object.entries(CHOICES).map(([name, blank]) => [name, said.get(name) ?? blank]));
   if (!(chosen.state in STATES)) chosen.state = "";
   const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
-  const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
+  const now = h("a", { class: "button quiet", href: "#/advise" }, "Advice now");
+  const actions = h("div", { class: "actions" }, now, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
   const first = isWork(chosen) ? null : await read(chosen, null, leaving);
   const title = "Overview";
   if (first && isEmpty(first) && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
     const who = await holderWords(leaving);
     if (policies.length > 0) return { title, actions, body: [lead(), who] };
-    return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome()]), who] };
+    return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome(advising(leaving))]), who] };
   }
   return { title, actions, body: overview(chosen, first, leaving) };
 }
@@ -225,7 +227,7 @@ function listed(entries, { ticks, advice, sorted, sort }) {
           "div",
           { class: "ticked" },
           ticks.box(session, `session ${called(session, name)}`),
-          h("div", {}, isAlone(name) ? h("a", { href: `#/sessions/${session}` }, name) : headed(`#/sessions/${session}`, session, name), " ", tagList(tags)),
+          h("div", {}, isAlone(name) ? h("a", { href: `#/sessions/${session}`, title: short(session) }, name) : headed(`#/sessions/${session}`, session, name), " ", tagList(tags)),
         ),
     },
     { ...by("Wealth", "wealth"), numeric: true, cell: ({ wealth: now }) => (now === null ? "\u2013" : wealth(now)) },

@@ -10,7 +10,7 @@ import { hasBall, investorsOnly, meant } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
 /** The form's initial request; null fields are to be filled in or may be left out. */
-const initial = () => ({
+export const initial = () => ({
   problem: {
     framework: "adaptive",
     horizon: 12,
@@ -42,8 +42,8 @@ export function requestOf(specification) {
   return structuredClone({ problem: { ...problem, ...named, radius: { ...radius, ...scale } }, design: { accuracy, count }, seed: specification.seed });
 }
 
-/** Puts returns into a request; several columns are assets with the columns' names. Without a reading there are none. */
-function taken({ problem }, series) {
+/** Puts returns into a training request; several columns are assets with the columns' names. Without a reading there are none. */
+export function withRecord({ problem }, series) {
   problem.history = [];
   if (series.length === 0) return;
   if (series.length === 1) {
@@ -60,10 +60,12 @@ function taken({ problem }, series) {
   if (problem.radius?.rule === "chi_square") problem.radius = radiusFor("adaptive", problem.radius);
 }
 
-/** `query`: `from=POLICY` fills the form with the request that trained the policy, and so does `newer=POLICY`, for newer returns. */
+/** `query`: `from=POLICY` fills the form with the request that trained the policy, and so does `newer=POLICY`, for newer returns. `follow` goes
+ * on with the record and the settings of an advice, which are kept as a draft. */
 export async function view(query, leaving) {
   const asked = new URLSearchParams(query ?? "");
   const origin = asked.get("from") ?? asked.get("newer");
+  const isFollowing = asked.has("follow");
   const drafts = draft(`#/train?${query ?? ""}`);
   const kept = drafts.read();
   const { specification } = origin ? await get(`/policies/${origin}`, leaving) : {};
@@ -79,7 +81,7 @@ export async function view(query, leaving) {
     example: { latest: 240 },
     several: true,
     changed: (series, answer) => {
-      taken(request, series);
+      withRecord(request, series);
       if (answer) fields.periods(answer.periods_per_year ?? (isOfDates ? null : request.problem.periods_per_year));
       if (answer) isOfDates = Boolean(answer.periods_per_year);
       fields.show(request);
@@ -186,7 +188,7 @@ export async function view(query, leaving) {
     announce(`Training ${job} is queued.`);
     meant(form, { noun: "training", job, warnings, problem: request.problem }, () => {
       drafts.drop();
-      location.hash = "#/jobs";
+      location.hash = isFollowing ? `#/jobs?follow=${job}` : "#/jobs";
     });
   };
   sending(form, send, ask, { otherwise: json, told: (error) => error.field === "body" && (advanced.open = true) });
@@ -201,8 +203,10 @@ export async function view(query, leaving) {
   const newer = asked.has("newer");
   const again = () => dispatchEvent(new HashChangeEvent("hashchange"));
   const actions = h("a", { class: "button quiet", href: "#/declare" }, "Declare a problem");
-  return { title: newer ? "Train on newer returns" : "Train a policy", trail, actions, body: [origin ? told(newer) : "", kept ? drafts.note(again) : "", form] };
+  return { title: newer ? "Train on newer returns" : "Train a policy", trail, actions, body: [origin ? told(newer) : "", kept && isFollowing ? h("p", { class: "lead" }, FOLLOWED) : kept ? drafts.note(again) : "", form] };
 }
+
+const FOLLOWED = "The record and the settings are those of the advice. Say how far ahead to look, then train. The form that opens the session follows by itself.";
 
 /** Says what to do with a form that is filled from a policy. */
 function told(newer) {

@@ -24,7 +24,7 @@ const COMPOSITION = "problem.composition";
 const COMPOSITIONS = { one_step: "Chosen each period, against the worst market", inverse_volatility: "Less of what varies more", equal: "Equal shares" };
 /** The path of the level of caution. */
 const CAUTION = "problem.caution";
-const CAUTIONS = {
+export const CAUTIONS = {
   balanced: "Balanced: least regret, whatever the premium is",
   bold: "Bold: closer to the record",
   cautious: "Cautious: closer to no premium",
@@ -67,7 +67,7 @@ const capital = (word) => word[0].toUpperCase() + word.slice(1);
 const PERIODS = "problem.periods_per_year";
 const RATE = "problem.rate_per_step";
 /** The choices of periods a year. */
-const CALENDARS = [["", "Choose one"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: other periods"]];
+export const CALENDARS = [["", "Choose one"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: other periods"]];
 
 /** Returns `{elements, show(request), periods(count), trouble(), choices(), choose(choices)}`; `changed(path, value)` is called at every edit.
  * `periods` takes the periods a year from the dates of a record, or null. `trouble()` returns a missing choice as a refusal, or null.

@@ -2,7 +2,8 @@
 
 import { h } from "./dom.js";
 
-export function welcome() {
+/** `start` is what can be done at once. */
+export function welcome(start = "") {
   const step = (title, ...text) => h("li", {}, h("h2", {}, title), h("p", {}, text));
   return h(
     "div",
@@ -10,8 +11,11 @@ export function welcome() {
     h(
       "p",
       { class: "lead" },
-      "Ballast tells an investor how much to hold in stocks when nobody knows what the market will do. Nothing has been trained here yet.",
+      "Ballast tells an investor how much to hold in stocks when nobody knows what the market will do. Nothing has been trained here yet",
+      start === "" ? "." : ", and nothing needs to be: give it a record, and it answers at once.",
     ),
+    start,
+    start === "" ? "" : h("h2", {}, "To follow a client for years"),
     h(
       "ol",
       { class: "steps" },
