@@ -181,6 +181,43 @@ test("a row is one line, and what to do with ticked rows stays in sight", async 
   assert.equal(await page.getByRole("link", { name: /^Report for the/ }).count(), 0);
 });
 
+test("the keyboard goes from row to row, on one control", async () => {
+  await go("#/sessions?sort=name");
+  const focused = () => page.evaluate(() => document.activeElement.getAttribute("aria-label") ?? document.activeElement.textContent);
+  const links = await names();
+  await page.locator("tbody th a").first().focus();
+  await page.keyboard.press("ArrowDown");
+  await page.keyboard.press("ArrowDown");
+  assert.equal(await focused(), links[2]);
+  await page.keyboard.press("ArrowUp");
+  assert.equal(await focused(), links[1]);
+  await page.keyboard.press("End");
+  assert.equal(await focused(), links.at(-1));
+  await page.keyboard.press("ArrowDown");
+  assert.equal(await focused(), links.at(-1));
+  await page.keyboard.press("Home");
+  await page.keyboard.press("Shift+Tab");
+  await page.keyboard.press("ArrowDown");
+  assert.equal(await focused(), `Tick session ${links[1]}`);
+  await page.keyboard.press("Space");
+  await page.getByText("1 ticked.", { exact: false }).waitFor();
+});
+
+test("those that are completed or end are continued together from the line that names them", async () => {
+  const ids = [];
+  for (const [name, periods] of [["Ends", 2], ["Is completed", 3]]) {
+    const { session } = await call(ballast.url, "/sessions", { policy, name });
+    ids.push(session);
+    for (let period = 1; period <= periods; period++) await call(ballast.url, "/observe", { session, period, simple_return: 0.01, date: isoDay(7 * (periods - period)) });
+  }
+  await go("");
+  await page.locator(".needs").getByText("2 are completed or in their last period", { exact: false }).waitFor();
+  await page.getByRole("button", { name: "Continue the 2" }).click();
+  await page.getByRole("heading", { level: 1, name: "Continue with another policy" }).waitFor();
+  assert.deepEqual((await names()).sort(), ["Ends", "Is completed"]);
+  assert.deepEqual(new URLSearchParams(page.url().split("?")[1]).get("sessions").split(",").sort(), [...ids].sort());
+});
+
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, async (place) => {
     await go(place);

@@ -5,11 +5,12 @@ import { advised } from "./advised.js";
 import { get, remove } from "./api.js";
 import { care, careWords } from "./care.js";
 import { h, table } from "./dom.js";
-import { input, select } from "./form.js";
+import { input, pressed, select } from "./form.js";
 import { allocation, count, counted, short, wealth } from "./format.js";
 import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
+import { all } from "./pages.js";
 import { isoDay, nearDay } from "./periods.js";
 import { ticking } from "./ticking.js";
 import { smallestField } from "./trades.js";
@@ -18,6 +19,8 @@ import { isWork, orderOf, WORK, worklist } from "./worklist.js";
 
 /** Rows shown at a time: the advice of each needs a call of its own. */
 const PAGE = 50;
+/** Most sessions renewed together, so that the address is not too long. */
+const RENEWED = 200;
 /** Pause in typing before the search is sent, in milliseconds. */
 const PAUSE = 250;
 const STATES = { "": "All", ...WORK, active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Market has changed", ending: "Completed, or in the last period" };
@@ -101,7 +104,7 @@ function overview(chosen, first, leaving) {
   });
   const tags = h("datalist", { id: "tags" });
   const known = new Set();
-  const holder = h("div", { class: "listing" });
+  const holder = h("div", { class: "listing", onkeydown: moveBetweenRows });
   const line = h("p", { class: "note", role: "status" });
   const more = h("button", { class: "quiet" }, "Show more");
   let [entries, damaged, page, total, asking] = [[], [], first, null, new AbortController()];
@@ -169,8 +172,14 @@ function overview(chosen, first, leaving) {
   });
   const { element, state: { control } } = filters(chosen, ask, tags, smallest);
   const judge = (counts) => {
-    const all = counts.any > 0 ? h("button", { class: "link", onclick: () => choose("care") }, "Show them") : "";
-    needs.replaceChildren(careWords(counts), " ", all, " ", beyond);
+    const some = counts.any > 0 ? h("button", { class: "link", onclick: () => choose("care") }, "Show them") : "";
+    const goOn = h("button", { class: "link", "data-needs": "operate", onclick: ({ target }) => pressed(target, continueEnding) }, `Continue the ${count(counts.ending)}`);
+    needs.replaceChildren(careWords(counts), " ", some, " ", ...(counts.ending > 0 ? [goOn, " "] : []), beyond);
+  };
+  /** Leads to the renewal of the sessions that are completed or in their last period. */
+  const continueEnding = async () => {
+    const ending = await all("/sessions?state=ending", "sessions", leaving);
+    location.hash = `#/renew?sessions=${ending.slice(0, RENEWED).map(({ session }) => session).join(",")}`;
   };
   // The counts of all sessions, independent of the search.
   const judgeAll = async () => {
@@ -188,6 +197,17 @@ function overview(chosen, first, leaving) {
   };
   start().catch(failed);
   return [work.element, needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
+}
+
+/** Moves the focus with the arrow keys, Home and End to the same control of another row. */
+function moveBetweenRows(event) {
+  const row = event.target.closest("tbody tr");
+  const rows = row ? [...row.parentElement.children] : [];
+  const at = { ArrowDown: rows.indexOf(row) + 1, ArrowUp: rows.indexOf(row) - 1, Home: 0, End: rows.length - 1 }[event.key];
+  if (at === undefined || !rows[at] || event.altKey || event.ctrlKey || event.metaKey) return;
+  const controls = (one) => [...one.querySelectorAll("a, input")];
+  event.preventDefault();
+  controls(rows[at])[controls(row).indexOf(event.target)]?.focus();
 }
 
 /** Says how many of the sessions shown are outside what their policies were trained for; the list itself does not contain that. */
