@@ -88,7 +88,7 @@ impl AbsoluteBridges {
 
     /// Returns the times and weights of each gap of a law.
     fn shares_of(&self, law: &EmpiricalDistribution, which: Statistic) -> Arc<[[Share; 4]]> {
-        if law.retention() == 1.0 {
+        if law.is_even() {
             return self.equal_gaps(law.sample_size(), which);
         }
         let (mut places, mut below) = (SizedGaps::of_laws_like(self, law, which), 0.0);
@@ -143,7 +143,7 @@ impl AbsoluteBridges {
         let total = law.total_weight() * retention + 1.0;
         let mut weights = Weights::new(self);
         // Known if all weights are equal; the others are computed gap by gap.
-        let equal = (retention == 1.0).then(|| self.equal_gaps(count + 1, which));
+        let equal = law.is_even().then(|| self.equal_gaps(count + 1, which));
         let mut places = SizedGaps::new(self, count + 1, total, retention, which);
         let mut place = |weights: &mut Weights, below: f64, length: f64| match &equal {
             Some(shares) => weights.place(&shares[below as usize - 1], length),

@@ -3,6 +3,7 @@
 //! Its modules hold empirical laws and their moments, and what is estimated from them.
 
 pub mod concentration;
+pub mod conditional;
 pub mod confidence_region;
 pub mod empirical;
 pub mod exponential_mean;

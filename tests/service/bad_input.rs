@@ -78,6 +78,11 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ),
         ("/problem/centre", json!({"kind": "mixed", "weight": 9.0}), "problem.centre.law"),
         ("/problem/centre", json!({"kind": "volatility_scaled", "half_life": 12.0}), "problem.centre.kind"),
+        (
+            "/problem/centre",
+            json!({"kind": "conditional", "on": {"kind": "trend", "half_life": 12.0}, "bandwidth": 1.0}),
+            "problem.centre.kind",
+        ),
         ("/problem/centre", json!({"kind": "volatility_scaled"}), "problem.centre.half_life"),
         (
             "/problem/centre",
@@ -200,6 +205,8 @@ fn the_list_covers_every_field() {
         "radius_factor",
         "means",
         "intensity",
+        "on",
+        "values",
     ];
     let missing: Vec<_> = described_fields()
         .into_iter()
@@ -602,6 +609,11 @@ fn faulty_walk_forwards() -> Vec<(&'static str, Value, &'static str)> {
         ("scale", json!(-0.1), "scale"),
         ("centre", json!({ "kind": "smoothed", "bandwidth": 2.0 }), "centre.bandwidth"),
         ("centre", json!({ "kind": "volatility_scaled", "half_life": 12.0 }), "centre.kind"),
+        (
+            "centre",
+            json!({ "kind": "conditional", "on": { "kind": "column", "values": [0.0, 1.0] }, "bandwidth": 1.0 }),
+            "centre.on.kind",
+        ),
         ("centre", json!({ "kind": "mixed", "weight": 10.0 }), "centre.law"),
         ("centre", json!({ "kind": "wild" }), "centre.kind"),
         ("risk_aversion", json!(0.9), "risk_aversion"),

@@ -9,6 +9,7 @@ mod beyond;
 mod calibration;
 mod caution;
 mod centre;
+mod conditional;
 mod contributions;
 mod control;
 mod controlled;

@@ -25,10 +25,11 @@ use crate::control::pool;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::annualised::premium;
 use crate::control::request::caution::{CautionLevel, CautionLevels, CautionScale};
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{ProblemSpecification, Specification};
-use crate::control::uncertainty::centre::record;
+use crate::control::uncertainty::centre::representative_record;
 use crate::control::uncertainty::joint::radius_factor;
 use crate::control::uncertainty::laws::Laws;
 use crate::control::uncertainty::radius::RadiusEstimator;
@@ -98,10 +99,15 @@ impl Specification {
     }
 
     fn found(&self, kept: &Cache) -> CautionLevels {
-        let history = record(&self.problem.history, &self.problem);
+        let history = representative_record(&self.problem);
         let laws = Laws::with(self, kept.clone());
         let worlds = Worlds::of(&history, &self.problem);
-        let losses = worlds.losses(&laws, self.problem.learning, &history, self.seed);
+        // The weights of a representative record are in how often it has a return.
+        let learning = match self.problem.centre {
+            CentreSpecification::Conditional { .. } => Learning::default(),
+            _ => self.problem.learning,
+        };
+        let losses = worlds.losses(&laws, learning, &history, self.seed);
         worlds.levels(&losses)
     }
 }

@@ -47,7 +47,7 @@ pub struct Advice {
     pub radius: f64,
     /// Number of returns observed, including the history.
     pub sample_size: usize,
-    /// Effective sample size; equal to `sample_size` if `learning` is `equal`.
+    /// Effective sample size; equal to `sample_size` if `learning` is `equal` and the centre is not `conditional`.
     pub effective_size: f64,
     /// Predicted standard deviation of the log certainty equivalent.
     pub surrogate_sd: f64,
@@ -62,7 +62,7 @@ pub struct Advice {
 pub struct Uncertainty {
     /// Number of returns observed, including the history.
     pub sample_size: usize,
-    /// Effective sample size; equal to `sample_size` if `learning` is `equal`.
+    /// Effective sample size; equal to `sample_size` if `learning` is `equal` and the centre is not `conditional`.
     pub effective_size: f64,
     /// Raw moments of the learned law, from the first to the specification's count.
     pub moments: Vec<f64>,

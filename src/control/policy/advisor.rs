@@ -267,7 +267,7 @@ impl Advisor {
             floor,
             radius: inputs.radius,
             sample_size: inputs.state.law.sample_size(),
-            effective_size: inputs.state.law.effective_size(),
+            effective_size: self.problem.laws.effective_size(&inputs.state.law),
             surrogate_sd: predicted.deviation,
             in_design: predicted.in_design,
             source: inputs.source,
@@ -333,7 +333,7 @@ impl Advisor {
         let Measure { radius, quantile } = self.problem.laws.measure(&state.law);
         Uncertainty {
             sample_size: state.law.sample_size(),
-            effective_size: state.law.effective_size(),
+            effective_size: self.problem.laws.effective_size(&state.law),
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),
             quantile,
             radius,

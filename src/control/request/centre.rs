@@ -24,6 +24,17 @@ pub enum CentreSpecification {
         /// Number of periods in which the weight of a square halves, 1 to 1e15.
         half_life: f64,
     },
+    /// The law of the returns seen at times like the present: a return has the weight `exp(-(d / bandwidth)^2 / 2)`, times
+    /// that of its age, with d how far what was known before it is from what is known now, in standard deviations. Its
+    /// radius is that of the weighted bridge. This needs the framework `static` or one period, because what will be known
+    /// later is not part of a state.
+    Conditional {
+        /// What tells times apart.
+        on: Covariate,
+        /// Standard deviations at which a return has the weight 0.6, 0.05 to 1e15. Widened if fewer than 30 returns would
+        /// count. Without bound the centre is that of `empirical`.
+        bandwidth: f64,
+    },
     /// The law of the returns seen, mixed with an assumed law that counts as additional returns. Exactly one of `law`
     /// and `history` is given. With n returns seen the radius is theirs times n / (n + weight): the ball allows for
     /// what they may miss. The assumed law is the user's assumption, and the ball does not allow for its error.
@@ -39,6 +50,39 @@ pub enum CentreSpecification {
     },
 }
 
+/// What is known before each period and tells times apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Covariate {
+    /// The exponentially weighted mean of the log-returns before.
+    Trend {
+        /// Number of periods in which the weight of a return halves, 1 to 1e15.
+        half_life: f64,
+    },
+    /// The root of the exponentially weighted mean of their squares.
+    Volatility {
+        /// Number of periods in which the weight of a square halves, 1 to 1e15.
+        half_life: f64,
+    },
+    /// Numbers of your own.
+    Column {
+        /// What was known before each return of the history, oldest first, and what is known now: one number more than the
+        /// history has.
+        values: Vec<f64>,
+    },
+}
+
+impl Covariate {
+    /// Returns the name used in requests.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Covariate::Trend { .. } => "trend",
+            Covariate::Volatility { .. } => "volatility",
+            Covariate::Column { .. } => "column",
+        }
+    }
+}
+
 impl Default for CentreSpecification {
     fn default() -> Self {
         CentreSpecification::Empirical {}
@@ -52,6 +96,7 @@ impl CentreSpecification {
             CentreSpecification::Empirical {} => "empirical",
             CentreSpecification::Smoothed { .. } => "smoothed",
             CentreSpecification::VolatilityScaled { .. } => "volatility_scaled",
+            CentreSpecification::Conditional { .. } => "conditional",
             CentreSpecification::Mixed { .. } => "mixed",
         }
     }
@@ -63,7 +108,7 @@ impl CentreSpecification {
 
     /// Returns true if the centre depends on the order of the returns, which the law of the returns seen does not keep.
     pub fn takes_order(&self) -> bool {
-        matches!(self, CentreSpecification::VolatilityScaled { .. })
+        matches!(self, CentreSpecification::VolatilityScaled { .. } | CentreSpecification::Conditional { .. })
     }
 
     /// Returns the number of returns that the assumed law counts as; 0 without one.
@@ -89,6 +134,9 @@ impl CentreSpecification {
                 format!(", each with a normal error of deviation {bandwidth},")
             }
             CentreSpecification::VolatilityScaled { .. } => ", each rescaled to today's volatility,".to_owned(),
+            CentreSpecification::Conditional { on, .. } => {
+                format!(", weighted by how much the {} before each was like that of today,", on.name())
+            }
             CentreSpecification::Mixed { weight, .. } => {
                 format!(" and the assumed law that counts as {weight} more")
             }

@@ -2,9 +2,10 @@
 
 use crate::control::error::FieldError;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
-use crate::control::request::centre::CentreSpecification;
+use crate::control::request::centre::{CentreSpecification, Covariate};
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::HALF_LIFE;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, LOG_RETURNS, within};
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, ProblemSpecification};
@@ -12,6 +13,10 @@ use crate::control::request::support::Interval;
 
 /// Allowed standard deviations of the smoothing error.
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
+/// Allowed bandwidths of a conditional centre, in standard deviations of what tells times apart.
+pub const KERNEL_BANDWIDTH: (f64, f64) = (0.05, 1e15);
+/// Largest absolute number that tells times apart.
+const COVARIATE: f64 = 1e15;
 /// Allowed number of returns that an assumed law counts as. With more, a record would have no effect.
 pub const ASSUMED_WEIGHT: (f64, f64) = (0.0, 1e6);
 
@@ -19,6 +24,7 @@ impl Bounded for CentreSpecification {
     const BOUNDS: &'static [FieldBounds] = &[
         ("smoothed.bandwidth", ValueBounds::number(BANDWIDTH)),
         ("volatility_scaled.half_life", ValueBounds::number(HALF_LIFE)),
+        ("conditional.bandwidth", ValueBounds::number(KERNEL_BANDWIDTH)),
         ("mixed.history", ValueBounds::list(&HISTORY_LENGTH, &LOG_RETURNS)),
         ("mixed.weight", ValueBounds::number(ASSUMED_WEIGHT)),
     ];
@@ -38,7 +44,7 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
         let refused = |rule: &str| Err(FieldError::new("problem.centre.kind", centre.name(), rule));
         if problem.horizon > 1 {
             return refused(
-                "must be another centre if the horizon exceeds 1, unless the framework is static: a state does not hold how later returns change the volatility",
+                "must be another centre if the horizon exceeds 1, unless the framework is static: a state does not hold how later returns change it",
             );
         }
         if laws == InitialLaws::Resampled {
@@ -52,6 +58,17 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
         }
         CentreSpecification::Smoothed { bandwidth } => {
             within("problem.centre.bandwidth", *bandwidth, BANDWIDTH.0, BANDWIDTH.1)
+        }
+        CentreSpecification::Conditional { on, bandwidth } => {
+            within("problem.centre.bandwidth", *bandwidth, KERNEL_BANDWIDTH.0, KERNEL_BANDWIDTH.1)?;
+            check_covariate(on, problem.history.len())?;
+            match problem.radius_rule() {
+                rule @ (RadiusRule::Calibrated { .. } | RadiusRule::Joint { .. }) => {
+                    let allowed = "must be bridge, root_n or fixed if the centre is conditional";
+                    Err(FieldError::new("problem.radius.rule", rule.name(), allowed))
+                }
+                _ => Ok(()),
+            }
         }
         CentreSpecification::Mixed { .. } if learning.decays() => {
             let rule = "must be equal if the centre is mixed: the assumed law has no age";
@@ -69,6 +86,24 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
                 }
             }
         }
+    }
+}
+
+fn check_covariate(on: &Covariate, returns: usize) -> Result<(), FieldError> {
+    match on {
+        Covariate::Trend { half_life } | Covariate::Volatility { half_life } => {
+            within("problem.centre.on.half_life", *half_life, HALF_LIFE.0, HALF_LIFE.1)
+        }
+        Covariate::Column { values } if values.len() != returns + 1 => {
+            let rule = format!(
+                "must hold {} numbers: one known before each of the {returns} returns, and the present one",
+                returns + 1
+            );
+            Err(FieldError::new("problem.centre.on.values", format!("{} values", values.len()), rule))
+        }
+        Covariate::Column { values } => values.iter().enumerate().try_for_each(|(index, value)| {
+            within(&format!("problem.centre.on.values[{index}]"), *value, -COVARIATE, COVARIATE)
+        }),
     }
 }
 

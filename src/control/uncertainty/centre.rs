@@ -1,17 +1,21 @@
 //! The discrete law that a Wasserstein ball is centred on.
 
 use crate::control::problem::sampling_law::{admissible, continuous_law};
-use crate::control::request::centre::CentreSpecification;
+use crate::control::request::centre::{CentreSpecification, Covariate};
 use crate::control::request::framework::Framework;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{Interval, LawExtent};
 use crate::numerics::law::ContinuousLaw;
+use crate::numerics::law::conditional::{effective, kernel_weights, representative, trend};
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::law::volatility::rescaled;
+use crate::numerics::law::volatility::{expected, rescaled};
 
 /// Smallest mass of an atom: less is lost in rounding, so an atom that decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
+
+/// The least number of returns that count under a conditional centre.
+const LEAST_LIKE: f64 = 30.0;
 
 /// The Gauss-Hermite rule of five nodes for a standard normal error, exact for polynomials up to the ninth order: nodes
 /// 0 and +-sqrt(5 -+ sqrt(10)), masses 8/15 and (7 +- 2 sqrt(10)) / 60. A record has many returns, and five nodes
@@ -57,6 +61,38 @@ pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
             rescaled(history, half_life).into_iter().map(|log_return| admissible(log_return, problem)).collect()
         }
         _ => history.to_vec(),
+    }
+}
+
+/// Returns the weights of a history under a conditional centre; `None` if all its returns count as they are learned.
+fn conditional_weights(problem: &ProblemSpecification) -> Option<Vec<f64>> {
+    let CentreSpecification::Conditional { on, bandwidth } = &problem.centre else { return None };
+    let known = match on {
+        Covariate::Trend { half_life } => trend(&problem.history, *half_life),
+        Covariate::Volatility { half_life } => expected(&problem.history, *half_life),
+        Covariate::Column { values } => values.clone(),
+    };
+    let ages = problem.learning.weights(problem.history.len());
+    let weights = kernel_weights(&known, &ages, *bandwidth, LEAST_LIKE);
+    (weights != ages).then_some(weights)
+}
+
+/// Returns the law of a history as the centre of the problem uses it.
+pub fn learned_law(problem: &ProblemSpecification) -> EmpiricalDistribution {
+    let record = record(&problem.history, problem);
+    match conditional_weights(problem) {
+        Some(weights) => EmpiricalDistribution::weighted(&record, &weights, problem.learning.retention()),
+        None => problem.learning.law(&record),
+    }
+}
+
+/// Returns the record that stands for a history in simulations of its worlds: the history itself, or under a conditional
+/// centre as many returns as count, drawn evenly from their weights.
+pub fn representative_record(problem: &ProblemSpecification) -> Vec<f64> {
+    let record = record(&problem.history, problem);
+    match conditional_weights(problem) {
+        Some(weights) => representative(&record, &weights, (effective(&weights).round() as usize).max(2)),
+        None => record,
     }
 }
 
@@ -156,7 +192,7 @@ impl Centre {
         let centring = Centring::of(problem);
         match known_law(problem) {
             Some(law) => centring.known_centre(&law),
-            None => centring.centre(&problem.learning.law(&record(&problem.history, problem))),
+            None => centring.centre(&learned_law(problem)),
         }
     }
 

@@ -9,7 +9,7 @@ use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::control::request::support::Interval;
-use crate::control::uncertainty::centre::record;
+use crate::control::uncertainty::centre::{learned_law, record};
 use crate::numerics::bridge::limit::BridgeLaw;
 use crate::numerics::bridge::paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::bridge::sized_gaps::Statistic;
@@ -104,9 +104,9 @@ impl RadiusEstimator {
         };
         let (last_size, learning) = (problem.history.len() + problem.horizon - 1, problem.learning);
         let history = record(&problem.history, problem);
-        let (learned, retention) = (learning.law(&history), learning.retention());
+        let (learned, retention) = (learned_law(problem), learning.retention());
         let calibration = goal.map(|goal| Calibration { history, retention, goal, factor: OnceLock::new() });
-        let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL;
+        let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL || !(learned.is_even() || retention < 1.0);
         let support_length = problem.support_rule().given().map_or(0.0, |Interval { min, max }| max - min);
         let (seed, centre) = (*seed, problem.centre.clone());
         RadiusEstimator {

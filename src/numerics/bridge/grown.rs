@@ -160,7 +160,7 @@ fn beyond(law: &EmpiricalDistribution, base: &[f64]) -> Option<Vec<Learned>> {
             learned.push((atom, below));
         }
     }
-    (below == base.len() && law.retention() >= 1.0).then_some(learned)
+    (below == base.len() && law.is_even()).then_some(learned)
 }
 
 #[cfg(test)]

@@ -17,6 +17,8 @@ pub struct EmpiricalDistribution {
     /// Weight `d^k` of each value, in the order of the values.
     weights: Vec<f64>,
     retention: f64,
+    /// True if all weights are equal.
+    even: bool,
     /// Sums of the weights and of their squares, in the order of arrival.
     total: f64,
     squares: f64,
@@ -37,7 +39,17 @@ impl EmpiricalDistribution {
             (total, squares) = one_more(total, squares, retention);
         }
         let (sorted, weights) = weighted.into_iter().unzip();
-        EmpiricalDistribution { sorted, weights, retention, total, squares }
+        EmpiricalDistribution { sorted, weights, retention, even: retention >= 1.0, total, squares }
+    }
+
+    /// Creates the law of `sample`, finite and oldest first, with these positive weights; values added later shrink them
+    /// by `retention`. Cost O(n ln n).
+    pub fn weighted(sample: &[f64], weights: &[f64], retention: f64) -> Self {
+        let (total, squares) = (weights.iter().sum(), weights.iter().map(|weight| weight * weight).sum());
+        let mut weighted: Vec<(f64, f64)> = sample.iter().copied().zip(weights.iter().copied()).collect();
+        weighted.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let (sorted, weights) = weighted.into_iter().unzip();
+        EmpiricalDistribution { sorted, weights, retention, even: false, total, squares }
     }
 
     /// Adds one observation. Cost O(n).
@@ -89,6 +101,11 @@ impl EmpiricalDistribution {
     /// Returns the sum of the weights: n if they are equal.
     pub fn total_weight(&self) -> f64 {
         self.total
+    }
+
+    /// Returns true if all weights are equal.
+    pub fn is_even(&self) -> bool {
+        self.even
     }
 
     /// Returns d, the factor by which a value's weight shrinks when another value is added.

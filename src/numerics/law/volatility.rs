@@ -4,6 +4,20 @@
 /// magnified without bound.
 const SMALLEST_SHARE: f64 = 0.01;
 
+/// Returns the volatility that is expected before each value of a record, and before the next: s_t as in [`rescaled`]. Cost
+/// O(n).
+pub fn expected(record: &[f64], half_life: f64) -> Vec<f64> {
+    let start = record.iter().map(|z| z * z).sum::<f64>() / record.len() as f64;
+    let newest = -f64::exp_m1(-std::f64::consts::LN_2 / half_life);
+    let mut square = start;
+    let mut after = |log_return: &f64| {
+        square += newest * (log_return * log_return - square);
+        square
+    };
+    let squares = std::iter::once(start).chain(record.iter().map(&mut after));
+    squares.map(|square| square.max(SMALLEST_SHARE * SMALLEST_SHARE * start).sqrt()).collect()
+}
+
 /// Rescales a record, oldest first, as if each return had occurred at the volatility that is expected for the next one:
 ///
 ///   y_t = z_t s_(n+1) / s_t,   s_(t+1)^2 = d s_t^2 + (1 - d) z_t^2,   d = 2^(-1 / half_life),
@@ -15,16 +29,9 @@ pub fn rescaled(record: &[f64], half_life: f64) -> Vec<f64> {
     if start <= 0.0 {
         return record.to_vec();
     }
-    let newest = -f64::exp_m1(-std::f64::consts::LN_2 / half_life);
-    let mut square = start;
-    let mut expected = |log_return: &f64| {
-        let before = square.max(SMALLEST_SHARE * SMALLEST_SHARE * start).sqrt();
-        square += newest * (log_return * log_return - square);
-        log_return / before
-    };
-    let standard: Vec<f64> = record.iter().map(&mut expected).collect();
-    let now = square.max(SMALLEST_SHARE * SMALLEST_SHARE * start).sqrt();
-    standard.into_iter().map(|value| value * now).collect()
+    let expected = expected(record, half_life);
+    let now = expected[record.len()];
+    record.iter().zip(&expected).map(|(log_return, before)| log_return / before * now).collect()
 }
 
 #[cfg(test)]

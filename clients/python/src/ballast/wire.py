@@ -410,6 +410,37 @@ class Costs(TypedDict):
     """Mean seconds of one re-solved step; null if there was none."""
 
 
+class Covariate1(TypedDict):
+    """The exponentially weighted mean of the log-returns before."""
+
+    half_life: float
+    """Number of periods in which the weight of a return halves, 1 to 1e15."""
+    kind: Literal["trend"]
+
+
+class Covariate2(TypedDict):
+    """The root of the exponentially weighted mean of their squares."""
+
+    half_life: float
+    """Number of periods in which the weight of a square halves, 1 to 1e15."""
+    kind: Literal["volatility"]
+
+
+class Covariate3(TypedDict):
+    """Numbers of your own."""
+
+    values: list[float]
+    """
+    What was known before each return of the history, oldest first, and what is known now: one number more than the
+    history has.
+    """
+    kind: Literal["column"]
+
+
+Covariate: TypeAlias = Covariate1 | Covariate2 | Covariate3
+"""What is known before each period and tells times apart."""
+
+
 class DeclaredAction(TypedDict):
     """An action: any number between two bounds, or one of some values."""
 
@@ -1483,7 +1514,7 @@ class Uncertainty(TypedDict):
     sample_size: int
     """Number of returns observed, including the history."""
     effective_size: float
-    """Effective sample size; equal to `sample_size` if `learning` is `equal`."""
+    """Effective sample size; equal to `sample_size` if `learning` is `equal` and the centre is not `conditional`."""
     moments: list[float]
     """Raw moments of the learned law, from the first to the specification's count."""
     quantile: NotRequired[float | None]
@@ -1717,7 +1748,7 @@ class Advice(TypedDict):
     sample_size: int
     """Number of returns observed, including the history."""
     effective_size: float
-    """Effective sample size; equal to `sample_size` if `learning` is `equal`."""
+    """Effective sample size; equal to `sample_size` if `learning` is `equal` and the centre is not `conditional`."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
@@ -1936,6 +1967,24 @@ class CautionLevels(TypedDict):
 
 class CentreSpecification4(TypedDict):
     """
+    The law of the returns seen at times like the present: a return has the weight `exp(-(d / bandwidth)^2 / 2)`, times
+    that of its age, with d how far what was known before it is from what is known now, in standard deviations. Its
+    radius is that of the weighted bridge. This needs the framework `static` or one period, because what will be known
+    later is not part of a state.
+    """
+
+    on: Covariate
+    """What tells times apart."""
+    bandwidth: float
+    """
+    Standard deviations at which a return has the weight 0.6, 0.05 to 1e15. Widened if fewer than 30 returns would
+    count. Without bound the centre is that of `empirical`.
+    """
+    kind: Literal["conditional"]
+
+
+class CentreSpecification5(TypedDict):
+    """
     The law of the returns seen, mixed with an assumed law that counts as additional returns. Exactly one of `law`
     and `history` is given. With n returns seen the radius is theirs times n / (n + weight): the ball allows for
     what they may miss. The assumed law is the user's assumption, and the ball does not allow for its error.
@@ -1949,7 +1998,7 @@ class CentreSpecification4(TypedDict):
     kind: Literal["mixed"]
 
 
-CentreSpecification: TypeAlias = CentreSpecification1 | CentreSpecification2 | CentreSpecification3 | CentreSpecification4
+CentreSpecification: TypeAlias = CentreSpecification1 | CentreSpecification2 | CentreSpecification3 | CentreSpecification4 | CentreSpecification5
 """The centre of the ball of laws, built from the returns seen: those of the history and those seen later."""
 
 

@@ -192,12 +192,14 @@ export function caution(problem) {
 }
 
 /** Says what the ball is centred on, if that is not the law of the returns seen. */
-export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit = "period") {
+export function centreInWords({ kind, bandwidth, half_life, on, weight } = {}, unit = "period") {
   switch (kind) {
     case "smoothed":
       return `Every return seen is spread out as a normal distribution around it, with deviation ${percent(bandwidth, 2)}.`;
     case "volatility_scaled":
       return `Every return seen is rescaled to the current volatility, in which squared returns count half after ${counted(half_life, unit)}.`;
+    case "conditional":
+      return `Returns count the more, the more the ${on.kind === "column" ? "given figure" : on.kind} before each was like that of today.`;
     case "mixed":
       return `Besides the returns seen, it uses an assumed law that counts as much as ${significant(weight)} more returns.`;
     default:
