@@ -115,7 +115,7 @@ fn two_states_are_two_records() {
     }
 }
 
-/// What is earned by a covariate that moves the mean, and by the same one shuffled, beyond what is held without it: the mean
+/// Measures what is earned by a covariate that moves the mean, and by the same one shuffled, beyond what is held without it: the mean
 /// log certainty equivalent of a period under the true law, over fresh records.
 #[test]
 fn a_covariate_that_tells_nothing_earns_nothing() {

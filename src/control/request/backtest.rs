@@ -9,7 +9,8 @@ use utoipa::ToSchema;
 use crate::control::error::FieldError;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::caution::CautionLevel;
-use crate::control::request::centre::{CentreSpecification, Covariate};
+use crate::control::request::centre::CentreSpecification;
+use crate::control::request::centre_rules::check_walked;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
 use crate::control::request::own_weights::{OwnWeights, check_weights};
@@ -225,16 +226,6 @@ impl Bounded for BacktestRequest {
 }
 
 impl BacktestRequest {
-    /// Refuses a column of numbers beside the returns, of which each window would need its own part.
-    fn check_centre(&self) -> Result<(), FieldError> {
-        match &self.centre {
-            CentreSpecification::Conditional { on: on @ Covariate::Column { .. }, .. } => {
-                Err(FieldError::new("centre.on.kind", on.name(), "must be trend or volatility in a walk-forward"))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// Fills the defaults that depend on other fields, and checks every rule except those of each window's training.
     ///
     /// # Errors
@@ -250,7 +241,7 @@ impl BacktestRequest {
         let year = self.periods_per_year.ok_or_else(|| FieldError::new("periods_per_year", "null", rule))?;
         whole("periods_per_year", year, &YEAR)?;
         self.check_strategies()?;
-        self.check_centre()?;
+        check_walked(&self.centre)?;
         check_weights(&self.weights, self.period_count())?;
         let every = self.every.unwrap_or_else(|| self.horizon.map_or(year, |horizon| year.min(horizon)));
         let horizon = self.horizon.unwrap_or(every);

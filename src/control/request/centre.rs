@@ -29,7 +29,7 @@ pub enum CentreSpecification {
     /// radius is that of the weighted bridge. This needs the framework `static` or one period, because what will be known
     /// later is not part of a state.
     Conditional {
-        /// What tells times apart.
+        /// A figure that tells times apart.
         on: Covariate,
         /// Standard deviations at which a return has the weight 0.6, 0.05 to 1e15. Widened if fewer than 30 returns would
         /// count. Without bound the centre is that of `empirical`.
@@ -50,7 +50,7 @@ pub enum CentreSpecification {
     },
 }
 
-/// What is known before each period and tells times apart.
+/// A figure known before each period that tells times apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Covariate {
@@ -66,7 +66,7 @@ pub enum Covariate {
     },
     /// Numbers of your own.
     Column {
-        /// What was known before each return of the history, oldest first, and what is known now: one number more than the
+        /// The figure before each return of the history, oldest first, and the present one: one number more than the
         /// history has.
         values: Vec<f64>,
     },

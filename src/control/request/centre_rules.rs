@@ -89,6 +89,19 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
     }
 }
 
+/// Refuses a column of numbers beside the returns of a walk-forward, of which each window would need its own part.
+///
+/// # Errors
+/// The centre has one.
+pub(super) fn check_walked(centre: &CentreSpecification) -> Result<(), FieldError> {
+    match centre {
+        CentreSpecification::Conditional { on: on @ Covariate::Column { .. }, .. } => {
+            Err(FieldError::new("centre.on.kind", on.name(), "must be trend or volatility in a walk-forward"))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn check_covariate(on: &Covariate, returns: usize) -> Result<(), FieldError> {
     match on {
         Covariate::Trend { half_life } | Covariate::Volatility { half_life } => {

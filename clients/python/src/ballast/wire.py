@@ -431,14 +431,14 @@ class Covariate3(TypedDict):
 
     values: list[float]
     """
-    What was known before each return of the history, oldest first, and what is known now: one number more than the
+    The figure before each return of the history, oldest first, and the present one: one number more than the
     history has.
     """
     kind: Literal["column"]
 
 
 Covariate: TypeAlias = Covariate1 | Covariate2 | Covariate3
-"""What is known before each period and tells times apart."""
+"""A figure known before each period that tells times apart."""
 
 
 class DeclaredAction(TypedDict):
@@ -1974,7 +1974,7 @@ class CentreSpecification4(TypedDict):
     """
 
     on: Covariate
-    """What tells times apart."""
+    """A figure that tells times apart."""
     bandwidth: float
     """
     Standard deviations at which a return has the weight 0.6, 0.05 to 1e15. Widened if fewer than 30 returns would
