@@ -153,7 +153,7 @@ fn a_covariate_that_tells_nothing_earns_nothing() {
     }
 }
 
-/// Where the covariate tells nothing, the weighted ball holds the law of the returns as often as it says.
+/// A covariate that tells nothing leaves the law as it is: the weighted ball holds the law of the returns as often as it says.
 #[test]
 fn the_weighted_ball_holds_the_law_as_often_as_it_says() {
     const RECORDS: u64 = 150;

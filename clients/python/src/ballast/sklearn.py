@@ -77,7 +77,8 @@ class RobustAllocation(Advised, BaseEstimator):
 
     ``url`` is the address of the service, and the key comes from ``BALLAST_KEY``. ``initial_wealth``,
     ``risk_aversion``, ``utility``, ``radius``, ``ground_norm``, ``means``, ``action_interval``, ``caution``,
-    ``support`` and ``periods_per_year`` are fields of the problem of ``POST /advise``. The service chooses those you leave out.
+    ``support`` and ``periods_per_year`` are fields of the problem of ``POST /advise``. The service chooses those you
+    leave out.
 
     After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: the advised share in each asset, and the
     rest in the column ``bank``. Without that column the rest is also in the bank, but the weights sum to less than 1.
