@@ -189,13 +189,6 @@ impl Fund {
         self.rows.extend(learned);
     }
 
-    /// Returns the state of a fund with another composition.
-    fn state(&self, advisor: &Advisor, state: &State, composition: &[f64]) -> State {
-        let returns = fund_returns(&self.centred(), composition);
-        let law = advisor.specification().problem.learning.law(&returns);
-        State { wealth: state.wealth, holding: state.holding, law }
-    }
-
     /// Prepares the period after `step`: chooses the composition if the policy advises that period, and returns the
     /// state of the fund, with the one-step solution if one made the proposal. Cost: that of [`Self::compose`].
     pub fn enter(&mut self, advisor: &Advisor, step: usize, state: &State) -> (State, Option<AssetsSolution>) {
@@ -217,10 +210,11 @@ impl Fund {
         state: &State,
     ) -> (State, Option<AssetsSolution>) {
         let problem = &advisor.specification().problem;
-        let mut solution = None;
+        let (rows, mut solution) = (self.centred(), None);
+        let of_fund = |composition: &[f64]| fund_returns(&rows, composition);
+        let with = |returns: &[f64]| State { law: problem.learning.law(returns), ..*state };
         let proposed = fund.composition.composition(&self.rows, || {
-            let rows = self.centred();
-            let even = self.state(advisor, state, &inverse_volatility(&self.rows));
+            let even = with(&of_fund(&inverse_volatility(&self.rows)));
             let law = ReturnScenarios {
                 returns: &rows,
                 radius: advisor.radius(&even),
@@ -236,15 +230,17 @@ impl Fund {
         let left = (problem.horizon - step) as f64;
         // The policy's value of the fund, and that value less the cost of the trade.
         let value = |composition: &[f64]| {
-            let varies = problem.learning.check_deviation("fund", &fund_returns(&self.centred(), composition)).is_ok();
-            let (total, gain) = advisor.surrogate(step, &self.state(advisor, state, composition));
+            let returns = of_fund(composition);
+            let varies = problem.learning.check_deviation("fund", &returns).is_ok();
+            let (total, gain) = advisor.surrogate(step, &with(&returns));
             let executed: Vec<f64> = composition.iter().map(|share| total * share).collect();
             let net = gain / left - problem.trading_cost * self.traded(&executed);
             varies.then_some([gain, net])
         };
         let chosen = accept_if_no_worse(self.composition.clone(), proposed, value);
+        let state = with(&of_fund(&chosen));
         self.take(chosen);
-        (self.state(advisor, state, &self.composition), solution)
+        (state, solution)
     }
 
     /// Reports a one-step solution in wealth, by the names of the assets; the bank alone makes `floor`.
