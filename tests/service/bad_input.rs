@@ -243,7 +243,7 @@ fn the_description_is_as_strict_as_the_rules_of_single_fields() {
     assert_eq!(loose, DECIDED_TOGETHER);
 }
 
-const DECIDED_TOGETHER: [&str; 22] = [
+const DECIDED_TOGETHER: [&str; 23] = [
     "problem.action_interval[0]",
     "problem.action_interval[1]",
     "problem.contributions",
@@ -255,6 +255,7 @@ const DECIDED_TOGETHER: [&str; 22] = [
     "problem.risk_aversion",
     "problem.centre.law.kind",
     "problem.centre.law",
+    "problem.centre.kind",
     "problem.centre.kind",
     "problem.centre.law",
     "problem.support",

@@ -1,10 +1,12 @@
 //! The conditional centre: `problem.centre` of the kind `conditional`.
 
+use crate::support::App;
 use crate::support::policies::{advisor, train};
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
-use ballast::numerics::law::conditional::{effective, kernel_weights, representative, trend};
+use ballast::numerics::law::conditional::{effective, kernel_weights, representative};
 use ballast::numerics::machine::streams::stream;
+use ballast::numerics::statistics::moving_mean::moving_means;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use serde_json::{Value, json};
@@ -38,7 +40,7 @@ fn normals(count: usize, seed: u64) -> Vec<f64> {
 #[test]
 fn weights_agree_with_pencil_and_paper() {
     // Means halved towards each value: 0.02, then 0.03, then 0.01.
-    let means = trend(&[0.04, -0.01, 0.03], 1.0);
+    let means = moving_means(&[0.04, -0.01, 0.03], 1.0);
     for (found, expected) in means.iter().zip([0.02, 0.03, 0.01, 0.02]) {
         assert!((found - expected).abs() < 1e-15, "{means:?}");
     }
@@ -83,6 +85,65 @@ fn a_bandwidth_without_bound_is_the_empirical_centre_bit_for_bit() {
             assert_ne!(by(&conditional(on, 0.5)), by(&json!({ "kind": "empirical" })), "{framework} {on}");
         }
     }
+}
+
+#[test]
+fn a_bandwidth_without_bound_leaves_the_levels_of_caution_of_decaying_returns_as_they_are() {
+    let history: Vec<f64> = normals(60, 2).iter().map(|normal| 0.01 + 0.04 * normal).collect();
+    let levels = |centre: Value| {
+        let mut body = request(&history, "adaptive", 1, &json!({ "rule": "bridge", "paths": 400 }), &centre);
+        body["problem"]["learning"] = json!({ "kind": "decay", "half_life": 20.0 });
+        body["problem"]["caution"] = json!("balanced");
+        serde_json::to_value(advisor(body).specification()).unwrap()["problem"]["levels"].clone()
+    };
+    let trend = |bandwidth: f64| conditional(&json!({ "kind": "trend", "half_life": 12.0 }), bandwidth);
+    assert!(levels(trend(1e15))["balanced"]["scale"].is_f64());
+    assert_eq!(levels(trend(1e15)), levels(json!({ "kind": "empirical" })));
+    assert_ne!(levels(trend(0.5)), levels(json!({ "kind": "empirical" })));
+}
+
+/// A column belongs to the returns of one history, and a path has no figures: what would read them otherwise is refused.
+#[tokio::test(flavor = "multi_thread")]
+async fn figures_that_would_be_misread_are_refused_by_name() {
+    let mut app = App::start().await;
+    let history: Vec<f64> = normals(60, 2).iter().map(|normal| 0.01 + 0.04 * normal).collect();
+    let column = |values: Vec<f64>| conditional(&json!({ "kind": "column", "values": values }), 1.0);
+    let good = request(&history, "static", 2, &bridge(), &column(normals(61, 3)));
+    let advise = |change: &dyn Fn(&mut Value)| {
+        let mut body = good.clone();
+        body.as_object_mut().unwrap().remove("design");
+        body["problem"]["horizon"] = json!(1);
+        change(&mut body);
+        body
+    };
+    assert_eq!(app.post("/advise", &advise(&|_| ())).await.0, 200);
+    let faults: [(Value, &str); 6] = [
+        (advise(&|body| body["sensitivity"] = json!(true)), "sensitivity"),
+        (advise(&|body| body["problem"]["centre"] = column(normals(60, 3))), "problem.centre.on.values"),
+        (advise(&|body| body["problem"]["centre"] = column(vec![1.0; 61])), "problem.centre.on.values"),
+        (advise(&|body| body["problem"]["centre"]["on"]["values"][7] = json!(1e16)), "problem.centre.on.values[7]"),
+        (advise(&|body| body["problem"]["centre"]["bandwidth"] = json!(0.01)), "problem.centre.bandwidth"),
+        (
+            advise(&|body| {
+                body["problem"]["history"] = json!(history[..30]);
+                body["problem"]["centre"] = column(normals(31, 3));
+            }),
+            "problem.history",
+        ),
+    ];
+    for (body, field) in faults {
+        let (status, refused) = app.post("/advise", &body).await;
+        assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(field)), "{refused}");
+    }
+    let mut evaluation = good.clone();
+    evaluation["problem"].as_object_mut().unwrap().remove("framework");
+    evaluation["frameworks"] = json!(["static"]);
+    let (status, refused) = app.post("/evaluate", &evaluation).await;
+    assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some("problem.centre.kind")), "{refused}");
+    app.train(&good).await;
+    let session = json!({ "policy": app.policy, "renew": { "every": 1 } });
+    let (status, refused) = app.post("/sessions", &session).await;
+    assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some("renew")), "{refused}");
 }
 
 /// Returns that follow one of two laws, and a column that says which: a bandwidth that tells them apart solves the problem

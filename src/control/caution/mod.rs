@@ -25,7 +25,6 @@ use crate::control::pool;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::annualised::premium;
 use crate::control::request::caution::{CautionLevel, CautionLevels, CautionScale};
-use crate::control::request::centre::CentreSpecification;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{ProblemSpecification, Specification};
@@ -99,14 +98,9 @@ impl Specification {
     }
 
     fn found(&self, kept: &Cache) -> CautionLevels {
-        let history = representative_record(&self.problem);
+        let (history, learning) = representative_record(&self.problem);
         let laws = Laws::with(self, kept.clone());
         let worlds = Worlds::of(&history, &self.problem);
-        // The weights of a representative record are in how often it has a return.
-        let learning = match self.problem.centre {
-            CentreSpecification::Conditional { .. } => Learning::default(),
-            _ => self.problem.learning,
-        };
         let losses = worlds.losses(&laws, learning, &history, self.seed);
         worlds.levels(&losses)
     }

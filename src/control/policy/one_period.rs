@@ -129,11 +129,16 @@ impl OnePeriod {
         Ok(self.advisor.sensitivity_by(0, &state, &self.problem().history, advice, &of))
     }
 
-    /// Checks that some return changes the advice.
+    /// Checks that some return changes the advice, and that other records can be advised.
     ///
     /// # Errors
-    /// Under the name `sensitivity`: the framework is `known_law`, which uses no returns.
+    /// Under the name `sensitivity`: the framework is `known_law`, which uses no returns, or the centre has a column, which
+    /// belongs to this record.
     pub fn check_sensitivity(&self) -> Result<(), FieldError> {
+        if self.problem().centre.has_column() {
+            let rule = "must be false if the centre has a column: it has no figures for other records";
+            return Err(FieldError::new("sensitivity", true, rule));
+        }
         check_learning(self.problem(), self.problem().framework != Framework::KnownLaw)
     }
 

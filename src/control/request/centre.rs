@@ -81,6 +81,14 @@ impl Covariate {
             Covariate::Column { .. } => "column",
         }
     }
+
+    /// Returns what it is in a sentence.
+    fn noun(&self) -> &'static str {
+        match self {
+            Covariate::Column { .. } => "given figure",
+            other => other.name(),
+        }
+    }
 }
 
 impl Default for CentreSpecification {
@@ -111,6 +119,11 @@ impl CentreSpecification {
         matches!(self, CentreSpecification::VolatilityScaled { .. } | CentreSpecification::Conditional { .. })
     }
 
+    /// Returns true if the centre has numbers that belong to the returns of one history, so that no other may replace it.
+    pub fn has_column(&self) -> bool {
+        matches!(self, CentreSpecification::Conditional { on: Covariate::Column { .. }, .. })
+    }
+
     /// Returns the number of returns that the assumed law counts as; 0 without one.
     pub fn assumed_weight(&self) -> f64 {
         match self {
@@ -135,7 +148,7 @@ impl CentreSpecification {
             }
             CentreSpecification::VolatilityScaled { .. } => ", each rescaled to today's volatility,".to_owned(),
             CentreSpecification::Conditional { on, .. } => {
-                format!(", weighted by how much the {} before each was like that of today,", on.name())
+                format!(", weighted by how much the {} before each was like that of today,", on.noun())
             }
             CentreSpecification::Mixed { weight, .. } => {
                 format!(" and the assumed law that counts as {weight} more")

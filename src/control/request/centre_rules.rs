@@ -15,8 +15,13 @@ use crate::control::request::support::Interval;
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
 /// Allowed bandwidths of a conditional centre, in standard deviations of what tells times apart.
 pub const KERNEL_BANDWIDTH: (f64, f64) = (0.05, 1e15);
-/// Largest absolute number that tells times apart.
-const COVARIATE: f64 = 1e15;
+/// Allowed figures that tell times apart.
+const COVARIATE: (f64, f64) = (-1e15, 1e15);
+const FIGURES: ValueBounds = ValueBounds::number(COVARIATE);
+/// Allowed numbers of such figures: one for each return of a history, and the present one.
+const FIGURE_COUNT: std::ops::RangeInclusive<usize> = LEAST_LIKE + 2..=*HISTORY_LENGTH.end() + 1;
+/// The least number of returns that count under a conditional centre.
+pub const LEAST_LIKE: usize = 30;
 /// Allowed number of returns that an assumed law counts as. With more, a record would have no effect.
 pub const ASSUMED_WEIGHT: (f64, f64) = (0.0, 1e6);
 
@@ -27,6 +32,14 @@ impl Bounded for CentreSpecification {
         ("conditional.bandwidth", ValueBounds::number(KERNEL_BANDWIDTH)),
         ("mixed.history", ValueBounds::list(&HISTORY_LENGTH, &LOG_RETURNS)),
         ("mixed.weight", ValueBounds::number(ASSUMED_WEIGHT)),
+    ];
+}
+
+impl Bounded for Covariate {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("trend.half_life", ValueBounds::number(HALF_LIFE)),
+        ("volatility.half_life", ValueBounds::number(HALF_LIFE)),
+        ("column.values", ValueBounds::list(&FIGURE_COUNT, &FIGURES)),
     ];
 }
 
@@ -61,6 +74,11 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
         }
         CentreSpecification::Conditional { on, bandwidth } => {
             within("problem.centre.bandwidth", *bandwidth, KERNEL_BANDWIDTH.0, KERNEL_BANDWIDTH.1)?;
+            if problem.history.len() <= LEAST_LIKE {
+                let rule =
+                    format!("must hold more than {LEAST_LIKE} log-returns if the centre is conditional: so many count");
+                return Err(FieldError::new("problem.history", format!("{} values", problem.history.len()), rule));
+            }
             check_covariate(on, problem.history.len())?;
             match problem.radius_rule() {
                 rule @ (RadiusRule::Calibrated { .. } | RadiusRule::Joint { .. }) => {
@@ -94,11 +112,9 @@ pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) ->
 /// # Errors
 /// The centre has one.
 pub(super) fn check_walked(centre: &CentreSpecification) -> Result<(), FieldError> {
-    match centre {
-        CentreSpecification::Conditional { on: on @ Covariate::Column { .. }, .. } => {
-            Err(FieldError::new("centre.on.kind", on.name(), "must be trend or volatility in a walk-forward"))
-        }
-        _ => Ok(()),
+    match centre.has_column() {
+        true => Err(FieldError::new("centre.on.kind", "column", "must be trend or volatility in a walk-forward")),
+        false => Ok(()),
     }
 }
 
@@ -114,9 +130,16 @@ fn check_covariate(on: &Covariate, returns: usize) -> Result<(), FieldError> {
             );
             Err(FieldError::new("problem.centre.on.values", format!("{} values", values.len()), rule))
         }
-        Covariate::Column { values } => values.iter().enumerate().try_for_each(|(index, value)| {
-            within(&format!("problem.centre.on.values[{index}]"), *value, -COVARIATE, COVARIATE)
-        }),
+        Covariate::Column { values } => {
+            values.iter().enumerate().try_for_each(|(index, value)| {
+                within(&format!("problem.centre.on.values[{index}]"), *value, COVARIATE.0, COVARIATE.1)
+            })?;
+            if values[1..returns].iter().all(|value| *value == values[0]) {
+                let rule = "must vary before the returns: equal figures tell no times apart";
+                return Err(FieldError::new("problem.centre.on.values", format!("all {}", values[0]), rule));
+            }
+            Ok(())
+        }
     }
 }
 

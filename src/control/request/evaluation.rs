@@ -122,6 +122,11 @@ impl EvaluationRequest {
                 "must be left out: list the frameworks in `frameworks`",
             ));
         }
+        if let CentreSpecification::Conditional { .. } = self.problem.centre {
+            let rule =
+                "must be another centre: the returns of a path are drawn from one law, whatever came before them";
+            return Err(FieldError::new("problem.centre.kind", self.problem.centre.name(), rule));
+        }
         self.problem = self.problem.as_in_the_paper();
         let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
         self.problem.law.get_or_insert(sampling_law);

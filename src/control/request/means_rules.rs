@@ -14,7 +14,7 @@ use crate::numerics::statistics::shrinkage::ShrunkMeans;
 const INTENSITY: (f64, f64) = (0.0, 1.0);
 
 impl Bounded for MeansRule {
-    const BOUNDS: &'static [FieldBounds] = &[("intensity", ValueBounds::number(INTENSITY))];
+    const BOUNDS: &'static [FieldBounds] = &[("shrunk.intensity", ValueBounds::number(INTENSITY))];
 }
 
 impl Specification {

@@ -2,20 +2,20 @@
 
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::request::centre::{CentreSpecification, Covariate};
+use crate::control::request::centre_rules::LEAST_LIKE;
 use crate::control::request::framework::Framework;
+use crate::control::request::learning::Learning;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::support::{Interval, LawExtent};
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::law::conditional::{effective, kernel_weights, representative, trend};
+use crate::numerics::law::conditional::{effective, kernel_weights, representative};
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::numerics::law::volatility::{expected, rescaled};
+use crate::numerics::statistics::moving_mean::moving_means;
 
 /// Smallest mass of an atom: less is lost in rounding, so an atom that decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
-
-/// The least number of returns that count under a conditional centre.
-const LEAST_LIKE: f64 = 30.0;
 
 /// The Gauss-Hermite rule of five nodes for a standard normal error, exact for polynomials up to the ninth order: nodes
 /// 0 and +-sqrt(5 -+ sqrt(10)), masses 8/15 and (7 +- 2 sqrt(10)) / 60. A record has many returns, and five nodes
@@ -68,12 +68,12 @@ pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
 fn conditional_weights(problem: &ProblemSpecification) -> Option<Vec<f64>> {
     let CentreSpecification::Conditional { on, bandwidth } = &problem.centre else { return None };
     let known = match on {
-        Covariate::Trend { half_life } => trend(&problem.history, *half_life),
+        Covariate::Trend { half_life } => moving_means(&problem.history, *half_life),
         Covariate::Volatility { half_life } => expected(&problem.history, *half_life),
         Covariate::Column { values } => values.clone(),
     };
     let ages = problem.learning.weights(problem.history.len());
-    let weights = kernel_weights(&known, &ages, *bandwidth, LEAST_LIKE);
+    let weights = kernel_weights(&known, &ages, *bandwidth, LEAST_LIKE as f64);
     (weights != ages).then_some(weights)
 }
 
@@ -86,13 +86,16 @@ pub fn learned_law(problem: &ProblemSpecification) -> EmpiricalDistribution {
     }
 }
 
-/// Returns the record that stands for a history in simulations of its worlds: the history itself, or under a conditional
-/// centre as many returns as count, drawn evenly from their weights.
-pub fn representative_record(problem: &ProblemSpecification) -> Vec<f64> {
+/// Returns the record that stands for a history in simulations of its worlds, and how it is learned: the history itself, or
+/// under a conditional centre as many returns as count, drawn evenly from their weights, which then are equal.
+pub fn representative_record(problem: &ProblemSpecification) -> (Vec<f64>, Learning) {
     let record = record(&problem.history, problem);
     match conditional_weights(problem) {
-        Some(weights) => representative(&record, &weights, (effective(&weights).round() as usize).max(2)),
-        None => record,
+        Some(weights) => {
+            let count = (effective(&weights).round() as usize).max(2);
+            (representative(&record, &weights, count), Learning::default())
+        }
+        None => (record, problem.learning),
     }
 }
 

@@ -10,7 +10,6 @@ use super::UncertaintySet;
 use super::centre::{Centring, known_law};
 use super::radius::{Measure, Radii, RadiusEstimator};
 use crate::control::cache::Cache;
-use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{FeatureMap, Specification};
@@ -41,8 +40,6 @@ pub struct Laws {
     pub centring: Centring,
     /// True if the set follows the law of the returns seen.
     learns: bool,
-    /// True if only returns at times like the present count.
-    is_conditional: bool,
     /// The law of returns, if the framework knows it.
     known_law: Option<ContinuousLaw>,
     /// The uncertainty set of every law, if nothing is learned; computed once.
@@ -88,7 +85,6 @@ impl Laws {
             radii: RadiusEstimator::new(specification, kept),
             centring: Centring::of(problem),
             learns: framework.learns() && !problem.centre.takes_order(),
-            is_conditional: matches!(problem.centre, CentreSpecification::Conditional { .. }),
             known_law: known_law(problem),
             fixed: OnceLock::new(),
         }
@@ -128,7 +124,8 @@ impl Laws {
 
     /// Returns the effective sample size of the law that the set is around.
     pub fn effective_size(&self, law: &EmpiricalDistribution) -> f64 {
-        if self.is_conditional { self.radii.learned.effective_size() } else { law.effective_size() }
+        let learned = &self.radii.learned;
+        if learned.is_by_age() { law.effective_size() } else { learned.effective_size() }
     }
 
     /// Returns how many numbers are read to measure a law, or `None` if these are yet to be computed.

@@ -103,10 +103,10 @@ impl RadiusEstimator {
             rule => (rule, None),
         };
         let (last_size, learning) = (problem.history.len() + problem.horizon - 1, problem.learning);
-        let history = record(&problem.history, problem);
         let (learned, retention) = (learned_law(problem), learning.retention());
-        let calibration = goal.map(|goal| Calibration { history, retention, goal, factor: OnceLock::new() });
-        let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL || !(learned.is_even() || retention < 1.0);
+        let history = || record(&problem.history, problem);
+        let calibration = goal.map(|goal| Calibration { history: history(), retention, goal, factor: OnceLock::new() });
+        let decays = retention.powf(last_size as f64) < ALL_BUT_EQUAL || !learned.is_by_age();
         let support_length = problem.support_rule().given().map_or(0.0, |Interval { min, max }| max - min);
         let (seed, centre) = (*seed, problem.centre.clone());
         RadiusEstimator {

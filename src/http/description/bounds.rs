@@ -15,7 +15,7 @@ use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::backtest_assets::AssetsBacktestRequest;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::caution::CautionLevel;
-use crate::control::request::centre::CentreSpecification;
+use crate::control::request::centre::{CentreSpecification, Covariate};
 use crate::control::request::declared::{DeclaredDesign, DeclaredProblem};
 use crate::control::request::declared_backtest::DeclaredBacktest;
 use crate::control::request::declared_comparison::DeclaredComparison;
@@ -23,6 +23,7 @@ use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
+use crate::control::request::means::MeansRule;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::{MixtureComponent, SamplingLaw};
 use crate::control::request::specification::{
@@ -69,6 +70,7 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<UtilitySpecification>(),
         of::<Learning>(),
         of::<CentreSpecification>(),
+        of::<Covariate>(),
         of::<RadiusRule>(),
         of::<CautionLevel>(),
         of::<Support>(),
@@ -79,6 +81,7 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<HyperparameterBounds>(),
         of::<AssetsProblem>(),
         of::<FundSpecification>(),
+        of::<MeansRule>(),
         of::<EvaluationRequest>(),
         of::<InitialHistories>(),
         of::<BacktestRequest>(),

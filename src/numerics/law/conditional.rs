@@ -9,19 +9,6 @@
 /// Halvings of the search for the least bandwidth.
 const HALVINGS: usize = 60;
 
-/// Returns the exponentially weighted mean of the values before each one, and before the next: `s_(t+1) = d s_t +
-/// (1 - d) z_t` with `d = 2^(-1 / half_life)`, and s_1 the mean of all. Cost O(n).
-pub fn trend(record: &[f64], half_life: f64) -> Vec<f64> {
-    let newest = -f64::exp_m1(-std::f64::consts::LN_2 / half_life);
-    let mut mean = record.iter().sum::<f64>() / record.len() as f64;
-    let mut means = vec![mean];
-    for value in record {
-        mean += newest * (value - mean);
-        means.push(mean);
-    }
-    means
-}
-
 /// Returns the weights of the values by what was known before each. `known` has one number more than there are values,
 /// the last for now; `ages` are their weights by age. If fewer than `least` values would count (as the effective number
 /// `(sum w)^2 / sum w^2`), the bandwidth is widened until so many do, or all. Weights of 1 are exact for a bandwidth

@@ -17,8 +17,8 @@ pub struct EmpiricalDistribution {
     /// Weight `d^k` of each value, in the order of the values.
     weights: Vec<f64>,
     retention: f64,
-    /// True if all weights are equal.
-    even: bool,
+    /// True if the weights follow from the order of arrival alone.
+    by_age: bool,
     /// Sums of the weights and of their squares, in the order of arrival.
     total: f64,
     squares: f64,
@@ -39,7 +39,7 @@ impl EmpiricalDistribution {
             (total, squares) = one_more(total, squares, retention);
         }
         let (sorted, weights) = weighted.into_iter().unzip();
-        EmpiricalDistribution { sorted, weights, retention, even: retention >= 1.0, total, squares }
+        EmpiricalDistribution { sorted, weights, retention, by_age: true, total, squares }
     }
 
     /// Creates the law of `sample`, finite and oldest first, with these positive weights; values added later shrink them
@@ -49,7 +49,7 @@ impl EmpiricalDistribution {
         let mut weighted: Vec<(f64, f64)> = sample.iter().copied().zip(weights.iter().copied()).collect();
         weighted.sort_by(|left, right| left.0.total_cmp(&right.0));
         let (sorted, weights) = weighted.into_iter().unzip();
-        EmpiricalDistribution { sorted, weights, retention, even: false, total, squares }
+        EmpiricalDistribution { sorted, weights, retention, by_age: false, total, squares }
     }
 
     /// Adds one observation. Cost O(n).
@@ -103,9 +103,14 @@ impl EmpiricalDistribution {
         self.total
     }
 
+    /// Returns true if the weights follow from the order of arrival alone.
+    pub fn is_by_age(&self) -> bool {
+        self.by_age
+    }
+
     /// Returns true if all weights are equal.
     pub fn is_even(&self) -> bool {
-        self.even
+        self.by_age && self.retention >= 1.0
     }
 
     /// Returns d, the factor by which a value's weight shrinks when another value is added.

@@ -1,5 +1,7 @@
 //! Returns rescaled to the current volatility.
 
+use crate::numerics::statistics::moving_mean::moving_means;
+
 /// Lower bound of the volatility as a share of its first value; without it a return after a long calm would be
 /// magnified without bound.
 const SMALLEST_SHARE: f64 = 0.01;
@@ -7,15 +9,10 @@ const SMALLEST_SHARE: f64 = 0.01;
 /// Returns the volatility that is expected before each value of a record, and before the next: s_t as in [`rescaled`]. Cost
 /// O(n).
 pub fn expected(record: &[f64], half_life: f64) -> Vec<f64> {
-    let start = record.iter().map(|z| z * z).sum::<f64>() / record.len() as f64;
-    let newest = -f64::exp_m1(-std::f64::consts::LN_2 / half_life);
-    let mut square = start;
-    let mut after = |log_return: &f64| {
-        square += newest * (log_return * log_return - square);
-        square
-    };
-    let squares = std::iter::once(start).chain(record.iter().map(&mut after));
-    squares.map(|square| square.max(SMALLEST_SHARE * SMALLEST_SHARE * start).sqrt()).collect()
+    let squares: Vec<f64> = record.iter().map(|z| z * z).collect();
+    let expected = moving_means(&squares, half_life);
+    let least = SMALLEST_SHARE * SMALLEST_SHARE * expected[0];
+    expected.into_iter().map(|square| square.max(least).sqrt()).collect()
 }
 
 /// Rescales a record, oldest first, as if each return had occurred at the volatility that is expected for the next one:
@@ -25,12 +22,11 @@ pub fn expected(record: &[f64], half_life: f64) -> Vec<f64> {
 /// s_1^2 is the mean square of the record. The volatility expected for a period follows from the returns before it,
 /// except at the start. A record of zeros is returned as it is. Cost O(n). Source: RiskMetrics (1996), section 5.2.
 pub fn rescaled(record: &[f64], half_life: f64) -> Vec<f64> {
-    let start = record.iter().map(|z| z * z).sum::<f64>() / record.len() as f64;
-    if start <= 0.0 {
-        return record.to_vec();
-    }
     let expected = expected(record, half_life);
     let now = expected[record.len()];
+    if now <= 0.0 {
+        return record.to_vec();
+    }
     record.iter().zip(&expected).map(|(log_return, before)| log_return / before * now).collect()
 }
 

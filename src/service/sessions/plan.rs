@@ -207,6 +207,10 @@ impl SessionPlan {
     pub fn new(advisor: &Advisor, returns: usize, renew: Option<Renewing>, rolling: bool) -> Result<Self, FieldError> {
         let specification = advisor.specification();
         renew.map_or(Ok(()), |renew| renew.check(&Terms::of(specification)))?;
+        if renew.is_some() && specification.problem.centre.has_column() {
+            let rule = "must be absent if the policy's centre has a column: the next policy needs a figure for each new return";
+            return Err(FieldError::new("renew", "an object", rule));
+        }
         if rolling && renew.is_some() {
             let rule = "must be false if renew is given: a rolling session continues without renewals";
             return Err(FieldError::new("rolling", rolling, rule));

@@ -426,10 +426,13 @@ class Covariate2(TypedDict):
     kind: Literal["volatility"]
 
 
+Value: TypeAlias = float
+
+
 class Covariate3(TypedDict):
     """Numbers of your own."""
 
-    values: list[float]
+    values: list[Value]
     """
     The figure before each return of the history, oldest first, and the present one: one number more than the
     history has.
