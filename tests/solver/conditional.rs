@@ -135,6 +135,13 @@ async fn figures_that_would_be_misread_are_refused_by_name() {
         let (status, refused) = app.post("/advise", &body).await;
         assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(field)), "{refused}");
     }
+    // A present figure that no return resembles is told, and one among the others is not.
+    for (now, told) in [(0.1, json!([])), (1e12, json!(["few_alike"]))] {
+        let body = advise(&|body| body["problem"]["centre"]["on"]["values"][60] = json!(now));
+        let (_, advised) = app.post("/advise", &body).await;
+        let codes: Vec<&Value> = advised["warnings"].as_array().unwrap().iter().map(|one| &one["code"]).collect();
+        assert_eq!(json!(codes), told, "{advised}");
+    }
     let mut evaluation = good.clone();
     evaluation["problem"].as_object_mut().unwrap().remove("framework");
     evaluation["frameworks"] = json!(["static"]);

@@ -10,6 +10,8 @@ use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, LOG_RETURNS, wi
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{InitialLaws, ProblemSpecification};
 use crate::control::request::support::Interval;
+use crate::numerics::law::volatility::expected;
+use crate::numerics::statistics::moving_mean::moving_means;
 
 /// Allowed standard deviations of the smoothing error.
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
@@ -33,6 +35,17 @@ impl Bounded for CentreSpecification {
         ("mixed.history", ValueBounds::list(&HISTORY_LENGTH, &LOG_RETURNS)),
         ("mixed.weight", ValueBounds::number(ASSUMED_WEIGHT)),
     ];
+}
+
+impl Covariate {
+    /// Returns the figure before each return of a history, and the present one. Cost O(n).
+    pub fn figures(&self, history: &[f64]) -> Vec<f64> {
+        match self {
+            Covariate::Trend { half_life } => moving_means(history, *half_life),
+            Covariate::Volatility { half_life } => expected(history, *half_life),
+            Covariate::Column { values } => values.clone(),
+        }
+    }
 }
 
 impl Bounded for Covariate {

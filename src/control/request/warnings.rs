@@ -10,7 +10,9 @@ use utoipa::ToSchema;
 
 use crate::control::request::annualised::{self, compounded};
 use crate::control::request::centre::CentreSpecification;
+use crate::control::request::centre_rules::LEAST_LIKE;
 use crate::control::request::specification::ProblemSpecification;
+use crate::numerics::law::conditional::{effective, kernel_weights};
 use crate::numerics::statistics::tail_index::{TailIndex, tail_indices};
 
 /// Annual rates above this are rarely paid in a currency that keeps its value.
@@ -56,6 +58,8 @@ pub enum WarningCode {
     /// A tail of the record is so heavy that moments above the second may not exist, and the returns have no bounds: the
     /// tail index is below 2 by 1.645 standard errors.
     TailHeavy,
+    /// At the bandwidth of a conditional centre fewer than 30 returns count, so it is widened.
+    FewAlike,
     /// A formula of a declared problem jumps as a state or the noise moves.
     Jumps,
 }
@@ -68,6 +72,7 @@ impl Warning {
             ("problem.trading_cost", "trading_cost"),
             ("problem.history", returns),
             ("problem.support", "support"),
+            ("problem.centre.bandwidth", "centre.bandwidth"),
         ];
         Warning {
             field: names.iter().find(|(from, _)| *from == self.field).map_or(self.field, |(_, to)| (*to).into()),
@@ -98,6 +103,22 @@ impl ProblemSpecification {
              on the returns in problem.support"
         );
         Some(warning(WarningCode::TailHeavy, "problem.history", text))
+    }
+
+    /// Warns of a present figure that so few returns resemble that the bandwidth is widened.
+    ///
+    /// Checked by: `tests/solver/conditional.rs::figures_that_would_be_misread_are_refused_by_name`.
+    fn few_alike(&self) -> Option<Warning> {
+        let CentreSpecification::Conditional { on, bandwidth } = &self.centre else { return None };
+        let figures = on.figures(&self.history);
+        let ages = self.learning.weights(self.history.len());
+        let count = effective(&kernel_weights(&figures, &ages, *bandwidth, 0.0));
+        let now = figures.last().copied().unwrap_or_default();
+        let text = format!(
+            "is {bandwidth}, at which {count:.1} returns count, because few came after a figure such as the present one, \
+             {now}. It was widened until {LEAST_LIKE} count"
+        );
+        (count < LEAST_LIKE as f64).then(|| warning(WarningCode::FewAlike, "problem.centre.bandwidth", text))
     }
 
     /// Returns the warnings, in the order of the request. Cost O(n ln n) for n returns.
@@ -148,6 +169,7 @@ impl ProblemSpecification {
             in_percent("problem.history", self.deviation()),
             assumed.and_then(|deviation| in_percent("problem.centre.history", deviation)),
             self.tail_heavy(),
+            self.few_alike(),
         ]
         .into_iter()
         .flatten()

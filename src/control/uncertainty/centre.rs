@@ -1,7 +1,7 @@
 //! The discrete law that a Wasserstein ball is centred on.
 
 use crate::control::problem::sampling_law::{admissible, continuous_law};
-use crate::control::request::centre::{CentreSpecification, Covariate};
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::centre_rules::LEAST_LIKE;
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::Learning;
@@ -11,8 +11,7 @@ use crate::control::request::support::{Interval, LawExtent};
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::conditional::{effective, kernel_weights, representative};
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::law::volatility::{expected, rescaled};
-use crate::numerics::statistics::moving_mean::moving_means;
+use crate::numerics::law::volatility::rescaled;
 
 /// Smallest mass of an atom: less is lost in rounding, so an atom that decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
@@ -67,13 +66,8 @@ pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
 /// Returns the weights of a history under a conditional centre; `None` if all its returns count as they are learned.
 fn conditional_weights(problem: &ProblemSpecification) -> Option<Vec<f64>> {
     let CentreSpecification::Conditional { on, bandwidth } = &problem.centre else { return None };
-    let known = match on {
-        Covariate::Trend { half_life } => moving_means(&problem.history, *half_life),
-        Covariate::Volatility { half_life } => expected(&problem.history, *half_life),
-        Covariate::Column { values } => values.clone(),
-    };
     let ages = problem.learning.weights(problem.history.len());
-    let weights = kernel_weights(&known, &ages, *bandwidth, LEAST_LIKE as f64);
+    let weights = kernel_weights(&on.figures(&problem.history), &ages, *bandwidth, LEAST_LIKE as f64);
     (weights != ages).then_some(weights)
 }
 

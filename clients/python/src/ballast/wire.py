@@ -1615,7 +1615,7 @@ class WalkedStrategy(TypedDict):
     """Period by period."""
 
 
-WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "tail_heavy", "jumps"]
+WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "tail_heavy", "few_alike", "jumps"]
 """Kind of a warning."""
 
 

@@ -142,6 +142,7 @@ export const WARNED = {
     `The ${field.includes("centre") ? "assumed " : ""}returns vary more than those of any market. Are they percentages that were read as fractions?`,
   trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of what is traded. Is that right?`,
   tail_heavy: () => "A few returns of the record lie so far out that its uncertainty cannot be measured. Give bounds on the returns.",
+  few_alike: () => "Hardly any return of the record came after a figure like the present one, so others count too. Is the present figure meant?",
   jumps: (_, field, message) => minus(message),
 };
 
