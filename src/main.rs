@@ -9,7 +9,9 @@ use std::process::ExitCode;
 use ballast::report::{end_where_nobody_reads, with_causes};
 use ballast::service::process::config::Config;
 use clap::{Parser, Subcommand};
-use command::{advise, audit, backtest, backup, check, demo, frontier, healthcheck, keys, serve, solve};
+use command::{
+    advise, audit, backtest, backup, check, demo, frontier, healthcheck, keys, letters, plan, serve, sleeve, solve,
+};
 use tokio::runtime::Builder;
 
 /// Nonparametric adaptive robust control of an investor, as a service.
@@ -31,6 +33,10 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Say what to hold through the coming period, from a file of returns or prices.
     Advise(advise::AdviseArgs),
+    /// Plan what to spend and what to hold for years, from a file of returns or prices.
+    Plan(plan::PlanArgs),
+    /// Say how much of the capital a strategy deserves, from a file of its returns or trades.
+    Sleeve(sleeve::SleeveArgs),
     /// Run the service.
     Serve(serve::Serve),
     /// Report a walk-forward on real returns: train on the past, follow the policy for the next year, repeat.
@@ -39,6 +45,8 @@ enum Command {
     Frontier(frontier::FrontierArgs),
     /// Solve a problem declared in formulas: say what to do first, what it is worth, and under which worst law.
     Solve(solve::SolveArgs),
+    /// Write the letters to all clients of a running service, a file each.
+    Letters(letters::LettersArgs),
     /// Manage the keys that allow callers to use a service.
     #[command(subcommand)]
     Keys(keys::KeysCommand),
@@ -86,9 +94,12 @@ async fn outcome() -> ExitCode {
         Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
         Command::Serve(arguments) => serve::run(arguments).await,
         Command::Advise(arguments) => tokio::task::block_in_place(|| advise::run(&arguments)),
+        Command::Plan(arguments) => tokio::task::block_in_place(|| plan::run(&arguments)),
+        Command::Sleeve(arguments) => tokio::task::block_in_place(|| sleeve::run(&arguments)),
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Frontier(arguments) => tokio::task::block_in_place(|| frontier::run(&arguments)),
         Command::Solve(arguments) => tokio::task::block_in_place(|| solve::run(&arguments)),
+        Command::Letters(arguments) => letters::run(arguments).await,
         Command::Keys(arguments) => keys::run(arguments).await,
         Command::Audit(arguments) => audit::run(arguments).await,
         Command::Check(arguments) => check::run(arguments).await,

@@ -16,6 +16,7 @@ use ballast::service::advice::advise_assets::AdviseAssets;
 use clap::Args;
 
 use super::caution::{self, CautionArgs};
+use super::limits::LimitsArgument;
 use super::means::means;
 use super::record::{RecordArguments, show};
 use super::returns::{AnyReturns, Returns, SeveralReturns};
@@ -28,6 +29,8 @@ pub struct AdviseArgs {
     record: RecordArguments,
     #[command(flatten)]
     caution: CautionArgs,
+    #[command(flatten)]
+    limits: LimitsArgument,
     /// Seed of the simulations
     #[arg(long, default_value_t = default_seed())]
     seed: u64,
@@ -103,6 +106,7 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
 
 fn one(arguments: &AdviseArgs, returns: &Returns) -> Result<(), Box<dyn Error>> {
     let holding = arguments.one_holding()?;
+    arguments.limits.check_none()?;
     if let Some(means) = arguments.means {
         return Err(FieldError::new("--means", means.name(), "must be left out: there is one asset").into());
     }
@@ -132,6 +136,7 @@ fn several(arguments: &AdviseArgs, returns: &SeveralReturns) -> Result<(), Box<d
     let question = AdviseAssets {
         problem: AssetsProblem {
             trading_cost: arguments.trading_cost,
+            limits: arguments.limits.given(),
             means: arguments.means.unwrap_or_default(),
             ..problem
         },
@@ -207,6 +212,9 @@ fn by_option(mut error: FieldError, count: usize, source: &'static str) -> Field
     }
     if let Some(column) = error.field.strip_prefix("holdings.") {
         return FieldError { value: format!("{column}={}", error.value), field: "--holding".into(), ..error };
+    }
+    if let Some(at) = error.field.strip_prefix("problem.limits") {
+        return FieldError { field: format!("--limits{}", at.replacen('.', " ", 1)), ..error };
     }
     match OPTIONS.iter().chain(&caution::OPTIONS).find(|(field, _)| *field == error.field) {
         Some((_, option)) => FieldError { field: (*option).into(), ..error },

@@ -19,6 +19,7 @@ use ballast::control::request::backtest_assets::StrategyFamily;
 use ballast::control::request::caution::CautionLevel;
 use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::means::MeansRule;
+use ballast::control::request::own_weights::OwnShares;
 use ballast::control::request::support::Support;
 use ballast::http::gate::decode;
 use ballast::http::site::dashboard;
@@ -27,8 +28,9 @@ use clap::Args;
 use serde::Serialize;
 use thiserror::Error;
 
-use self::weights::OwnStrategy;
+use self::weights::{OwnRule, OwnStrategy, own_strategies};
 use super::caution;
+use super::limits::LimitsArgument;
 use super::means::means;
 use super::progress::Parts;
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
@@ -96,6 +98,12 @@ pub struct BacktestArgs {
     /// in each period, or for several assets a column with the name of each
     #[arg(long)]
     weights: Vec<OwnStrategy>,
+    /// Compare a strategy of your own, from a formula over the returns before each period: `last`, `mean`, `deviation`, with
+    /// several assets for each; `mean12` is the mean of the last 12 periods. `bank` is the rate of the bank
+    #[arg(long, value_name = "NAME=FORMULA")]
+    formula: Vec<OwnRule>,
+    #[command(flatten)]
+    limits: LimitsArgument,
     /// Design points per step: more is more accurate and slower; 100 unless given
     #[arg(long)]
     count: Option<usize>,
@@ -220,6 +228,7 @@ impl BacktestArgs {
             let rule = "must be left out, because the file has one asset";
             return Err(refused("--strategies", format!("{} names", self.strategies.len()), rule));
         }
+        self.limits.check_none()?;
         if let Some(means) = self.means {
             return Err(refused("--means", means.name(), "must be left out, because the file has one asset"));
         }
@@ -264,8 +273,8 @@ impl BacktestArgs {
         let request = self.request(returns)?.completed()?;
         let window = request.window.unwrap_or_default();
         let dates: Vec<String> = returns.rows().iter().map(|row| row.date.clone()).collect();
-        let shares = |own: &OwnStrategy| Ok((own.name.clone(), own.rows(&[], &dates, window)?.concat()));
-        let weights = self.weights.iter().map(shares).collect::<Result<_, BacktestError>>()?;
+        let shares = |own: &OwnStrategy| Ok(OwnShares::Given(own.rows(&[], &dates, window)?.concat()));
+        let weights = own_strategies(&self.weights, &self.formula, shares)?;
         Ok(Backtest::new(BacktestRequest { weights, ..request })?)
     }
 }
@@ -290,11 +299,15 @@ fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
 impl From<FieldError> for BacktestError {
     fn from(FieldError { field, value, rule }: FieldError) -> Self {
         // Fields of an object belong to its option.
-        let field = if ["centre.", "means.", "weights."].iter().any(|object| field.starts_with(object)) {
+        let field = if ["centre.", "limits.", "means.", "weights."].iter().any(|object| field.starts_with(object)) {
             field.replacen('.', " ", 1)
         } else {
             field
         };
+        // An option of its own name already.
+        if field.starts_with("--") {
+            return BacktestError::Option { option: field, value, rule };
+        }
         let option = match (field.strip_prefix("simple_returns"), field.strip_prefix("assets")) {
             (Some(at), _) => format!("the file{at}"),
             (None, Some(at)) => format!("--column{at}"),

@@ -6,11 +6,15 @@ use ballast::control::error::FieldError;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::frontier::asked_of;
+use ballast::control::request::rules::within;
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
 use clap::Args;
 use serde::Serialize;
 
-use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, SeveralReturns};
+use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, SeveralReturns, Trades};
+
+/// Relative risk aversion unless given.
+const USUAL_RISK_AVERSION: f64 = 3.0;
 
 #[derive(Debug, Clone, Args)]
 pub struct RecordArguments {
@@ -19,9 +23,9 @@ pub struct RecordArguments {
     /// Number of the latest returns to use; all of them unless given
     #[arg(long)]
     window: Option<usize>,
-    /// Relative risk aversion: 1 is log utility, more is more careful
-    #[arg(long, default_value_t = 3.0)]
-    risk_aversion: f64,
+    /// Relative risk aversion: 1 is log utility, more is more careful; 3 unless given
+    #[arg(long)]
+    risk_aversion: Option<f64>,
 }
 
 impl RecordArguments {
@@ -55,11 +59,32 @@ impl RecordArguments {
         })
     }
 
+    /// Reads the outcomes of trades, and builds the problem from them.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn trades(&self) -> Result<(ProblemSpecification, String), Box<dyn Error>> {
+        self.check()?;
+        let Trades { log_returns, rate, trades_per_year, sentence } = self.file.trades()?;
+        let kept = self.window.unwrap_or(log_returns.len());
+        let Some(first) = log_returns.len().checked_sub(kept) else {
+            return Err(fewer(kept, log_returns.len()).into());
+        };
+        let problem = self.specification(log_returns[first..].to_vec(), rate, 1);
+        Ok((ProblemSpecification { periods_per_year: trades_per_year, ..problem }, sentence))
+    }
+
     fn check(&self) -> Result<(), FieldError> {
-        if (1.0..=100.0).contains(&self.risk_aversion) {
-            return Ok(());
-        }
-        Err(FieldError::new("--risk-aversion", self.risk_aversion, "must lie in [1, 100]"))
+        self.risk_aversion.map_or(Ok(()), |given| within("--risk-aversion", given, 1.0, 100.0))
+    }
+
+    /// Checks that no risk aversion is given, because `why`.
+    ///
+    /// # Errors
+    /// One is given.
+    pub fn check_no_risk_aversion(&self, why: &str) -> Result<(), FieldError> {
+        let rule = || format!("must be left out: {why}");
+        self.risk_aversion.map_or(Ok(()), |given| Err(FieldError::new("--risk-aversion", given, rule())))
     }
 
     /// Returns the source of the number of returns: the option if it is given, or else the file.
@@ -92,7 +117,7 @@ impl RecordArguments {
         ProblemSpecification {
             horizon: 1,
             periods_per_year: Some(periods_per_year as f64),
-            utility: UtilitySpecification::relative(self.risk_aversion),
+            utility: UtilitySpecification::relative(self.risk_aversion.unwrap_or(USUAL_RISK_AVERSION)),
             ..ProblemSpecification::of(history, rate)
         }
     }
@@ -103,14 +128,19 @@ fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralR
     let SeveralReturns { record, sentence } = &mut returns;
     let found = record.rows.len();
     if !(2..=found).contains(&count) {
-        let rule = "must be from 2 to the number of returns in the file";
-        return Err(ReturnsError::Option { option: "--window", value: format!("{count} of {found}"), rule });
+        return Err(fewer(count, found));
     }
     record.rows.drain(..found - count);
     record.bank.drain(..found - count);
     record.dates.drain(..found - count);
     sentence.push_str(&format!(" The last {count} periods are used, from {}.", record.dates[0]));
     Ok(returns)
+}
+
+/// Returns the error of a window that the file does not fill.
+fn fewer(count: usize, found: usize) -> ReturnsError {
+    let rule = "must be from 2 to the number of returns in the file";
+    ReturnsError::Option { option: "--window", value: format!("{count} of {found}"), rule }
 }
 
 /// Prints what was read, followed by `text`. As JSON, prints the answer alone, and what was read on the standard error.

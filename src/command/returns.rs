@@ -74,6 +74,17 @@ pub struct SeveralReturns {
     pub sentence: String,
 }
 
+/// Outcomes of trades.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trades {
+    pub log_returns: Vec<f64>,
+    /// Interest of the bank per trade.
+    pub rate: f64,
+    pub trades_per_year: Option<f64>,
+    /// Description of what was read, so that users can check it.
+    pub sentence: String,
+}
+
 /// The contents of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyReturns {
@@ -104,6 +115,28 @@ impl ReturnsFile {
     /// As [`Self::read`].
     pub fn read_any(&self) -> Result<AnyReturns, ReturnsError> {
         AnyReturns::parse(&self.text()?, &self.choices, self.rate, self.periods_per_year)
+    }
+
+    /// Reads the outcomes of trades, one after another, each as a share of its stake. Dates do not count, and the bank pays
+    /// nothing unless an option says so.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn trades(&self) -> Result<Trades, ReturnsError> {
+        // Trades move more than periods do. Whether they are fractions or percent is asked as it is of returns.
+        let choices = Choices {
+            kind: self.choices.kind.or(Some(Kind::Simple)),
+            unusual: self.choices.unusual.or(Some(true)),
+            ..self.choices.clone()
+        };
+        let rate = self.rate.unwrap_or(0.0);
+        let Record { series, mut sentence, .. } = record(&self.text()?, &choices, Some(rate), self.periods_per_year)?;
+        let [Series { log_returns, .. }] = &series[..] else {
+            return Err(ReturnsError::Several { found: series.len() });
+        };
+        sentence.push_str(" Each is a trade.");
+        let trades_per_year = self.periods_per_year.map(|trades| trades as f64);
+        Ok(Trades { log_returns: log_returns.clone(), rate, trades_per_year, sentence })
     }
 
     /// Returns true if options name the columns to read.

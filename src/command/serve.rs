@@ -10,12 +10,13 @@ use ballast::service::callers::allowance::Limits;
 use ballast::service::process::config::{Config, DAY, Role, TlsFiles};
 use ballast::service::process::memory::{ByteSize, MemoryLimit};
 use ballast::service::process::shutdown::Shutdown;
+use ballast::service::subscriptions::mail_server::MailServer;
 use ballast::store::Quotas;
 use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::store_location::StoreArgs;
+use super::store_location::{Password, StoreArgs};
 use super::traces;
 
 #[derive(Debug, Args)]
@@ -32,6 +33,12 @@ pub struct Serve {
     /// Host names the service answers to besides its own while it needs no key, separated by commas.
     #[arg(long = "host", env = "BALLAST_HOSTS", value_delimiter = ',')]
     hosts: Vec<String>,
+    /// Hosts that webhooks may reach at private addresses and without encryption, separated by commas; others must be
+    /// public and encrypted.
+    #[arg(long = "webhook-allow", env = "BALLAST_WEBHOOK_ALLOW", value_delimiter = ',')]
+    webhook_allow: Vec<String>,
+    #[command(flatten)]
+    mail: MailArgs,
     #[command(flatten)]
     store: StoreArgs,
     /// Listen on an address that others reach even while the store holds no key.
@@ -109,6 +116,18 @@ struct TlsArgs {
     allow_plaintext: bool,
 }
 
+/// E-mails about events.
+#[derive(Debug, Args)]
+struct MailArgs {
+    /// Mail server by which people are told of events: smtps://user:password@host:465, or
+    /// smtp://user:password@host:587?tls=required for STARTTLS. smtp://host:25 is not encrypted.
+    #[arg(long, env = "BALLAST_SMTP", hide_env_values = true, requires = "mail_from")]
+    smtp: Option<Password>,
+    /// Address that these e-mails come from.
+    #[arg(long, env = "BALLAST_MAIL_FROM", requires = "smtp")]
+    mail_from: Option<String>,
+}
+
 /// Rate limits of one tenant.
 #[derive(Debug, Args)]
 struct LimitArgs {
@@ -184,6 +203,9 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let TlsArgs { tls_cert, tls_key, allow_plaintext } = arguments.tls;
     config.tls = tls_cert.zip(tls_key).map(|(certificate, key)| TlsFiles { certificate, key });
     (config.allow_plaintext, config.hosts) = (allow_plaintext, arguments.hosts);
+    config.webhooks.allowed = arguments.webhook_allow;
+    let MailArgs { smtp, mail_from } = arguments.mail;
+    config.webhooks.mail = smtp.zip(mail_from).map(|(Password(url), from)| MailServer::new(&url, &from)).transpose()?;
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);

@@ -18,7 +18,7 @@ pub struct StoreArgs {
 
 /// An address that may hold a password, so it does not print.
 #[derive(Clone)]
-pub(super) struct Password(String);
+pub(super) struct Password(pub(super) String);
 
 impl std::fmt::Debug for Password {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

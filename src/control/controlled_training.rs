@@ -191,7 +191,7 @@ impl ControlledPolicy {
     /// Trains from `start` on the current rayon pool, as [`ControlledTraining`] does.
     ///
     /// # Errors
-    /// Those of [`ControlledTraining::new`] and [`ControlledTraining::solve_step`].
+    /// The errors of [`ControlledTraining::new`] and [`ControlledTraining::solve_step`].
     pub fn train<P: Controlled>(
         problem: &P,
         start: &P::State,

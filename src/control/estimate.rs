@@ -189,7 +189,7 @@ pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
     // Policies frozen at a history are trained on every thread at once.
     let at_once = |framework: Framework| if request.one_policy_for_all(framework) { 1 } else { threads };
     let policies = trainings.iter().map(|(framework, sizes, _)| sizes.policy().saturating_mul(at_once(*framework)));
-    let strategies = request.frameworks.len() + request.mixes().len();
+    let strategies = request.frameworks.len() + request.mixes().len() + request.weights.len();
     let lived = product(&[request.problem.horizon, request.frameworks.len(), LIVED_BYTES]);
     let outcomes = product(&[request.history_count(), request.paths, strategies * ENDED_BYTES + lived + PATH_BYTES]);
     let (field, value) = trainings.first().map_or(("frameworks", 0), |(_, sizes, _)| ("design.count", sizes.count));

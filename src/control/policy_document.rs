@@ -54,7 +54,7 @@ impl PolicyDocument {
     /// Reads the portable form. It is checked when it is prepared.
     ///
     /// # Errors
-    /// It is not JSON of its format.
+    /// The bytes are not JSON of the format that they name.
     pub fn from_json(bytes: &[u8]) -> Result<Self, PolicyError> {
         let format = |error: serde_json::Error| PolicyError::Format(error.to_string());
         match PolicyDocument::is_declared(bytes) {

@@ -90,7 +90,7 @@ pub struct SurrogateDiagnostics {
     pub signal_variance: f64,
     /// In units of the target's variance over the design.
     pub noise_variance: f64,
-    /// Log likelihood of the scaled targets, at the hyperparameters found.
+    /// Log likelihood of the scaled targets at the hyperparameters found, divided by their number.
     pub log_likelihood_per_point: f64,
     /// Root mean square of the leave-one-out errors of up to 500 design points, in the target's own unit.
     pub leave_one_out_error: f64,

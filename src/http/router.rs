@@ -17,15 +17,17 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::problem::{ProblemDocument, ProblemKind};
+use crate::http::agents::tools::Toolbox;
 use crate::http::description::documentation::{self, Published};
-use crate::http::description::{bounds, defaults, problem_responses, reference};
+use crate::http::description::{bounds, defaults, identifiers, problem_responses, reference};
 use crate::http::gate::access::{self, CallerOf, Gate, ReadCalls};
 use crate::http::gate::bodies::{self, Bodies};
 use crate::http::gate::hosts::Hosts;
 use crate::http::gate::telemetry;
 use crate::http::routes::{
-    advise, audit, backtests, decide, evaluations, events, frontiers, futures, holder, jobs, labels, operations,
-    overview, policies, reports, returns, sessions, what_if, wire,
+    advise, audit, backtests, calendar, decide, evaluations, events, frontiers, futures, holder, jobs, labels, letter,
+    links, mcp, moving, operations, orders, overview, plan, policies, reports, returns, sessions, sleeve,
+    subscriptions, what_if, wire,
 };
 use crate::http::site::{dashboard, guide};
 use crate::service::Service;
@@ -44,12 +46,14 @@ const BODY_BYTES: usize = 4 << 20;
         (name = "jobs", description = "Train and compare policies in the background."),
         (name = "policies", description = "Manage trained policies."),
         (name = "sessions", description = "Run sessions: report returns and get live advice."),
+        (name = "subscriptions", description = "Be told of events by signed webhooks or by e-mail."),
+        (name = "agents", description = "Let agents read and get advice, by the Model Context Protocol."),
         (name = "operations", description = "Operate the service."))
 )]
 struct Description;
 
 fn routes() -> OpenApiRouter<Arc<Service>> {
-    users().merge(operators()).merge(pages())
+    users().merge(agents()).merge(operators()).merge(pages())
 }
 
 fn users() -> OpenApiRouter<Arc<Service>> {
@@ -70,18 +74,36 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(futures::of_policy))
         .routes(routes!(policies::import))
         .routes(routes!(sessions::open, overview::list))
+        .routes(routes!(calendar::reports))
         .routes(routes!(sessions::get, sessions::delete, labels::of_session))
         .routes(routes!(sessions::history))
+        .routes(routes!(moving::export))
+        .routes(routes!(moving::import))
         .routes(routes!(futures::of_session))
         .routes(routes!(reports::observe))
         .routes(routes!(sessions::correct))
         .routes(routes!(sessions::renew))
         .routes(routes!(sessions::action))
+        .routes(routes!(letter::letter))
+        .routes(routes!(links::make, links::list))
+        .routes(routes!(links::delete))
+        .routes(routes!(links::read))
         .routes(routes!(what_if::what_if))
+        .routes(routes!(orders::orders))
         .routes(routes!(advise::advise))
+        .routes(routes!(plan::plan))
+        .routes(routes!(sleeve::sleeve))
         .routes(routes!(decide::decide))
         .routes(routes!(returns::read))
         .routes(routes!(holder::get))
+        .routes(routes!(subscriptions::create, subscriptions::list))
+        .routes(routes!(subscriptions::delete))
+        .routes(routes!(subscriptions::rotate))
+        .routes(routes!(subscriptions::resend))
+}
+
+fn agents() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(mcp::receive))
 }
 
 fn operators() -> OpenApiRouter<Arc<Service>> {
@@ -102,11 +124,13 @@ fn pages() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(dashboard::file))
         .routes(routes!(guide::start))
         .routes(routes!(guide::file))
+        .routes(routes!(guide::llms))
 }
 
 /// Returns the OpenAPI description.
 pub fn description() -> utoipa::openapi::OpenApi {
     let mut description = routes().into_openapi();
+    identifiers::tell(&mut description);
     problem_responses::with_every_problem(&mut description);
     bounds::tell(&mut description);
     defaults::tell(&mut description);
@@ -114,6 +138,8 @@ pub fn description() -> utoipa::openapi::OpenApi {
 }
 
 static PUBLISHED: LazyLock<String> = LazyLock::new(|| description().to_pretty_json().unwrap_or_default() + "\n");
+
+static TOOLBOX: LazyLock<Toolbox> = LazyLock::new(|| Toolbox::new(&description()));
 
 /// Returns the description as checked in under `api/openapi.json`.
 pub fn description_json() -> &'static str {
@@ -127,16 +153,22 @@ pub fn reference_page() -> String {
 
 /// Returns the whole application; for a replica that only runs jobs, its operator part.
 pub fn application(service: Arc<Service>, config: &Config) -> Router {
-    let routes = match config.role.answers() {
-        true => publishing(operators().merge(pages())).merge(users()),
-        false => publishing(operators()),
-    };
-    guarded(routes, service, config)
+    if !config.role.answers() {
+        return for_operators(service, config);
+    }
+    let surroundings = Surroundings::new(&service, config);
+    // An agent's call passes the gate as itself and once more as its operation.
+    let operations = guarded(users(), service.clone(), surroundings.clone());
+    let tools = Arc::new(mcp::AgentTools { toolbox: &TOOLBOX, operations });
+    let agents = agents().route_layer(Extension(tools));
+    let routes = publishing(operators().merge(pages())).merge(users()).merge(agents);
+    guarded(routes, service, surroundings)
 }
 
 /// Returns the operator part of the application.
 pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
-    guarded(publishing(operators()), service, config)
+    let surroundings = Surroundings::new(&service, config);
+    guarded(publishing(operators()), service, surroundings)
 }
 
 /// Returns the application that answers while the service starts: the process is alive, and not ready. Each connection
@@ -157,19 +189,12 @@ fn publishing(routes: OpenApiRouter<Arc<Service>>) -> OpenApiRouter<Arc<Service>
     routes.route_layer(Extension(published))
 }
 
-fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, config: &Config) -> Router {
+fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, surroundings: Surroundings) -> Router {
     let (router, _) = routes.split_for_parts();
-    let gate = Gate {
-        service: service.clone(),
-        large_body_bytes: config.body_limit_bytes,
-        body_bytes: config.body_limit_bytes.min(BODY_BYTES),
-        bodies: Bodies::new(config.memory_limit.bytes, config.body_limit_bytes),
-        hosts: Arc::new(Hosts::new(&config.hosts)),
-    };
     router
         .fallback(unknown_route)
         .method_not_allowed_fallback(wrong_method)
-        .layer(middleware::from_fn_with_state(Surroundings { gate, limit: config.request_timeout }, answered))
+        .layer(middleware::from_fn_with_state(surroundings, answered))
         .with_state(service)
 }
 
@@ -178,6 +203,19 @@ fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, config: &
 struct Surroundings {
     gate: Gate,
     limit: Duration,
+}
+
+impl Surroundings {
+    fn new(service: &Arc<Service>, config: &Config) -> Self {
+        let gate = Gate {
+            service: service.clone(),
+            large_body_bytes: config.body_limit_bytes,
+            body_bytes: config.body_limit_bytes.min(BODY_BYTES),
+            bodies: Bodies::new(config.memory_limit.bytes, config.body_limit_bytes),
+            hosts: Arc::new(Hosts::new(&config.hosts)),
+        };
+        Surroundings { gate, limit: config.request_timeout }
+    }
 }
 
 /// Admits a request, bounds its time, answers if it panics, forbids browsers to store the answer or to guess its type,

@@ -17,7 +17,7 @@ use crate::http::connection::listener::{ConnectionSettings, Listener};
 use crate::http::connection::timed_stream::ClientLimits;
 use crate::http::connection::tls::{Certificate, TlsError};
 use crate::http::gate::telemetry;
-use crate::http::router;
+use crate::http::{router, webhooks};
 use crate::service::Service;
 use crate::service::error::ServiceError;
 use crate::service::process::clock::Clock;
@@ -132,6 +132,7 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<RunningServer, Serv
             return Err(ServeError::Stopped);
         }
     };
+    service.send_webhooks(config.webhooks.clone(), webhooks::post(config.webhooks.allowed.clone()));
     let scheme = if encryption.is_some() { "https" } else { "http" };
     tracing::info!(%address, scheme, store = %config.store, role = ?config.role, "listening");
     let front = settings(router::application(service.clone(), &config), bounds(&config), &config, &encryption);

@@ -47,8 +47,8 @@ impl AbsoluteBridges {
         self.directional_statistics(&[law], which).swap_remove(0)
     }
 
-    /// Returns the statistics of many laws of one size, identical to single ones bit for bit. The cost is that of
-    /// single ones, but the bridges are read from memory once.
+    /// Returns the statistics of many laws with the same number of values, each bit for bit as for that law alone. The
+    /// cost is that of one law after the other, but the bridges are read from memory once.
     ///
     /// Checked by: `many_laws_at_a_time_are_one_by_one_to_the_last_bit`.
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {
@@ -73,8 +73,8 @@ impl AbsoluteBridges {
         weights.weights.iter().zip(&self.units).map(|(weight, unit)| weight / unit).collect()
     }
 
-    /// Returns the weights of every gap of each law. With equal weights, the gaps of all laws of one size count at the
-    /// same times.
+    /// Returns the weights of every gap of each law. With equal weights, the gaps of all laws with the same number of
+    /// values count at the same times.
     fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<GapWeights> {
         let mut weights = Weights::new(self);
         let of_law = |law: &&EmpiricalDistribution| {
@@ -99,8 +99,9 @@ impl AbsoluteBridges {
         law.weights().iter().take(law.sample_size() - 1).map(gap).collect()
     }
 
-    /// Returns the (1 - alpha)-quantiles of a statistic for each of `laws`, which are of one size, at each of `alphas`,
-    /// to 5e-6 of themselves. `base` holds the values that the laws share, ascending, if there are any.
+    /// Returns, for each of `laws`, the (1 - alpha)-quantile of a statistic at each of `alphas`, with a relative error
+    /// of at most 5e-6. Alphas must be in [0.001, 0.999], and all laws must have the same number of values. `base`
+    /// holds the values that they all share, ascending; it may be empty.
     pub fn bridge_quantiles(
         &self,
         laws: &[&EmpiricalDistribution],
@@ -118,20 +119,22 @@ impl AbsoluteBridges {
         statistics.into_iter().map(at_levels).collect()
     }
 
-    /// Returns the (1 - alpha)-quantile of a statistic of `law`; `alpha` must be in [0.001, 0.999], here and below.
+    /// Returns the (1 - alpha)-quantile of a statistic of `law`; `alpha` must be in [0.001, 0.999].
     pub fn bridge_quantile(&self, law: &EmpiricalDistribution, which: Statistic, alpha: f64) -> f64 {
         self.lengths.quantile(1.0 - alpha, &self.directional_statistic(law, which))
     }
 
-    /// Returns the (1 - alpha)-quantile for the law itself, with the standard error of its simulation.
+    /// Returns the (1 - alpha)-quantile for the law itself, with the standard error of its simulation; `alpha` must be
+    /// in [0.001, 0.999].
     pub fn bridge_quantile_with_error(&self, law: &EmpiricalDistribution, alpha: f64) -> Quantile {
         let statistic = self.directional_statistic(law, Statistic::Current);
         let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &statistic);
         Quantile { value, standard_error }
     }
 
-    /// Returns the quantiles of a statistic of `law` (of m values) with one more value, for every value in ascending
-    /// `values`. Cost O((min(m, 540) + values) paths): between two values only the gaps between them change.
+    /// Returns the (1 - alpha)-quantiles of a statistic of `law` (of m values) with one more value, for every value in
+    /// ascending `values`; `alpha` must be in [0.001, 0.999]. Cost O((min(m, 540) + values) paths): between two values
+    /// only the gaps between them change.
     pub fn bridge_quantiles_with(
         &self,
         law: &EmpiricalDistribution,

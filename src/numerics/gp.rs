@@ -70,8 +70,8 @@ fn kernel(scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> DMatrix<f64> {
     kernel
 }
 
-/// The posterior mean of a process, or of several that share inputs and length scales. It keeps only what evaluation
-/// needs.
+/// The posterior mean of a Gaussian process, or of several that share inputs and length scales. It keeps only what
+/// evaluation needs.
 ///
 ///   m(x) = s2 sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j),   r_j^2 = 5 sum_i ((x_i - x_ji) / l_i)^2
 #[derive(Debug, Clone, PartialEq)]
@@ -227,8 +227,9 @@ impl GaussianProcess {
         &self.hyper
     }
 
-    /// Returns the bytes that a process over `points` rows of `inputs` columns holds: mostly the square factor, and a
-    /// quarter of it for memory that remains from making it (`tests/estimates.rs` measures it).
+    /// Returns the bytes of memory of a Gaussian process over `points` rows of `inputs` columns. Most of them hold the
+    /// square factor. A quarter as many are counted for memory that remains in use after the factorisation
+    /// (`tests/estimates.rs` measures it).
     pub fn bytes_of(points: usize, inputs: usize) -> usize {
         size_of::<f64>().saturating_mul(points).saturating_mul(points + points / 4 + inputs + 2)
     }
@@ -277,7 +278,7 @@ impl GaussianProcess {
         self.jitter
     }
 
-    /// Returns the part that evaluates means, which is all that a stored process needs.
+    /// Returns the part that evaluates means, which is all that a stored Gaussian process needs.
     pub fn posterior_mean(&self) -> &GpMean {
         &self.mean
     }

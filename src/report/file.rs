@@ -1,34 +1,30 @@
 //! A report as one HTML file: the modules that draw it, its data as JSON, its styles and its typeface.
 //!
-//! Modules are embedded in an import map as `data:` addresses, each under its name. They are the dashboard's own
-//! modules, except for the `./` before the names that they import. The policy names the two scripts of the page by
-//! their hashes, so a browser may run these and load nothing else.
+//! The modules are the dashboard's own, joined into one script. The policy names it and the styles by their hashes, so a
+//! browser may run these and load nothing else.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
 use thiserror::Error;
+
+use super::escape::escaped;
+use super::modules::{Files, ModuleError, bytes, joined, named, text};
 
 /// The module that shows the page, whichever module draws it.
 const SHOWS: &str = "report_file.js";
 const SHEETS: [&str; 2] = ["style.css", "print.css"];
 const TYPEFACE: &str = "inter.woff2";
-/// The text before a module's name in an import.
-const BESIDE: &str = " from \"./";
 
 /// A report that cannot be written.
 #[derive(Debug, Error)]
 pub enum FileError {
-    #[error("the file {name:?}, which draws the report, is missing")]
-    Missing { name: String },
+    #[error(transparent)]
+    Modules(#[from] ModuleError),
     #[error("writing the data of the report")]
     Json(#[from] serde_json::Error),
 }
-
-/// A function that returns an embedded file by its name.
-pub type Files = fn(&str) -> Option<&'static [u8]>;
 
 /// Returns the file. `module` draws `data` below `title`; readers without scripts see `sentences`.
 ///
@@ -41,24 +37,16 @@ pub fn html(
     data: &impl Serialize,
     sentences: &[String],
 ) -> Result<String, FileError> {
-    let mut imports = BTreeMap::new();
-    for name in [SHOWS, module] {
-        collect(files, name, &mut imports)?;
-    }
-    let map = json(&serde_json::json!({ "imports": imports }))?;
-    let start = format!(
-        "import {{ show }} from \"ballast/{SHOWS}\"; import * as drawn from \"ballast/{module}\"; show(drawn);"
-    );
+    let script = format!("{}{}.show({});", joined(files, &[SHOWS, module])?, named(SHOWS), named(module));
     let mut style = String::new();
     for name in SHEETS {
         style.push_str(&text(files, name)?);
     }
     let style = style.replace(TYPEFACE, &address("font/woff2", bytes(files, TYPEFACE)?));
     let policy = format!(
-        "default-src 'none'; script-src data: {} {}; style-src {}; font-src data:; base-uri 'none'; form-action 'none'; \
+        "default-src 'none'; script-src {}; style-src {}; font-src data:; base-uri 'none'; form-action 'none'; \
          require-trusted-types-for 'script'",
-        hash(&map),
-        hash(&start),
+        hash(&script),
         hash(&style)
     );
     let data = json(&serde_json::json!({ "title": title, "data": data }))?;
@@ -74,39 +62,17 @@ pub fn html(
 <meta name="color-scheme" content="light dark">
 <title>{title}</title>
 <style>{style}</style>
-<script type="importmap">{map}</script>
 </head>
 <body>
 <main class="report"><noscript><h1>{title}</h1>
 {sentences}<p>The figures and charts of this report are drawn by scripts, which are not run here.</p></noscript></main>
 <p id="status" class="unseen" role="status" aria-live="polite"></p>
 <script type="application/json" id="report">{data}</script>
-<script type="module">{start}</script>
+<script type="module">{script}</script>
 </body>
 </html>
 "#
     ))
-}
-
-/// Adds a module and all that it imports to `imports`, as addresses.
-fn collect(files: Files, name: &str, imports: &mut BTreeMap<String, String>) -> Result<(), FileError> {
-    let key = format!("ballast/{name}");
-    if imports.contains_key(&key) {
-        return Ok(());
-    }
-    let source = text(files, name)?;
-    let whole = source.replace(BESIDE, " from \"ballast/");
-    imports.insert(key, address("text/javascript", whole.as_bytes()));
-    let names = source.split(BESIDE).skip(1).filter_map(|rest| rest.split_once('"'));
-    names.map(|(name, _)| name).try_for_each(|name| collect(files, name, imports))
-}
-
-fn bytes(files: Files, name: &str) -> Result<&'static [u8], FileError> {
-    files(name).ok_or_else(|| FileError::Missing { name: name.into() })
-}
-
-fn text(files: Files, name: &str) -> Result<String, FileError> {
-    bytes(files, name).map(|bytes| String::from_utf8_lossy(bytes).into_owned())
 }
 
 fn address(media: &str, bytes: &[u8]) -> String {
@@ -123,10 +89,6 @@ fn json(value: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
 }
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,7 +97,7 @@ mod tests {
         Some(match name {
             SHOWS => b"export const show = 1;",
             "drawn.js" => b"import { a } from \"./a.js\";\nexport const body = a;",
-            "a.js" => b"import { body } from \"./drawn.js\";\nexport const a = 1;",
+            "a.js" => b"export const a = 1;",
             "style.css" => b"src: url(\"inter.woff2\")",
             "print.css" | TYPEFACE => b"",
             _ => return None,
@@ -146,18 +108,14 @@ mod tests {
     fn a_file_holds_every_module_once_and_nothing_in_its_data_ends_a_script() {
         let hostile = "</script><script>alert(1)</script> & <b>";
         let page = html(files, "drawn.js", hostile, &[hostile], &[hostile.to_owned()]).unwrap();
-        assert_eq!(page.matches("<script").count(), 3, "{page}");
-        assert_eq!(page.matches("</script>").count(), 3, "{page}");
+        assert_eq!(page.matches("<script").count(), 2, "{page}");
+        assert_eq!(page.matches("</script>").count(), 2, "{page}");
         assert!(page.contains("<p>&lt;/script&gt;&lt;script&gt;alert(1)&lt;/script&gt; &amp; &lt;b&gt;</p>"), "{page}");
         for name in [SHOWS, "drawn.js", "a.js"] {
-            assert_eq!(
-                page.matches(&format!("\"ballast/{name}\":\"data:text/javascript;base64,")).count(),
-                1,
-                "{page}"
-            );
+            assert_eq!(page.matches(&format!("// {name}\n")).count(), 1, "{page}");
         }
-        let whole = STANDARD.encode("import { a } from \"ballast/a.js\";\nexport const body = a;");
-        assert!(page.contains(&whole) && page.contains("url(\"data:font/woff2;base64,\")"), "{page}");
+        assert!(page.contains("\n$report_file.show($drawn);</script>"), "{page}");
+        assert!(page.contains("url(\"data:font/woff2;base64,\")"), "{page}");
     }
 
     #[test]

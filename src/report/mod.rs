@@ -4,9 +4,13 @@
 //! the same in both. Tables of data are written as CSV.
 
 mod csv;
+mod escape;
 mod file;
+mod modules;
 mod terminal;
 
 pub use self::csv::Csv;
-pub use file::{FileError, Files, html};
+pub use escape::escaped;
+pub use file::{FileError, html};
+pub use modules::{Files, joined};
 pub use terminal::{end_where_nobody_reads, with_causes};

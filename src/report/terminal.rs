@@ -5,8 +5,8 @@ use std::error::Error;
 /// Exit code that a shell reports for a program whose output is no longer read.
 const NOBODY_READS: i32 = 141;
 
-/// Ends the process silently if the reader of its output is gone, as `head` is once it has read enough. Other panics
-/// are reported as usual.
+/// Installs a panic hook that ends the process silently if nothing reads its output any more: `head` stops once it has
+/// read enough. Other panics are reported as usual.
 pub fn end_where_nobody_reads() {
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

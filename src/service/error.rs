@@ -20,6 +20,8 @@ pub enum ServiceError {
     KeyConflict { key: String },
     #[error("{sessions} sessions use the policy '{policy}'; delete them first")]
     PolicyInUse { policy: String, sessions: u64 },
+    #[error("the session '{session}' exists already")]
+    SessionExists { session: String },
     #[error("the job '{job}' has not ended; cancel it first")]
     JobNotEnded { job: String },
     #[error("{what} {number} was reported with other content")]

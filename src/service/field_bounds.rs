@@ -9,6 +9,7 @@ use crate::returns::MOST_BYTES;
 use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
 use crate::service::advice::decide::Decide;
+use crate::service::advice::orders::{AMOUNT, COST, LOT, OrdersQuestion};
 use crate::service::advice::policy_map::{InputRange, MOST_RANGES, VALUES};
 use crate::service::advice::returns::ReadReturns;
 use crate::service::advice::sweep::{POINTS, SweepRange};
@@ -43,6 +44,7 @@ impl Bounded for Report {
         ("previous_price", PRICES),
         ("rate", ValueBounds::number(RATE)),
         ("flow", ValueBounds::Number(-WEALTH.1, WEALTH.1)),
+        ("spent", ValueBounds::Number(0.0, WEALTH.1)),
         ("log_returns", ValueBounds::ByAsset(&LOG_RETURNS)),
         ("simple_returns", ValueBounds::ByAsset(&REPORTED_RETURNS)),
         ("prices", ValueBounds::ByAsset(&END_PRICES)),
@@ -95,6 +97,18 @@ impl Bounded for WhatIf {
         ("simple_returns", ValueBounds::ByAsset(&REPORTED_RETURNS)),
         ("prices", ValueBounds::ByAsset(&END_PRICES)),
         ("previous_prices", ValueBounds::ByAsset(&PRICES)),
+    ];
+}
+
+impl Bounded for OrdersQuestion {
+    const BOUNDS: &'static [FieldBounds] = &[
+        ("session", GIVEN),
+        ("prices", ValueBounds::ByAsset(&PRICES)),
+        ("units", ValueBounds::ByAsset(&ValueBounds::number(AMOUNT))),
+        ("cash", ValueBounds::number(AMOUNT)),
+        ("lots", ValueBounds::ByAsset(&ValueBounds::number(LOT))),
+        ("smallest", ValueBounds::number(AMOUNT)),
+        ("trading_cost", ValueBounds::number(COST)),
     ];
 }
 

@@ -34,6 +34,8 @@ pub const KEY_USED: &str = "ballast_key_last_use_timestamp_seconds";
 pub const OLDEST_JOB_SECONDS: &str = "ballast_oldest_job_age_seconds";
 pub const DRIFT_ALARMS: &str = "ballast_drift_alarms_total";
 pub const RENEWALS: &str = "ballast_renewals_total";
+/// Attempts to deliver an event, by outcome.
+pub const WEBHOOKS: &str = "ballast_webhooks_total";
 pub const JOBS_EXPIRED: &str = "ballast_jobs_expired_total";
 pub const STORE_BYTES: &str = "ballast_store_bytes";
 pub const STORE_FREE_BYTES: &str = "ballast_store_free_bytes";
@@ -126,14 +128,7 @@ pub fn describe() {
         Unit::Seconds,
         "Time since the oldest queued job was made and since the oldest running job began, by state; 0 if there is none."
     );
-    describe_counter!(DRIFT_ALARMS, "Sessions whose drift test rose to a level, by level.");
-    for level in ["warning", "alarm"] {
-        counter!(DRIFT_ALARMS, "level" => level).increment(0);
-    }
-    describe_counter!(RENEWALS, "Renewals of sessions that renew themselves, by outcome.");
-    for outcome in ["renewed", "failed"] {
-        counter!(RENEWALS, "outcome" => outcome).increment(0);
-    }
+    describe_outcomes();
     describe_counter!(JOBS_EXPIRED, "Ended jobs deleted by age.");
     describe_gauge!(STORE_BYTES, Unit::Bytes, "Size of the database.");
     describe_gauge!(STORE_FREE_BYTES, Unit::Bytes, "Size of the empty pages in the database; only for a folder.");
@@ -146,6 +141,22 @@ pub fn describe() {
     );
     gauge!(CLOCK_SKEW_SECONDS).set(0.0);
     metrics::counter!(JOBS_EXPIRED).absolute(0);
+}
+
+/// Describes the counters by level or outcome, each of which starts at 0.
+fn describe_outcomes() {
+    describe_counter!(DRIFT_ALARMS, "Sessions whose drift test rose to a level, by level.");
+    for level in ["warning", "alarm"] {
+        counter!(DRIFT_ALARMS, "level" => level).increment(0);
+    }
+    describe_counter!(WEBHOOKS, "Attempts to deliver an event, by outcome; dead ones were given up.");
+    for outcome in ["delivered", "failed", "dead"] {
+        counter!(WEBHOOKS, "outcome" => outcome).increment(0);
+    }
+    describe_counter!(RENEWALS, "Renewals of sessions that renew themselves, by outcome.");
+    for outcome in ["renewed", "failed"] {
+        counter!(RENEWALS, "outcome" => outcome).increment(0);
+    }
 }
 
 /// Records how far the clock is ahead of its reference.

@@ -10,9 +10,11 @@ pub mod entries;
 pub mod error;
 pub mod field_bounds;
 pub mod jobs;
+pub mod letter;
 pub mod metrics;
 pub mod process;
 pub mod sessions;
+pub mod subscriptions;
 
 use std::sync::Arc;
 
@@ -25,12 +27,17 @@ use error::ServiceError;
 use jobs::renewer::Renewer;
 use jobs::trainer::Trainer;
 use jobs::{Accepted, Jobs};
+use letter::links::LinkLookups;
 use process::clock::Clock;
-use process::config::{Config, Role, StoreLocation};
+use process::config::{Config, Role, StoreLocation, WebhookSettings};
 use process::memory::{Memory, Reserved};
 use process::shutdown::Shutdown;
 use process::timekeeper::Timekeeper;
 use sessions::Sessions;
+use subscriptions::Subscriptions;
+use subscriptions::missing_reports::MissingReports;
+use subscriptions::outbox::Outbox;
+use subscriptions::sender::{PostWebhook, WebhookSender};
 
 use crate::control::error::FieldError;
 use crate::control::evaluation::declared_comparison::Comparison;
@@ -48,6 +55,8 @@ pub struct Service {
     pub policies: Arc<Policies>,
     pub sessions: Sessions,
     pub shutdown: Shutdown,
+    pub subscriptions: Subscriptions,
+    lookups: LinkLookups,
     memory: Memory,
     store: Store,
     clock: Clock,
@@ -97,7 +106,9 @@ impl Service {
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), decoding.clone(), threads);
         let policies = Arc::new(Policies::new(store.clone(), memory.clone(), decoding.clone()));
         let (due, due_names) = tokio::sync::mpsc::channel(jobs::renewer::TOLD);
-        let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), &memory, due);
+        let outbox = Outbox::default();
+        outbox.refresh(&store).await?;
+        let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), (&memory, &outbox), due);
         let (renewing, queueing) = (sessions.clone(), jobs.clone());
         let renewer = Renewer { store: store.clone(), clock: clock.clone(), sessions: renewing, jobs: queueing };
         tokio::spawn(renewer.run(due_names, shutdown.clone()));
@@ -107,6 +118,7 @@ impl Service {
             || Trainer::start(config, store.clone(), clock.clone(), jobs.board(), memory.clone(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
         let names = Names::new(store.clone());
+        let subscriptions = Subscriptions::new(store.clone(), clock.clone(), outbox, config.webhooks.clone());
         Ok(Arc::new(Service {
             audit,
             decoding,
@@ -116,12 +128,23 @@ impl Service {
             policies,
             sessions,
             shutdown,
+            subscriptions,
+            lookups: LinkLookups::default(),
             memory,
             store,
             clock,
             time,
             trainer,
         }))
+    }
+
+    /// Starts to send events, webhooks by `post`, until the service ends.
+    pub fn send_webhooks(&self, settings: WebhookSettings, post: PostWebhook) {
+        let (store, clock, outbox) = (self.store.clone(), self.clock.clone(), self.sessions.outbox.clone());
+        let sender = WebhookSender { store, clock, outbox, settings, post };
+        let WebhookSender { store, clock, outbox, settings, .. } = sender.clone();
+        tokio::spawn(MissingReports { store, clock, outbox, pause: settings.look }.run(self.shutdown.clone()));
+        tokio::spawn(sender.run(self.shutdown.clone()));
     }
 
     /// Queues an evaluation. The same key and request again return the same job.

@@ -12,6 +12,7 @@
 //! recorded of a session is decided in [`crate::service::entries`].
 
 pub mod account_state;
+pub mod advised;
 pub mod asset_change;
 pub mod assets;
 pub(super) mod content;
@@ -49,8 +50,9 @@ use crate::service::process::memory::Memory;
 use crate::service::process::spans;
 use crate::service::sessions::current_advice::AdviceContext;
 use crate::service::sessions::live::{LiveSession, SESSION_BYTES};
-use crate::service::sessions::opening::{SessionStart, declared_begins};
+use crate::service::sessions::opening::SessionStart;
 use crate::service::sessions::slots::{Generation, SlotGuard, Slots};
+use crate::service::subscriptions::outbox::Outbox;
 use crate::store::{CreateSession, SessionFacts, SessionRow, Store, Tenant};
 
 /// Lists of sessions read concurrently. These are fewer than the store's connections for lists, so that the lists of
@@ -70,6 +72,7 @@ pub struct Sessions {
     slots: Arc<Slots<Name, LiveSession>>,
     /// Receives sessions that became due for renewal.
     pub(super) due: Sender<Name>,
+    pub(super) outbox: Outbox,
     pub(super) advising: FairQueue,
     pub(super) resolving: FairQueue,
     pub(super) listing: CallTurns,
@@ -81,7 +84,7 @@ impl Sessions {
         store: Store,
         clock: Clock,
         policies: Arc<Policies>,
-        memory: &Memory,
+        (memory, outbox): (&Memory, &Outbox),
         due: Sender<Name>,
     ) -> Self {
         let size = |first| QueueSize { first, long: config.long_limit };
@@ -91,7 +94,8 @@ impl Sessions {
         // There are two generations.
         let weight = memory.for_sessions() / 2;
         let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
-        Sessions { store, clock, policies, memory: memory.clone(), slots, due, advising, resolving, listing }
+        let (memory, outbox) = (memory.clone(), outbox.clone());
+        Sessions { store, clock, policies, memory, slots, due, outbox, advising, resolving, listing }
     }
 
     /// Opens a session. The same key and start again return the same session as it was opened.
@@ -109,10 +113,7 @@ impl Sessions {
         let key = key.map(|key| start.under(key)).transpose()?;
         start.labels.check()?;
         let (policy, labels) = (start.policy.clone(), start.labels.clone());
-        let (beginning, plan) = match self.policies.policy(tenant, &policy).await? {
-            PreparedPolicy::Investor(advisor) => self.account_begins((tenant, turn), &advisor, start).await?,
-            PreparedPolicy::Declared(advisor) => declared_begins(&advisor, start)?,
-        };
+        let (beginning, plan) = self.begins((tenant, turn), start).await?;
         let row = SessionRow {
             session: identity::new_id("session")?,
             tenant: tenant.clone(),

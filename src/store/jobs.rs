@@ -18,6 +18,7 @@ use crate::store::engine::error::Failure;
 use crate::store::engine::query::{StoreConnection, StoreRow, query};
 use crate::store::jobs::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
 use crate::store::jobs::state::{JobEvent, JobState};
+use crate::store::subscriptions::events;
 use crate::store::tenants::audit::{Actor, AuditAction};
 use crate::store::tenants::audit_chain;
 use crate::store::tenants::quotas::{self, Quotas, ROW_BYTES, Usage};
@@ -243,7 +244,8 @@ pub(super) async fn cancel(
     find(connection, &job).await
 }
 
-/// Sets a terminal state, and deletes the checkpoints and the request, which are no longer needed.
+/// Sets a terminal state, stores its events, and deletes the checkpoints and the request, which are no longer needed.
+/// The reason of a failure is set before.
 pub(super) async fn end(
     connection: &mut StoreConnection<'_>,
     row: &JobRow,
@@ -251,6 +253,8 @@ pub(super) async fn end(
     now_ms: i64,
 ) -> Result<(), Failure> {
     let job = row.job.as_str();
+    // First, because a deletion of the job's request also takes the totals of its tenant.
+    events::publish_job(connection, row, state, now_ms).await?;
     connection.execute(query("DELETE FROM checkpoints WHERE job = $1").bind(job)).await?;
     let end = query(
         "UPDATE jobs SET state = $1, finished_ms = $2, cancel_requested = FALSE, worker = NULL, lease_until_ms = NULL

@@ -130,7 +130,7 @@ impl Labels {
 
     /// Returns the words of the name and of the tags.
     fn words(&self) -> BTreeSet<String> {
-        words::words(&format!("{}\n{}", self.name, self.tags.join("\n")))
+        words::findable(&format!("{}\n{}", self.name, self.tags.join("\n")))
     }
 }
 

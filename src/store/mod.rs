@@ -11,8 +11,8 @@
 //!    the table's keys admit only one. Keys are the exception: a [`KeyRing`] adds and revokes them beside the process
 //!    that holds the folder, one statement each.
 //!
-//! Each decision is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions`
-//! and `entries`. The engines, in `sqlite` and `postgres`, run statements and commit groups of writes. `error`
+//! Each decision is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions`,
+//! `entries` and `subscriptions`. The engines, in `sqlite` and `postgres`, run statements and commit groups of writes. `error`
 //! classifies an engine's errors.
 //!
 //! Conflicts and repeats are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
@@ -30,6 +30,7 @@ mod labels;
 mod maintenance;
 mod policies;
 mod sessions;
+mod subscriptions;
 mod tenants;
 
 use std::path::Path;
@@ -58,6 +59,8 @@ pub use sessions::entries::{Append, EntryKind, EntryRow};
 pub use sessions::head::Head;
 pub use sessions::idempotency::RequestKey;
 pub use sessions::initial_account::InitialAccount;
+pub use sessions::links::{LinkRow, Linking, MOST_LINKS};
+pub use sessions::moving::SessionImport;
 pub use sessions::overview::{
     Counted, SessionFilter, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary,
 };
@@ -65,6 +68,9 @@ pub use sessions::renewals::RenewalTarget;
 pub use sessions::row_version::RowVersion;
 pub use sessions::words::Labelled;
 pub use sessions::{CreateSession, SessionFacts, SessionRow};
+pub use subscriptions::deliveries::{ClaimedDelivery, DeliveryEnd, DeliveryLease};
+pub use subscriptions::events::{EventKind, NewEvent};
+pub use subscriptions::{DeadLetter, MOST_SUBSCRIPTIONS, NewSecret, NewSubscription, Subscribing, SubscriptionRow};
 pub use tenants::audit::{Actor, AuditAction, AuditFilter, AuditRow};
 pub use tenants::audit_chain::AuditEnd;
 pub use tenants::keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotation, StoredKeys, Successor};

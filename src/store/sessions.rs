@@ -4,9 +4,12 @@
 
 pub(super) mod attention;
 pub(super) mod entries;
+pub(super) mod entry_events;
 pub(super) mod head;
 pub(super) mod idempotency;
 pub(super) mod initial_account;
+pub(super) mod links;
+pub(super) mod moving;
 pub(super) mod overview;
 pub(super) mod renewals;
 pub(super) mod row_version;

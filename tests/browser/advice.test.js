@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 import { call, trained } from "./ballast.js";
+import { visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
@@ -13,7 +14,7 @@ before(async () => {
   const radius = { rule: "bridge", alpha: 0.1, scale: 0.2 };
   const policy = await trained(ballast.url, {
     problem: { horizon: 4, rate_per_step: 0.002, utility: { kind: "exponential", risk_aversion: 0.01 }, history: HISTORY, radius },
-    design: { count: 100 },
+    design: { count: 10 },
   });
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.004 });
@@ -35,8 +36,7 @@ async function shown(read, anew) {
     for (const point of answer.points) if (Math.abs(point.radius_scale - 1) < 1e-9) point.allocation = anew;
     await route.fulfill({ response, json: answer });
   });
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await visit(page, `${ballast.url}/#/sessions/${session}`);
   await page.getByRole("slider", { name: "Worth as much as a sure, by caution" }).waitFor();
   await page.getByRole("slider", { name: "Returns seen and the worst market" }).waitFor();
 }
@@ -78,8 +78,7 @@ test("a step solved anew that is apart is told behind the fold, and the advice s
 
 test("an advice that nothing was changed in is the service's own, in money too", async () => {
   await page.unrouteAll({ behavior: "ignoreErrors" });
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await visit(page, `${ballast.url}/#/sessions/${session}`);
   await page.locator(".big").waitFor();
   const { allocation } = await call(ballast.url, `/action?session=${session}`);
   const { wealth, holding } = await call(ballast.url, `/sessions/${session}`);

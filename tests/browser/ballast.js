@@ -72,6 +72,7 @@ export async function browser() {
       const response = await route.fetch().catch(() => null);
       return response ? route.fulfill({ response, path: join(FILES, "index.html") }) : route.abort();
     });
+    await context.route("**/guide/guide.css", (route) => route.fulfill({ path: join(FILES, "../guide/guide.css") }));
     await context.route(/\/docs(\/(page\.css|start\.js))?$/, (route) => {
       const name = basename(new URL(route.request().url()).pathname);
       return route.fulfill({ path: join(FILES, "../../description/documentation", name === "docs" ? "index.html" : name) });
@@ -81,15 +82,27 @@ export async function browser() {
   return launched;
 }
 
+/** A job once it has ended. */
+export async function ended(url, job) {
+  for (;;) {
+    const now = await call(url, `/jobs/${job}`);
+    if (now.finished_ms !== null) return now;
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}
+
 /** The policy of a training, once it is trained. */
 export async function trained(url, request) {
   const { job } = await call(url, "/train", request);
-  for (;;) {
-    const { state, policy, error } = await call(url, `/jobs/${job}`);
-    if (policy) return policy;
-    if (state !== "queued" && state !== "running") throw new Error(`${state}: ${error}`);
-    await new Promise((resolve) => setTimeout(resolve, 50));
-  }
+  const { state, policy, error } = await ended(url, job);
+  if (!policy) throw new Error(`${state}: ${error}`);
+  return policy;
+}
+
+/** Cancels the jobs that have not ended: one that was asked for on the page for its request alone would keep others waiting. */
+export async function cancelJobs(url) {
+  const { jobs } = await call(url, "/jobs");
+  await Promise.all(jobs.filter(({ finished_ms }) => finished_ms === null).map(({ job }) => fetch(`${url}/jobs/${job}/cancel`, { method: "POST" })));
 }
 
 /** The service's answer to a request with a JSON body. */

@@ -5,7 +5,7 @@ import { readFile } from "node:fs/promises";
 import { before, test } from "node:test";
 import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
-import { plain, usable } from "./page.js";
+import { plain, usable, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
@@ -18,7 +18,7 @@ let session, policy;
 before(async () => {
   policy = await trained(ballast.url, {
     problem: { horizon: 6, rate_per_step: RATE, history: HISTORY, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
-    design: { count: 40 },
+    design: { count: 10 },
   });
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   let price = 50;
@@ -31,8 +31,7 @@ before(async () => {
 
 const main = async () => plain(await page.locator("main").innerText());
 const go = async (id = session) => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/sessions/${id}`);
+  await visit(page, `${ballast.url}/#/sessions/${id}`);
   await page.getByRole("slider", { name: "Worth as much as a sure, by caution" }).waitFor();
 };
 
@@ -102,6 +101,7 @@ test("the worst market is told in months and losses", async () => {
   const said = (moves) => plain(assumed({ transport: [stay, ...moves] }, "month"));
   assert.equal(said([move(-0.17, Math.log(0.81), 0.0435)]), "It assumes that one month in 23 loses 19 %.");
   assert.equal(said([move(0.05, Math.log(1.036), 0.25)]), "It counts the best month in 4 as only 3.6 %.");
+  assert.equal(said([move(-0.17, Math.log(0.5), 1 / 2099)]), "It assumes that one month in 175 years loses 50 %.");
   assert.match(said([move(-0.17, -0.3, 0.02), move(0.05, 0.03, 0.1)]), /one month in 50 loses 26 %, and that one month in 10 brings less/);
   assert.match(said([]), /every month is like those seen/);
 });

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
+import { sentTraining, visit } from "./page.js";
 
 test("a policy is cloned with one thing changed, and retrained on newer returns", async () => {
   const [ballast, chromium] = await Promise.all([service(), browser()]);
@@ -11,16 +12,14 @@ test("a policy is cloned with one thing changed, and retrained on newer returns"
     page.setDefaultTimeout(20_000);
     const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008];
     const problem = { horizon: 2, rate_per_step: 0.0021, history, utility: { kind: "power", risk_aversion: 6 }, radius: { rule: "bridge", alpha: 0.3, scale: 0.4 }, trading_cost: 0.01 };
-    const policy = await trained(ballast.url, { problem, design: { count: 30 }, seed: 7 });
+    const policy = await trained(ballast.url, { problem, design: { count: 10 }, seed: 7 });
     const { specification } = await call(ballast.url, `/policies/${policy}`);
     const sent = async () => {
-      const request = page.waitForRequest((request) => request.url().endsWith("/train"));
-      await page.getByRole("button", { name: "Train", exact: true }).click();
-      const body = (await request).postDataJSON();
+      const body = await sentTraining(page, ballast.url);
       await page.getByRole("heading", { level: 1, name: "Jobs" }).waitFor();
       return body;
     };
-    await page.goto(`${ballast.url}/#/policies/${policy}`);
+    await visit(page, `${ballast.url}/#/policies/${policy}`);
     await page.getByRole("link", { name: "Clone with one thing changed" }).click();
     await page.getByRole("heading", { level: 1, name: "Train a policy" }).waitFor();
     assert.equal(await page.getByLabel("Investor").inputValue(), "cautious");
@@ -31,7 +30,7 @@ test("a policy is cloned with one thing changed, and retrained on newer returns"
     changed.problem.radius.alpha = 0.2;
     assert.deepEqual(await sent(), changed);
 
-    await page.goto(`${ballast.url}/#/policies/${policy}`);
+    await visit(page, `${ballast.url}/#/policies/${policy}`);
     await page.getByRole("link", { name: "Retrain on newer returns" }).click();
     await page.getByRole("heading", { level: 1, name: "Train on newer returns" }).waitFor();
     await page.getByLabel("Returns or prices").fill(`${history.join("\n")}\n0.05\n-0.01`);

@@ -1,4 +1,4 @@
-// Two policies or two sessions side by side, reached by ticking two rows of their list.
+// Two to four policies or sessions side by side, reached by ticking rows of their list.
 
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
@@ -13,7 +13,7 @@ let careful, bold, one, other;
 
 before(async () => {
   const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
-  const design = { count: 40 };
+  const design = { count: 10 };
   careful = await trained(ballast.url, { problem, design });
   bold = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, scale: 0.05 }, trading_cost: 0.003 }, design });
   [one, other] = await Promise.all([careful, bold].map(async (policy) => (await call(ballast.url, "/sessions", { policy })).session));
@@ -31,7 +31,7 @@ const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const tick = async (kind, ids) => {
   await go(`#/${kind}`);
   for (const id of ids) await page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox").check();
-  await page.getByRole("link", { name: "Compare the two" }).click();
+  await page.getByRole("link", { name: `Compare the ${["two", "three", "four"][ids.length - 2]}` }).click();
 };
 
 test("two sessions ticked are told side by side", async () => {
@@ -75,7 +75,7 @@ test("a session's page has the return of the comparison, whatever money came and
 
 test("policies that differ are never said to be the same", async () => {
   const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
-  const design = { count: 40 };
+  const design = { count: 10 };
   const bounded = await trained(ballast.url, { problem: { ...problem, support: { rule: "between", min: -0.4, max: 0.4 } }, design });
   const calibrated = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, rule: "calibrated" } }, design });
   for (const [policy, what] of [[bounded, /They differ in moves assumed possible; everything else/], [calibrated, /They differ in caution; everything else/]]) {
@@ -113,22 +113,61 @@ test("of several assets, of their distance, of what may be held and of money add
     }
 });
 
-test("of policies a third tick takes the place of the first, of sessions as many are ticked as are reported for", async () => {
-  const third = (await call(ballast.url, "/sessions", { policy: careful })).session;
+test("of policies a fifth tick takes the place of the first, of sessions as many are ticked as are reported for", async () => {
+  const more = [];
+  for (let k = 0; k < 3; k++) more.push((await call(ballast.url, "/sessions", { policy: careful })).session);
   const box = (id) => page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox");
   await go("#/sessions");
-  for (const id of [one, other, third]) await box(id).check();
-  await page.getByRole("link", { name: "Compare the two" }).waitFor({ state: "hidden" });
-  await page.getByRole("link", { name: "Report for the 3" }).waitFor();
-  await box(one).uncheck();
+  for (const id of [one, other, ...more]) await box(id).check();
+  await page.getByRole("link", { name: /^Compare/ }).waitFor({ state: "hidden" });
+  await page.getByRole("link", { name: "Report for the 5" }).waitFor();
+  for (const id of [one, ...more.slice(1)]) await box(id).uncheck();
   await page.getByRole("link", { name: "Compare the two" }).click();
   await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
-  assert.ok(page.url().endsWith(`#/compare?sessions=${other},${third}`), page.url());
-  const problem = { horizon: 1, rate_per_step: 0.001, history: HISTORY };
-  const last = await trained(ballast.url, { problem, design: { count: 20 } });
-  await tick("policies", [careful, bold, last]);
-  await page.getByRole("heading", { level: 1, name: "Two policies" }).waitFor();
-  assert.ok(page.url().endsWith(`#/compare?policies=${bold},${last}`), page.url());
+  assert.ok(page.url().endsWith(`#/compare?sessions=${other},${more[0]}`), page.url());
+  const policies = [careful, bold];
+  for (const rate_per_step of [0.001, 0.0012, 0.0014]) policies.push(await trained(ballast.url, { problem: { horizon: 1, rate_per_step, history: HISTORY }, design: { count: 10 } }));
+  await go("#/policies");
+  for (const id of policies) await box(id).check();
+  await page.getByRole("link", { name: "Compare the four" }).click();
+  await page.getByRole("heading", { level: 1, name: "Four policies" }).waitFor();
+  assert.ok(page.url().endsWith(`#/compare?policies=${policies.slice(1).join(",")}`), page.url());
+});
+
+test("four sessions have a line each on one axis, a column each, and no difference of two", async () => {
+  const third = (await call(ballast.url, "/sessions", { policy: bold })).session;
+  const fourth = (await call(ballast.url, "/sessions", { policy: careful })).session;
+  for (const [session, returns] of [[third, [0.03, 0.01]], [fourth, [-0.02]]])
+    for (const [index, simple_return] of returns.entries()) await call(ballast.url, "/observe", { session, period: index + 1, simple_return, executed_allocation: 1, confirm: true, date: `2008-0${index + 1}-28` });
+  await tick("sessions", [one, other, third, fourth]);
+  await page.getByRole("heading", { level: 1, name: "Four sessions" }).waitFor();
+  const heads = (await page.locator(".beside thead th").allInnerTexts()).map((head) => head[0]);
+  assert.deepEqual(heads, ["W", "A", "B", "C", "D", "D"]);
+  const told = await rows();
+  assert.deepEqual(told["Worst fall"], ["0.0 %", "-10.0 %", "0.0 %", "-2.0 %", "differs"]);
+  assert.equal(told["100 has become since the start"].length, 5);
+  assert.equal(told["100 has become since the start"][4], "differs");
+  for (const name of ["What 100 has become", "Below the highest so far", "Share held in stocks"]) {
+    const chart = page.locator("figure").filter({ has: page.getByRole("slider", { name }) });
+    assert.deepEqual((await chart.locator(".legend > span:has(svg)").allInnerTexts()).map((words) => words.trim()[0]), ["A", "B", "C", "D"], name);
+    assert.equal(await chart.locator(".plot svg").count(), 1);
+  }
+  const lines = page.locator("figure").filter({ has: page.getByRole("slider", { name: "What 100 has become" }) }).locator(".plot path.line");
+  const drawn = await lines.evaluateAll((paths) => paths.map((path) => `${getComputedStyle(path).stroke} ${getComputedStyle(path).strokeDasharray}`));
+  assert.equal(new Set(drawn).size, 4, `${drawn}`);
+  assert.match(plain(await page.locator(".lead").innerText()), /100 in A has become [\d.]+, in B [\d.]+, in C [\d.]+ and in D [\d.]+\. The advice now is to hold .* in stocks in A, .* in B, .* in C and .* in D\./);
+});
+
+test("three policies are told by what differs between any of them, and drawn on one axis", async () => {
+  const third = await trained(ballast.url, { problem: { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 }, support: { rule: "between", min: -0.4, max: 0.4 } }, design: { count: 10 } });
+  await tick("policies", [careful, third, bold]);
+  await page.getByText("They differ in caution, trading cost and moves assumed possible; everything else is the same.").waitFor();
+  const told = await rows();
+  assert.deepEqual(told["Trading cost"], ["0.00 %", "0.00 %", "0.30 %", "differs"]);
+  assert.deepEqual(told["Moves assumed possible"][3], "differs");
+  assert.deepEqual(told.Record[3], "");
+  const chart = page.getByRole("slider", { name: "Share in stocks by average return" });
+  assert.match(plain(await chart.getAttribute("aria-valuetext")), /A [\d.]+ %, B [\d.]+ %, C [\d.]+ %/);
 });
 
 test("two policies ticked are told by what differs, and by what they hold", async () => {
@@ -148,9 +187,11 @@ test("two policies ticked are told by what differs, and by what they hold", asyn
   assert.ok(low[1] >= low[0] && high[1] > high[0] && high[1] > low[1], `${low} to ${high}`);
 });
 
-test("an address that names no two says how to come by them", async () => {
-  await go("#/compare?sessions=only");
-  await page.getByText("Tick two rows of the policies or of the sessions.").waitFor();
+test("an address that names one or five says how to come by two to four", async () => {
+  for (const ids of ["only", "a,b,c,d,e"]) {
+    await go(`#/compare?sessions=${ids}`);
+    await page.getByText("Tick two to four rows of the policies or of the sessions.").waitFor();
+  }
 });
 
 test("on a phone both stand beside each other", async () => {
@@ -161,6 +202,6 @@ test("on a phone both stand beside each other", async () => {
 });
 
 test("axe finds nothing on the pages of two and on the lists, in light, in dark, at 200 % and at 320 pixels", async () => {
-  const places = ["#/sessions", "#/policies", `#/compare?policies=${careful},${bold}`, `#/compare?sessions=${one},${other}`];
+  const places = ["#/sessions", "#/policies", `#/compare?policies=${careful},${bold}`, `#/compare?sessions=${one},${other}`, `#/compare?sessions=${(await call(ballast.url, "/sessions?limit=4")).sessions.map(({ session }) => session).join(",")}`];
   await usable(page, go, places);
 });

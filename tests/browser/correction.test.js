@@ -3,7 +3,8 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 import { call, trained } from "./ballast.js";
-import { plain } from "./page.js";
+import { dashboardModule } from "./modules.js";
+import { plain, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 let session;
@@ -16,7 +17,7 @@ before(async () => {
       history: [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002],
       radius: { rule: "bridge", alpha: 0.5, scale: 0.05 },
     },
-    design: { count: 20 },
+    design: { count: 10 },
   });
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   for (const [period, simple_return] of [[1, 0.01], [2, -0.03]])
@@ -27,7 +28,7 @@ const main = async () => plain(await page.locator("main").innerText());
 const form = () => page.locator("form", { has: page.getByRole("button", { name: "Correct it" }) });
 
 test("the last period comes first, and the fields are those of their own form", async () => {
-  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await visit(page, `${ballast.url}/#/sessions/${session}`);
   await page.getByText("Correct a period").click();
   const periods = form().getByLabel("Period").locator("option");
   await periods.first().waitFor({ state: "attached" });
@@ -36,11 +37,24 @@ test("the last period comes first, and the fields are those of their own form", 
   assert.equal(await page.evaluate(() => document.activeElement.form.textContent.includes("Correct it")), true);
 });
 
+test("a correction says why, or is not sent", async () => {
+  const { corrections } = await call(ballast.url, `/sessions/${session}`);
+  for (const change of ["The report is wrong", "The period should be removed"]) {
+    await form().getByLabel("What is wrong").selectOption(change);
+    await form().getByRole("button", { name: "Correct it" }).click();
+    await form().getByText("Say why.").waitFor();
+    assert.equal(await form().getByLabel("Why").evaluate((field) => field === document.activeElement), true);
+  }
+  await form().getByLabel("What is wrong").selectOption("The report is wrong");
+  assert.equal((await call(ballast.url, `/sessions/${session}`)).corrections, corrections);
+  const { problemWords } = await dashboardModule("problem_words.js");
+  assert.equal(problemWords({ value: "0 letters", rule: "must have 1 to 200 letters" }, "Why"), "Why is blank; it must have 1 to 200 letters.");
+});
+
 test("the link below the last report opens the form at the first press, by mouse and by keyboard", async () => {
   const link = page.getByRole("button", { name: "Correct it" }).first();
   for (const press of [() => link.click(), () => link.press("Enter")]) {
-    await page.goto("about:blank");
-    await page.goto(`${ballast.url}/#/sessions/${session}`);
+    await visit(page, `${ballast.url}/#/sessions/${session}`);
     await link.waitFor();
     await press();
     await form().getByLabel("Period").waitFor();
@@ -92,7 +106,7 @@ test("what was put right is undone, and what was there before stands again", asy
 test("the last report is taken back, and what it was stays on record", async () => {
   const { session } = await call(ballast.url, "/sessions", { policy: (await call(ballast.url, "/policies")).policies[0].policy });
   await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.05, date: "2008-01-31" });
-  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await visit(page, `${ballast.url}/#/sessions/${session}`);
   page.on("dialog", (dialog) => dialog.accept());
   await page.getByRole("button", { name: "take it back" }).click();
   await page.getByText("The report was taken back").waitFor();

@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 import { call } from "./ballast.js";
-import { visit } from "./page.js";
+import { quiet, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 /** Nothing that is waited for takes longer, in milliseconds. */
@@ -31,6 +31,18 @@ before(async () => {
 
 const heading = (text) => page.getByRole("heading", { level: 1, name: text });
 const go = (hash) => visit(page, `${ballast.url}/${hash}`);
+
+test("a first visit takes few requests and little to load", { skip: process.env.BALLAST_DASHBOARD && "files that are read from a folder are not joined" }, async () => {
+  const answers = [];
+  const heard = (response) => answers.push(response);
+  page.on("response", heard);
+  await go("");
+  await page.getByText("Nothing has been trained here yet").waitFor();
+  page.off("response", heard);
+  const sizes = await Promise.all(answers.map(async (response) => (await response.request().sizes()).responseBodySize));
+  assert.ok(answers.length <= 15, answers.map((response) => response.url()).join(" "));
+  assert.ok(sizes.reduce((sum, size) => sum + size, 0) < 300_000, sizes.join(" "));
+});
 
 test("an empty service says what to do first", async () => {
   await go("");
@@ -80,7 +92,7 @@ test("a training from a file, watched to its end", async () => {
   await page.getByLabel("Utility", { exact: true }).selectOption("exponential");
   await page.getByLabel("Relative risk aversion").fill("1");
   await page.getByLabel("Radius, times").fill("0.2");
-  await page.getByLabel("Design points").fill("400");
+  await page.getByLabel("Design points").fill("100");
   await page.getByText("Every field, as JSON").click();
   const request = JSON.parse(await page.getByLabel("Training request as JSON").inputValue());
   assert.equal(request.problem.radius.scale, 0.2);
@@ -278,5 +290,5 @@ function views() {
 
 /** What is fetched after the view stands has arrived. */
 async function settled() {
-  await page.waitForLoadState("networkidle");
+  await quiet(page);
 }

@@ -271,7 +271,7 @@ test("a verdict says whether the range contains 0", async () => {
 });
 
 test("it stands in the list, and is no policy for an evaluation, a comparison or an investor's form", async () => {
-  const investor = await trained(ballast.url, { problem: { horizon: 2, rate_per_step: 0.002, history: [0.01, -0.02, 0.03, 0.01] }, design: { count: 20 } });
+  const investor = await trained(ballast.url, { problem: { horizon: 2, rate_per_step: 0.002, history: [0.01, -0.02, 0.03, 0.01] }, design: { count: 10 } });
   await visit("#/policies");
   const row = page.getByRole("row").filter({ hasText: "The shop" });
   assert.match(await row.innerText(), /None: decides order/);

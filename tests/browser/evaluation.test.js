@@ -2,9 +2,9 @@
 
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
-import { call, trained } from "./ballast.js";
+import { call, cancelJobs, ended, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
-import { plain, usable } from "./page.js";
+import { plain, usable, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
@@ -13,26 +13,22 @@ let policy, report, evaluation;
 
 before(async () => {
   const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, caution: "paper", support: { rule: "none" } };
-  const design = { count: 40 };
+  const design = { count: 10 };
   policy = await trained(ballast.url, { problem, design });
   const { specification } = await call(ballast.url, `/policies/${policy}`);
   const { framework, ...asked } = specification.problem;
-  const request = { ...specification, problem: asked, policies: { [framework]: policy }, frameworks: ["adaptive", "static", "plug_in"], paths: 400 };
+  const request = { ...specification, problem: asked, policies: { [framework]: policy }, frameworks: ["adaptive", "static", "plug_in"], paths: 400, weights: { "My own": "if(mean3 > mean, 0.35, 0)" } };
   evaluation = (await call(ballast.url, "/evaluate", request)).job;
-  for (;;) {
-    const now = await call(ballast.url, `/jobs/${evaluation}`);
-    if (now.finished_ms !== null) break;
-    await new Promise((resolve) => setTimeout(resolve, 100));
-  }
+  await ended(ballast.url, evaluation);
   report = await call(ballast.url, `/jobs/${evaluation}/report`);
-  await page.goto(`${ballast.url}/#/evaluations/${evaluation}`);
+  await visit(page, `${ballast.url}/#/evaluations/${evaluation}`);
   await page.getByRole("table", { name: "How wealth ended, by what it is worth" }).waitFor();
 });
 
 test("what was compared, on which policy and for whom, comes first, and then what came of it", async () => {
   const words = plain(await page.locator("main").innerText());
   const [first] = words.split("What each is worth");
-  assert.match(first, /14 ways to hold stocks, through the same 400 futures of 3 months, after a record of 24 returns, for a balanced investor \(risk aversion 3\) who starts with 100\.00\./);
+  assert.match(first, /15 ways to hold stocks, through the same 400 futures of 3 months, after a record of 24 returns, for a balanced investor \(risk aversion 3\) who starts with 100\.00\./);
   assert.match(first, /the bank pays 0\.20 % a month\. .Cautious, learns. is policy [0-9a-f]{10}; the other policies were trained for this\./);
   await page.locator(`a[href="#/policies/${policy}"]`).waitFor();
   const best = report.strategies.reduce((best, one) => (one.certainty_equivalent.value > best.certainty_equivalent.value ? one : best));
@@ -40,9 +36,26 @@ test("what was compared, on which policy and for whom, comes first, and then wha
   assert.match(words, /In \d+ % of the futures .Cautious, learns. ends with less than the money put in; the worst 5 % of all futures end with [\d.]+ on average\./);
   const main = report.strategies.find(({ strategy }) => strategy === report.reference);
   assert.notEqual(main, best);
-  assert.match(words, /Here the record is the true market, so caution can only cost\. To see what it may save, draw the histories from the market\./);
+  // The cost of caution is that beside the policy that trusts the record.
+  const trusting = report.strategies.find(({ framework }) => framework === "plug_in").certainty_equivalent.value;
+  const cost = trusting - main.certainty_equivalent.value;
+  assert.ok(cost > 0, `${cost}`);
+  assert.ok(words.includes(`Here the record is the true market, so caution can only cost: ${cost.toFixed(2)} of the ${trusting.toFixed(2)} that \u201cTrusts the record\u201d is worth. To see what it saves when the record misleads, compare on records drawn from the market.`), words);
   assert.deepEqual(await page.locator("tbody th b").allInnerTexts(), ["Cautious, learns"]);
   assert.doesNotMatch(words, /utility|Variance|Less adaptive|undefined|NaN/);
+});
+
+test("a button leads from there to the form, with the policy and drawn records chosen", async () => {
+  await page.getByRole("link", { name: "Draw records" }).click();
+  await page.getByRole("heading", { level: 1, name: "Compare out of sample" }).waitFor();
+  assert.deepEqual([await page.getByLabel("Policy", { exact: true }).inputValue(), await page.getByLabel("Records", { exact: true }).inputValue()], [policy, "drawn"]);
+  const sent = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/evaluate"));
+  await page.getByRole("button", { name: "Evaluate", exact: true }).click();
+  assert.deepEqual((await sent).postDataJSON().histories, { kind: "drawn", count: 50 });
+  await page.waitForURL(/#\/evaluations\/(?!new)./);
+  await cancelJobs(ballast.url);
+  await visit(page, `${ballast.url}/#/evaluations/${evaluation}`);
+  await page.getByRole("table", { name: "How wealth ended, by what it is worth" }).waitFor();
 });
 
 test("the table is in wealth and sorted by what each is worth", async () => {
@@ -108,12 +121,25 @@ test("it is called by the policy it is of, and by its record while that has no n
   const heading = (level, name) => page.getByRole("heading", { level, name, exact: true }).waitFor();
   const unnamed = "Evaluation of stocks, on 24 returns, 3 months ahead";
   await heading(1, unnamed);
-  await page.goto(`${ballast.url}/#/evaluations`);
+  await visit(page, `${ballast.url}/#/evaluations`);
   await heading(2, unnamed);
   await fetch(`${ballast.url}/policies/${policy}`, { method: "PATCH", headers: { "content-type": "application/json" }, body: JSON.stringify({ name: "Careful" }) });
-  await page.goto(`${ballast.url}/#/jobs`);
+  await visit(page, `${ballast.url}/#/jobs`);
   await heading(2, "Evaluation of Careful");
-  await page.goto(`${ballast.url}/#/evaluations/${evaluation}`);
+  await visit(page, `${ballast.url}/#/evaluations/${evaluation}`);
   await heading(1, "Evaluation of Careful");
   assert.match(await page.title(), /^Evaluation of Careful/);
+});
+
+test("a formula of one's own is sent with an evaluation, and its fault stands at its field", async () => {
+  await page.goto(`${ballast.url}/#/evaluations/new?policy=${policy}`);
+  await page.getByLabel("A formula of your own").fill("wealth");
+  await page.getByRole("button", { name: "Evaluate", exact: true }).click();
+  await page.locator(".error").getByText("column 1", { exact: false }).waitFor();
+  assert.equal(await page.getByLabel("A formula of your own").getAttribute("aria-invalid"), "true");
+  await page.getByLabel("A formula of your own").fill("0.25 + 2*last");
+  const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/evaluate"));
+  await page.getByRole("button", { name: "Evaluate", exact: true }).click();
+  assert.deepEqual((await asked).postDataJSON().weights, { "Your formula": "0.25 + 2*last" });
+  await page.waitForURL(/#\/evaluations\/./);
 });

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { browser, call, ended, service, trained } from "./ballast.js";
 import { usable, visitQuiet } from "./page.js";
 
 let ballast, chromium, page;
@@ -22,7 +22,7 @@ after(async () => {
 const visit = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const nothing = `session_${"0".repeat(32)}`;
 /** Views that need nothing to be there. */
-const BARE = ["#/", "#/advise", "#/jobs", "#/train", "#/declare", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/key", "#/nowhere", `#/sessions/${nothing}`];
+const BARE = ["#/", "#/advise", "#/plan", "#/sleeve", "#/jobs", "#/train", "#/declare", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/letters", "#/subscriptions", "#/key", "#/nowhere", `#/sessions/${nothing}`];
 
 test("every view where there is nothing yet", () => usable(page, visit, BARE));
 
@@ -32,14 +32,10 @@ const STOCK = JSON.parse(await readFile(new URL("../../examples/problems/stock.j
 const both = (k) => [HISTORY[k], BONDS[k]];
 
 /** A job once it has ended. */
-async function ended(path, request) {
-  const { job } = await call(ballast.url, path, request);
-  while ((await call(ballast.url, `/jobs/${job}`)).finished_ms === null) await new Promise((resolve) => setTimeout(resolve, 50));
-  return job;
-}
+const done = async (path, request) => (await ended(ballast.url, (await call(ballast.url, path, request)).job)).job;
 
 test("every view where there is something, of one asset and of several", async () => {
-  const design = { count: 20 };
+  const design = { count: 10 };
   const problem = { horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY };
   const wide = { ...problem, assets: ["Stocks", "Bonds"], history: HISTORY.map((_, k) => both(k)), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
   const [one, several] = [await trained(ballast.url, { problem, design, name: "A name of so many words that they take more than a line" }), await trained(ballast.url, { problem: wide, design })];
@@ -50,19 +46,18 @@ test("every view where there is something, of one asset and of several", async (
   const walk = { rate: 0.002, periods_per_year: 4, log_returns: HISTORY };
   const dates = HISTORY.map((_, k) => `${2004 + Math.floor(k / 4)}-${String(3 * (k % 4) + 3).padStart(2, "0")}`);
   const jobs = {
-    evaluations: [await ended("/evaluate", { problem, design, frameworks: ["adaptive"], paths: 100 }), await ended("/evaluate", { policies: { policy: declared }, rules: { rule: { order: "max(25 - stock, 0)" } }, paths: 100 })],
-    backtests: [await ended("/backtest", { ...walk, window: 8, every: 4, count: 10, alpha: [0.5] }), await ended("/backtest", { ...walk, dates, assets: ["Stocks", "Bonds"], log_returns: wide.history, windows: [8], alpha: 0.5 })],
-    frontiers: [await ended("/frontier", { problem: { history: HISTORY, rate_per_step: 0.002 } })],
+    evaluations: [await done("/evaluate", { problem, design, frameworks: ["adaptive"], paths: 100 }), await done("/evaluate", { policies: { policy: declared }, rules: { rule: { order: "max(25 - stock, 0)" } }, paths: 100 })],
+    backtests: [await done("/backtest", { ...walk, window: 8, every: 4, count: 10, alpha: [0.5] }), await done("/backtest", { ...walk, dates, assets: ["Stocks", "Bonds"], log_returns: wide.history, windows: [8], alpha: 0.5 })],
+    frontiers: [await done("/frontier", { problem: { history: HISTORY, rate_per_step: 0.002 } })],
   };
-  // One that failed to be, and one that runs or waits as long as this test looks.
+  // One that was stopped.
   const { job: stopped } = await call(ballast.url, "/evaluate", { problem: { ...problem, horizon: 200 }, design: { count: 1000 }, frameworks: ["adaptive"] });
-  const { job: running } = await call(ballast.url, "/train", { problem: { ...problem, horizon: 200 }, design: { count: 1000 } });
-  await fetch(`${ballast.url}/jobs/${stopped}/cancel`, { method: "POST" });
   const places = [
     ...["#/", "#/jobs", "#/policies", "#/sessions/new", "#/evaluations", "#/evaluations/new", `#/train?like=${one}`, `#/train?newer=${several}`, `#/report?sessions=${lived},${other}`, `#/renew?sessions=${lived}`],
     ...[one, several, declared].map((policy) => `#/policies/${policy}`),
     `#/declare?from=${declared}`,
-    ...[lived, other].map((session) => `#/sessions/${session}`),
+    ...[lived, other].flatMap((session) => [`#/sessions/${session}`, `#/sessions/${session}?present`, `#/sessions/${session}/letter`, `#/sessions/${session}/track`]),
+    `#/letters?sessions=${lived},${other}`,
     ...Object.entries({ ...jobs, evaluations: [...jobs.evaluations, stopped] }).flatMap(([at, all]) => all.map((job) => `#/${at}/${job}`)),
     `#/compare?policies=${one},${several}`,
     `#/compare?sessions=${lived},${other}`,
@@ -71,18 +66,19 @@ test("every view where there is something, of one asset and of several", async (
   assert.ok(routes.length > 15, `${routes}`);
   const unseen = routes.filter((route) => ![...BARE, ...places].some((place) => route.test(place)));
   assert.deepEqual(unseen, [], "a view is on no list of this test");
-  // What moves or is asked for a moment later stands still: a job that runs is told by the events of it.
+  const cancel = (job) => fetch(`${ballast.url}/jobs/${job}/cancel`, { method: "POST" });
+  await cancel(stopped);
+  let running = null;
   await usable(page, async (hash) => {
-    await page.goto("about:blank");
-    await page.goto(`${ballast.url}/${hash}`);
-    await page.locator("main:not([aria-busy]) h1").waitFor();
-    if (hash === "#/jobs") return page.locator("progress").waitFor();
-    await page.waitForLoadState("networkidle");
+    // A job runs as long as the jobs are looked at, and takes the processor no longer.
+    if (running) await cancel(running);
+    running = hash === "#/jobs" ? (await call(ballast.url, "/train", { problem: { ...problem, horizon: 200 }, design: { count: 1000 } })).job : null;
+    await visit(hash);
+    if (running) return page.locator("progress").waitFor();
     if (hash !== `#/policies/${declared}`) return;
     await page.getByRole("button", { name: "Decide" }).click();
     await page.locator("#decision .big").waitFor();
   }, places);
-  await fetch(`${ballast.url}/jobs/${running}/cancel`, { method: "POST" });
 });
 
 test("the page that asks for a key", async () => {
@@ -106,9 +102,9 @@ test("the interface, with calls opened, but for what Swagger UI brings", async (
   const open = async () => {
     await page.goto("about:blank");
     await page.goto(`${ballast.url}/docs`);
-    await page.locator("#operations-jobs-train").getByRole("button").first().click();
-    await page.locator("#operations-jobs-train").getByText('"target": "floor_gain"').first().waitFor();
-    const tried = page.locator("#operations-jobs-list");
+    await page.locator("#operations-jobs-post_train").getByRole("button").first().click();
+    await page.locator("#operations-jobs-post_train").getByText('"target": "floor_gain"').first().waitFor();
+    const tried = page.locator("#operations-jobs-get_jobs");
     await tried.getByRole("button").first().click();
     await tried.getByRole("button", { name: "Try it out" }).click();
     await tried.getByRole("button", { name: "Execute" }).waitFor();

@@ -14,7 +14,7 @@ let policy, session;
 
 before(async () => {
   page.on("dialog", (dialog) => dialog.accept());
-  policy = await trained(ballast.url, { problem: PROBLEM, design: { count: 20 } });
+  policy = await trained(ballast.url, { problem: PROBLEM, design: { count: 10 } });
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.01, date: "2008-01-31" });
   await call(ballast.url, `/sessions/${session}/corrections`, { correction: 1, period: 1, reason: "a slip", simple_return: 0.02 });

@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { call, trained } from "./ballast.js";
-import { plain, visit } from "./page.js";
+import { call, ended, trained } from "./ballast.js";
+import { plain, sentTraining, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
@@ -11,16 +11,14 @@ const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.
 const main = async () => plain(await page.locator("main").innerText());
 
 test("a policy is trained with what is added and withdrawn as the form says", async () => {
-  await page.goto(`${ballast.url}/#/train`);
+  await visit(page, `${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByLabel("Periods ahead").fill("3");
   await page.getByLabel("Periods a year").selectOption("none");
   await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Trading cost").fill("1 %");
   await page.getByLabel("Added each period").fill("12 500; -20; 3,5");
-  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
-  await page.getByRole("button", { name: "Train" }).click();
-  const { problem } = (await sent).postDataJSON();
+  const { problem } = await sentTraining(page, ballast.url);
   assert.deepEqual([problem.contributions, problem.trading_cost], [[12500, -20, 3.5], 0.01]);
 });
 
@@ -35,12 +33,12 @@ test("a session says what is added at the end of the period, reckons with it, an
       trading_cost: 0.01,
       contributions: [5, -8.25, 0],
     },
-    design: { count: 40 },
+    design: { count: 10 },
   });
-  await page.goto(`${ballast.url}/#/policies/${policy}`);
+  await visit(page, `${ballast.url}/#/policies/${policy}`);
   await page.getByText(/In 1 of the periods money is added, 5\.00 in all, and in 1 of the periods money is withdrawn, 8\.25 in all\./).waitFor();
   const { session } = await call(ballast.url, "/sessions", { policy, holding: 0.2 });
-  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await visit(page, `${ballast.url}/#/sessions/${session}`);
   await page.getByText("At the end of the period 5.00 is added.").first().waitFor();
   assert.match(await main(), /No-trade range, low end/);
   await page.getByLabel("Return in period 1").fill("2");
@@ -81,27 +79,23 @@ test("what the form says will be refused is refused in the same words", async ()
 });
 
 test("a policy that forgets is asked for by the form, and sessions by it renew themselves or roll", async () => {
-  await page.goto(`${ballast.url}/#/train`);
+  await visit(page, `${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByLabel("Periods ahead").fill("2");
   await page.getByLabel("Periods a year").selectOption("none");
   await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Half-life of returns").fill("1");
-  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
-  await page.getByRole("button", { name: "Train" }).click();
-  const request = (await sent).postDataJSON();
+  const request = await sentTraining(page, ballast.url);
   assert.deepEqual(request.problem.learning, { kind: "decay", half_life: 1 });
   const design = { count: 20, initial_laws: "resampled" };
   const { job } = await call(ballast.url, "/train", { ...request, design });
-  let now;
-  do now = await call(ballast.url, `/jobs/${job}`);
-  while (now.finished_ms === null);
+  const now = await ended(ballast.url, job);
   assert.equal(now.state, "succeeded", JSON.stringify(now));
   for (const [choice, told] of [
     ["Renewed automatically", { renew: { every: 1, window: null }, rolling: false }],
     ["Rolling", { renew: null, rolling: true }],
   ]) {
-    await page.goto(`${ballast.url}/#/sessions/new?policy=${now.policy}`);
+    await visit(page, `${ballast.url}/#/sessions/new?policy=${now.policy}`);
     await page.getByLabel("How it continues").selectOption(choice);
     if (choice === "Renewed automatically") await page.getByLabel("Periods with each policy").fill("1");
     await page.getByRole("button", { name: "Open" }).click();
@@ -115,4 +109,38 @@ test("a policy that forgets is asked for by the form, and sessions by it renew t
   const words = await main();
   assert.match(words, /0 periods observed\n/);
   assert.doesNotMatch(words, /undefined|at the horizon/);
+});
+
+test("money that came or went today has its advice at once, and nothing is recorded", async () => {
+  const problem = { horizon: 3, rate_per_step: 0.002, utility: { kind: "power", risk_aversion: 3 }, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  const one = await trained(ballast.url, { problem: { ...problem, history: HISTORY, trading_cost: 0.01 }, design: { count: 10 } });
+  const two = await trained(ballast.url, { problem: { ...problem, assets: ["Stocks", "Bonds"], history: HISTORY.map((back, k) => [back, 0.004 + 0.01 * Math.cos(2.3 * k)]) }, design: { count: 10 } });
+  for (const [policy, more, assets] of [[one, { holding: 0.2 }, null], [two, { holdings: { Stocks: 0.3, Bonds: 0.6 } }, ["Stocks", "Bonds"]]]) {
+    const { session } = await call(ballast.url, "/sessions", { policy, wealth: 1000, ...more });
+    const before = await call(ballast.url, `/sessions/${session}`);
+    await visit(page, `${ballast.url}/#/sessions/${session}`);
+    await page.getByText("Money came or went today").click();
+    const field = page.getByLabel("Money that came today");
+    for (const refused of ["", "a lot", "-1000"]) {
+      await field.fill(refused);
+      await page.getByRole("button", { name: "Show what to hold" }).click();
+      await page.getByText("Type an amount, such as 100", { exact: false }).waitFor();
+    }
+    // The second takes more than the bank holds, so the assets are sold for it.
+    for (const added of [600, -500]) {
+      await field.fill(String(added));
+      await page.getByRole("button", { name: "Show what to hold" }).click();
+      const wealth = 1000 + added;
+      const words = page.getByText(`With ${wealth}.00: `, { exact: false });
+      await words.waitFor();
+      const own = assets ? { holdings: Object.fromEntries(assets.map((name) => [name, (more.holdings[name] * 1000) / Math.max(wealth, 900)])) } : { holding: (more.holding * 1000) / wealth };
+      const advice = await call(ballast.url, "/what-if", { session, wealth, ...own });
+      const cost = assets ? 0 : 0.01 * Math.abs(advice.trade);
+      const share = assets ? advice.total : advice.allocation;
+      const shown = Number(/: ([\d,.]+) (?:of|in)/.exec(plain(await words.innerText()))[1].replaceAll(",", ""));
+      assert.ok(Math.abs(shown - share * wealth * (1 - cost)) < 0.006, `${shown} for ${share * wealth * (1 - cost)}`);
+      if (assets) for (const name of assets) assert.ok(advice.trade[name] === 0 || plain(await words.innerText()).includes(` of ${name}`));
+    }
+    assert.deepEqual(await call(ballast.url, `/sessions/${session}`), before, "nothing is recorded");
+  }
 });

@@ -94,10 +94,35 @@ test("a batch proposes the day, asks about what differs, fills gaps and says wha
   assert.deepEqual((await observed(sessions[3])).map(({ log_return }) => log_return === null), [false, true, false]);
   // Neither a press nor a list without the others makes it pass.
   assert.equal(await page.getByRole("button", { name: "Report", exact: true }).isDisabled(), true);
-  await page.getByLabel("The doubted returns are right").check();
+  await page.getByLabel("It is right: Cleo").check();
   await page.getByRole("button", { name: "Report for 1" }).click();
   await page.getByText("1 return is recorded.").first().waitFor();
   assert.equal((await observed(sessions[2])).length, 2);
+});
+
+test("no day is filled in before it has come, but the day that is due is named", async () => {
+  const [late, early] = [await open("Nora"), await open("Olga")];
+  await report(late, 1, { simple_return: 0.01, date: "2019-05-31" });
+  const now = new Date();
+  await report(early, 1, { simple_return: 0.01, date: new Date(now - now.getTimezoneOffset() * 60_000).toISOString().slice(0, 10) });
+  await go(`#/sessions/${late}`);
+  assert.equal(await page.getByLabel("Last day").first().inputValue(), "2019-06-30");
+  await go(`#/sessions/${early}`);
+  const { next } = await call(ballast.url, `/sessions/${early}`);
+  assert.equal(await page.getByLabel("Last day").first().inputValue(), "");
+  await page.getByText(`Due on ${next}. May be blank.`).waitFor();
+});
+
+test("a session that was deleted in another tab leaves no advice on its page", async () => {
+  const session = await open("Gone");
+  await go(`#/sessions/${session}`);
+  await page.getByLabel("Return in period 1, %").fill("1");
+  await fetch(`${ballast.url}/sessions/${session}`, { method: "DELETE" });
+  await page.getByRole("button", { name: "Report period 1" }).click();
+  await page.getByRole("heading", { level: 1, name: "Session deleted" }).waitFor();
+  assert.equal(await main(), "Session deleted\n\nThis session was deleted. See the sessions.");
+  await page.getByRole("link", { name: "See the sessions" }).click();
+  await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
 });
 
 test("the day proposed is the end of the last period", async () => {
@@ -115,4 +140,11 @@ test("axe finds nothing in what is asked", async () => {
     await page.getByRole("button", { name: "Report June 2019" }).click();
     await page.getByText("Not recorded yet.").waitFor();
   });
+});
+
+test("a day with slashes is read where it can be read in one way", async () => {
+  const { dayOf } = await dashboardModule("periods.js");
+  const days = { "31/12/2026": "2026-12-31", "12/31/2026": "2026-12-31", "5/5/2026": "2026-05-05", "30.9.2008": "2008-09-30", "2008-9-3": "2008-09-03" };
+  for (const [text, day] of Object.entries(days)) assert.equal(dayOf(text), day, text);
+  for (const text of ["1/2/2026", "31/13/2026", "13/13/2026", "2/30/2026", "2026"]) assert.equal(dayOf(text), null, text);
 });

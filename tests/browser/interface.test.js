@@ -19,7 +19,7 @@ before(async () => {
 });
 
 test("every call is listed, and every problem", async () => {
-  await page.locator("#operations-jobs-train").waitFor();
+  await page.locator("#operations-jobs-post_train").waitFor();
   const { paths } = await call(ballast.url, "/openapi.json");
   const calls = Object.values(paths).flatMap(Object.keys).length;
   assert.ok(calls > 25);
@@ -28,10 +28,10 @@ test("every call is listed, and every problem", async () => {
 });
 
 test("a call shows its example, its fields and their defaults", async () => {
-  const train = page.locator("#operations-jobs-train");
+  const train = page.locator("#operations-jobs-post_train");
   await train.getByRole("button").first().click();
   await train.getByText('"target": "floor_gain"').first().waitFor();
-  const walk = page.locator("#operations-jobs-backtest");
+  const walk = page.locator("#operations-jobs-post_backtest");
   await walk.getByRole("button").first().click();
   await walk.getByRole("tab", { name: "Schema" }).first().click();
   await walk.getByText("count", { exact: true }).first().waitFor();
@@ -49,7 +49,7 @@ test("it is dark where the reader's screen is", async () => {
 });
 
 test("a call is tried", async () => {
-  const live = page.locator("#operations-operations-livez");
+  const live = page.locator("#operations-operations-get_livez");
   await live.getByRole("button").first().click();
   await live.getByRole("button", { name: "Try it out" }).click();
   await live.getByRole("button", { name: "Execute" }).click();

@@ -38,7 +38,7 @@ test("with the key the page works, and its streams and files show it too", async
   await page.getByText("Nothing has been trained here yet").waitFor();
   const authorization = { authorization: `Bearer ${key}`, "content-type": "application/json" };
   const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
-  const body = JSON.stringify({ problem: { horizon: 40, rate_per_step: 0.002, history }, design: { count: 30 } });
+  const body = JSON.stringify({ problem: { horizon: 40, rate_per_step: 0.002, history }, design: { count: 10 } });
   const queued = await (await fetch(`${ballast.url}/train`, { method: "POST", headers: authorization, body })).json();
   const stream = page.waitForRequest((request) => request.url().endsWith(`/jobs/${queued.job}/events`));
   await page.reload();

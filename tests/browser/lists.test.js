@@ -2,7 +2,8 @@
 
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
-import { call, trained } from "./ballast.js";
+import { call, ended, trained } from "./ballast.js";
+import { quiet, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const SESSIONS = 211;
@@ -12,25 +13,17 @@ const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.
 
 let policy, oldest, evaluation;
 
-const ended = async (job) => {
-  for (;;) {
-    const now = await call(ballast.url, `/jobs/${job}`);
-    if (now.finished_ms !== null) return now;
-    await new Promise((resolve) => setTimeout(resolve, 100));
-  }
-};
-
 before(async () => {
   const problem = { horizon: 2, rate_per_step: 0.002, history: HISTORY };
   const design = { count: 20 };
-  ({ policy } = await ended((await call(ballast.url, "/train", { problem, design })).job));
+  policy = await trained(ballast.url, { problem, design });
   ({ job: evaluation } = await call(ballast.url, "/evaluate", {
     problem,
     design,
     frameworks: ["plug_in"],
     paths: 100,
   }));
-  await ended(evaluation);
+  await ended(ballast.url, evaluation);
   oldest = (await call(ballast.url, "/sessions", { policy })).session;
   for (let k = 1; k < SESSIONS; k++) await call(ballast.url, "/sessions", { policy });
   for (let k = 0; k < JOBS; k++) {
@@ -44,9 +37,7 @@ before(async () => {
 });
 
 async function go(hash) {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
+  await visit(page, `${ballast.url}/${hash}`);
 }
 
 /** Asks for more until there is no more; how often that was. */
@@ -75,6 +66,21 @@ test("every session can be reached", async () => {
   assert.equal(await page.locator("tbody tr").count(), SESSIONS);
   await page.locator(`a[href="#/sessions/${oldest}"]`).click();
   await page.getByRole("heading", { level: 1, name: /^Session / }).waitFor();
+});
+
+test("more than two hundred sessions stand newest first, and what is to be done first if asked", async () => {
+  let asked = 0;
+  const note = (request) => (asked += request.url().includes("/action?") ? 1 : 0);
+  await go("#/");
+  await page.getByText("50 of 211", { exact: true }).waitFor();
+  assert.equal(await page.getByRole("columnheader", { name: "Opened" }).getAttribute("aria-sort"), "descending");
+  await quiet(page);
+  page.on("request", note);
+  await page.getByRole("button", { name: "Put first what is to be done" }).click();
+  await page.getByText("What is to be done stands first", { exact: false }).waitFor();
+  await page.getByText("50 of 211", { exact: true }).waitFor();
+  page.off("request", note);
+  assert.equal(asked, 0, "the advice of all was read for the sums before");
 });
 
 test("every job can be reached, the first of all too", async () => {

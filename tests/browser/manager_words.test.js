@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
-import { call, trained } from "./ballast.js";
-import { plain, usable, visitQuiet } from "./page.js";
+import { call, cancelJobs, trained } from "./ballast.js";
+import { plain, sentTraining, usable, visit, visitQuiet } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
@@ -14,7 +14,7 @@ let policy;
 
 before(async () => {
   const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, radius: { rule: "bridge", alpha: 0.2, scale: 0.1 } };
-  policy = await trained(ballast.url, { problem, design: { count: 40 } });
+  policy = await trained(ballast.url, { problem, design: { count: 10 } });
 });
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
@@ -41,11 +41,11 @@ test("the first sentence of a policy says what it holds now, as a session of it 
     const { session } = await call(ballast.url, "/sessions", { policy });
     return call(ballast.url, `/action?session=${session}`);
   };
-  const one = await trained(ballast.url, { problem, design: { count: 40 } });
+  const one = await trained(ballast.url, { problem, design: { count: 10 } });
   const told = /^Now it holds ([\d.]+) % in stocks\. It holds nothing in \d+ % of the situations it was trained for in the last month\.$/.exec(await first(one));
   const { allocation } = await advised(one);
   assert.ok(allocation > 0.1 && Math.abs(Number(told[1]) - 100 * allocation) <= 0.05, `${told} for ${allocation}`);
-  const costly = await trained(ballast.url, { problem: { ...problem, trading_cost: 0.002 }, design: { count: 40 } });
+  const costly = await trained(ballast.url, { problem: { ...problem, trading_cost: 0.002 }, design: { count: 10 } });
   const [, low, high] = /^Now it holds ([\d.]+) % in stocks if everything is in the bank now, and keeps up to ([\d.]+) %\./.exec(await first(costly));
   const { band } = await advised(costly);
   for (const [index, share] of [low, high].entries()) assert.ok(Math.abs(Number(share) - 100 * band[index]) <= 0.05, `${share} for ${band}`);
@@ -89,9 +89,8 @@ test("the form takes percent and presets, and sends what the service counts in",
   await askFor({ rate: "0.25", cost: "0,2 %" });
   await page.getByLabel("Confidence, %").fill("95");
   await page.getByLabel("Investor").selectOption({ label: "Cautious" });
-  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
-  await page.getByRole("button", { name: "Train", exact: true }).click();
-  const { problem } = (await sent).postDataJSON();
+  const { problem } = await sentTraining(page, ballast.url);
+  await page.getByRole("heading", { level: 1, name: "Jobs" }).waitFor();
   assert.deepEqual([problem.rate_per_step, problem.trading_cost, problem.radius.alpha, problem.horizon], [0.0025, 0.002, 0.05, 2]);
   assert.deepEqual(problem.utility, { kind: "power", risk_aversion: 6 });
 });
@@ -105,6 +104,7 @@ test("what may be a mistake is asked about in percent", async () => {
   assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than the average return of the record\./);
   assert.match(words, /Trading costs 5\.00 % of what is traded\. Is that right\?/);
   assert.doesNotMatch(words, /problem\./);
+  await cancelJobs(ballast.url);
 });
 
 test("a refusal is the page's own sentence, in the unit of its field and beside it", async () => {
@@ -157,13 +157,11 @@ test("a session that is not there leads back to the list", async () => {
 test("a service that stopped answering is said to have, and heard again", async () => {
   await call(ballast.url, "/train", { problem: { horizon: 60, rate_per_step: 0.002, history: HISTORY }, design: { count: 3000 } });
   await page.route("**/jobs/**", (route) => route.abort());
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/jobs`);
+  await visit(page, `${ballast.url}/#/jobs`);
   await page.getByText(/The service did not answer\..*This page shows its last answer, of \d/).waitFor();
   await page.unrouteAll();
   await page.getByText("The service did not answer.", { exact: false }).waitFor({ state: "hidden" });
-  const { jobs } = await call(ballast.url, "/jobs");
-  await Promise.all(jobs.map(({ job }) => fetch(`${ballast.url}/jobs/${job}/cancel`, { method: "POST" })));
+  await cancelJobs(ballast.url);
 });
 
 test("a visit starts at the sessions", async () => {

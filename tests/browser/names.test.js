@@ -11,7 +11,7 @@ const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.
 let policy, session;
 
 before(async () => {
-  policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 20 } });
+  policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 10 } });
 });
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
@@ -36,7 +36,7 @@ test("a training is listed by the name of its policy, and says where that is gon
   await go("#/jobs");
   await page.getByRole("heading", { level: 2, name: /^Training of World & bills$/ }).waitFor();
   await page.getByRole("heading", { level: 2, name: /^Training, \d+ \w+ \d{4}/ }).waitFor();
-  const other = await trained(ballast.url, { problem: { horizon: 1, rate_per_step: 0.003, history: HISTORY }, design: { count: 20 }, name: "Short-lived" });
+  const other = await trained(ballast.url, { problem: { horizon: 1, rate_per_step: 0.003, history: HISTORY }, design: { count: 10 }, name: "Short-lived" });
   await go("#/jobs");
   await page.getByRole("heading", { level: 2, name: /^Training of Short-lived$/ }).waitFor();
   await fetch(`${ballast.url}/policies/${other}`, { method: "DELETE" });

@@ -38,7 +38,7 @@ test("where nothing is, a visit is welcomed; where only a policy is, a session i
   await page.getByRole("link", { name: "Train the first policy" }).waitFor();
   policy = await trained(ballast.url, {
     problem: { horizon: 3, rate_per_step: 0.002, periods_per_year: 52, history: HISTORY, trading_cost: 0.01, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
-    design: { count: 40 },
+    design: { count: 10 },
     name: "World, weekly",
   });
   await go("");
@@ -47,21 +47,21 @@ test("where nothing is, a visit is welcomed; where only a policy is, a session i
   await page.getByRole("heading", { level: 1, name: "Open a session" }).waitFor();
 });
 
-test("a row tells wealth, holding, the last period, how late the report is, the advice and the trade", async () => {
+test("a row tells wealth, holding, the last return, how late the report is, the advice and the trade", async () => {
   sessions = [];
   for (const [index, name] of NAMES.entries())
     sessions.push((await call(ballast.url, "/sessions", { policy, wealth: 1000 * (index + 1), name, tags: index === 1 ? ["pension"] : [] })).session);
   const now = Date.now();
-  await call(ballast.url, "/observe", { session: sessions[0], period: 1, simple_return: 0.1, executed_allocation: 1, confirm: true, date: isoDay(now - 17 * DAY) });
+  await call(ballast.url, "/observe", { session: sessions[0], period: 1, simple_return: 0.1, executed_allocation: 1, flow: 500, confirm: true, date: isoDay(now - 17 * DAY) });
   await call(ballast.url, "/observe", { session: sessions[1], period: 1, simple_return: -0.1, executed_allocation: 0, confirm: true, date: isoDay(now - DAY) });
   await go("");
   const session = await call(ballast.url, `/sessions/${sessions[0]}`);
   const action = await call(ballast.url, `/action?session=${sessions[0]}`);
-  const [wealth, held, change, report, hold, trade, state, opened] = await cells("Ada");
-  // All is bought at a hundredth, and gains a tenth.
-  assert.equal(wealth, "1089.00");
-  assert.equal(held, "100 %");
-  assert.equal(change, "+89.00");
+  const [wealth, held, back, report, hold, trade, state, opened] = await cells("Ada");
+  // All is bought at a hundredth, and gains a tenth; the money added is no gain.
+  assert.equal(wealth, "1589.00");
+  assert.equal(held, "68.5 %");
+  assert.equal(back, "+10.00 %");
   assert.match(report, /overdue by 10 days/);
   assert.ok(Math.abs(Number.parseFloat(hold) - 100 * action.allocation) <= 0.05, `${hold} for ${action.allocation}`);
   const whole = session.wealth * (1 - 0.01 * Math.abs(action.trade));
@@ -72,7 +72,7 @@ test("a row tells wealth, holding, the last period, how late the report is, the 
   assert.match(opened, /by World, weekly/);
   assert.match((await cells("Grace"))[3], /next \d/);
   assert.match((await cells("Emmy"))[3], /^None yet\s+next about \d/);
-  assert.equal((await cells("Emmy"))[2], "\u2013");
+  assert.deepEqual([(await cells("Grace"))[2], (await cells("Emmy"))[2]], ["-10.00 %", "\u2013"]);
 });
 
 test("a report is late by the days since it was due", async () => {
@@ -81,7 +81,7 @@ test("a report is late by the days since it was due", async () => {
 });
 
 test("headers put the rows in order, and say so", async () => {
-  await go("");
+  await go("#/sessions?sort=-created");
   assert.deepEqual(await names(), ["Emmy", "Grace", "Ada"]);
   const press = (name) => page.getByRole("button", { name }).click();
   const order = (name) => page.getByRole("columnheader", { name }).getAttribute("aria-sort");
@@ -119,6 +119,29 @@ test("search, tag and state leave those that match", async () => {
   await shown("3 of 3");
   await page.getByLabel("State").selectOption("completed");
   await shown("0 of 0");
+});
+
+test("a search and a tag typed within a moment both count, and neither follows to another page", async () => {
+  await go("");
+  await shown("3 of 3");
+  const asked = page.waitForRequest((request) => request.url().includes("tag=pension"));
+  const type = (words) => page.evaluate((words) => {
+    for (const [name, text] of Object.entries(words)) {
+      const field = document.querySelector(`.filters [name=${name}]`);
+      field.value = text;
+      field.dispatchEvent(new Event("input"));
+    }
+  }, words);
+  await type({ search: "gra", tag: "pension" });
+  assert.equal(new URL((await asked).url()).searchParams.get("search"), "gra");
+  const { sessions: found } = await call(ballast.url, "/sessions?search=gra&tag=pension");
+  await shown(`${found.length} of ${found.length}`);
+  assert.match(page.url(), /search=gra&tag=pension/);
+  await type({ search: "a" });
+  await page.evaluate(() => (location.hash = "#/jobs"));
+  await page.getByRole("heading", { level: 1, name: "Jobs" }).waitFor();
+  await page.waitForTimeout(400);
+  assert.match(page.url(), /#\/jobs$/);
 });
 
 test("an advice that is refused is a dash with its reason, and the others stand", async () => {
@@ -179,6 +202,7 @@ test("who needs care is told in a sentence", async () => {
   const { careWords } = await dashboardModule("care.js");
   assert.equal(careWords({ sessions: 3, any: 2, overdue: 1, renewal: 2, alarm: 0, ending: 0 }), "2 of 3 sessions need care: 1 is overdue, 2 wait for their next policies.");
   assert.equal(careWords({ sessions: 1, any: 0, overdue: 0, renewal: 0, alarm: 0, ending: 0 }), "None of 1 session needs care.");
+  assert.equal(careWords({ sessions: 3, any: 0, overdue: 0, renewal: 0, alarm: 0, ending: 0 }, true), "Otherwise no session needs care.");
   assert.equal(careWords({ sessions: 4, any: 2, overdue: 0, renewal: 0, alarm: 0, ending: 2 }), "2 of 4 sessions need care: 2 are completed or in their last period.");
 });
 

@@ -12,7 +12,7 @@ const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.
 let short, long;
 
 before(async () => {
-  const of = (horizon, name, more = {}) => trained(ballast.url, { problem: { horizon, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, ...more }, design: { count: 20 }, name });
+  const of = (horizon, name, more = {}) => trained(ballast.url, { problem: { horizon, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, ...more }, design: { count: 10 }, name });
   short = await of(2, "Short");
   long = await of(12, "Long");
 });
@@ -62,7 +62,7 @@ test("those ticked that end go on by their policy trained anew, one training for
 
 test("where wealth matters a training anew starts from the wealth reached", async () => {
   const { anew } = await dashboardModule("renewing.js");
-  const specification = { problem: { initial_wealth: 100, rate_per_step: 0.001, utility: { kind: "exponential", risk_aversion: 0.03 }, contributions: 0, history: HISTORY }, design: { count: 20, wealth: { min: 50, max: 200 } }, seed: 1 };
+  const specification = { problem: { initial_wealth: 100, rate_per_step: 0.001, utility: { kind: "exponential", risk_aversion: 0.03 }, contributions: 0, history: HISTORY }, design: { count: 10, wealth: { min: 50, max: 200 } }, seed: 1 };
   const history = { history: HISTORY, record: [...HISTORY, 0.02], observations: [{ period: 1, log_return: 0.02, reported: { rate: 0.003 } }, { period: 2, log_return: null, reported: {} }] };
   const asked = anew({ wealth: 150 }, history, { specification: structuredClone(specification), name: "" }, new Date("2026-11-15"));
   assert.deepEqual([asked.problem.history, asked.problem.rate_per_step, asked.problem.initial_wealth, asked.design.wealth, asked.name], [[...HISTORY, 0.02], 0.003, 150, { min: 75, max: 300 }, "Renewed Nov 2026"]);

@@ -55,7 +55,7 @@ test("a backtest tells what was read and how it was walked through, in its own p
 });
 
 test("a chart is walked by keyboard, has a table and is saved as a picture", async () => {
-  const chart = page.locator("figure", { hasText: "Wealth from 100" });
+  const chart = page.locator("figure", { hasText: "Growth of 100" });
   const before = await chart.getByRole("slider").getAttribute("aria-valuetext");
   await chart.getByRole("slider").press("ArrowLeft");
   assert.notEqual(await chart.getByRole("slider").getAttribute("aria-valuetext"), before);

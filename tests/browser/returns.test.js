@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { call } from "./ballast.js";
-import { usable } from "./page.js";
+import { usable, visit } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const area = () => page.locator('textarea[name="problem.history"]');
@@ -11,9 +11,9 @@ const note = () => page.locator("#f-problem-history-note");
 
 /** The form without what was typed in it before. */
 async function afresh() {
-  await page.goto(`${ballast.url}/livez`);
+  await visit(page, `${ballast.url}/#/nowhere`);
   await page.evaluate(() => sessionStorage.clear());
-  await page.goto(`${ballast.url}/#/train`);
+  await visit(page, `${ballast.url}/#/train`);
 }
 
 /** The form afresh, with a text in its field as if pasted. */
@@ -83,8 +83,7 @@ test("a file in UTF-16 is read", async () => {
 });
 
 test("a file as a spreadsheet in Europe saves it is read, and what stands above its table is named", async () => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/train`);
+  await visit(page, `${ballast.url}/#/train`);
   const buffer = Buffer.from("Depot M\u00fcller\r\nDatum;Kurs\r\n28.01.2020;100,5\r\n28.02.2020;101,5\r\n28.03.2020;99,5\r\n", "latin1");
   await page.locator('input[type="file"]').setInputFiles({ name: "depot.csv", mimeType: "text/csv", buffer });
   await note().getByText("2 monthly returns of prices, February 2020 to March 2020, as in column Kurs.").waitFor();

@@ -3,9 +3,9 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { before, test } from "node:test";
-import { call, trained } from "./ballast.js";
+import { call, ended, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
-import { plain, usable, visitQuiet } from "./page.js";
+import { plain, usable, visit, visitQuiet } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const ASSETS = ["World", "Bonds A/B", "Gold"];
@@ -21,7 +21,7 @@ before(async () => {
   page.setDefaultTimeout(10_000);
   const policy = await trained(ballast.url, {
     problem: { assets: ASSETS, horizon: 4, rate_per_step: 0.001, periods_per_year: 12, history: HISTORY, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
-    design: { count: 20 },
+    design: { count: 10 },
   });
   ({ session } = await call(ballast.url, "/sessions", { policy, wealth: 250_000, name: "Trust" }));
 });
@@ -193,14 +193,14 @@ test("the last report of several is taken back, and returns by price are told by
 test("it stands beside another session by what it holds in all", async () => {
   const { policy } = await call(ballast.url, `/sessions/${session}`);
   const other = (await call(ballast.url, "/sessions", { policy })).session;
-  await page.goto(`${ballast.url}/#/compare?sessions=${session},${other}`);
+  await visit(page, `${ballast.url}/#/compare?sessions=${session},${other}`);
   await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
   const told = await rows("Two sessions side by side");
   const actions = await Promise.all([session, other].map((id) => call(ballast.url, `/action?session=${id}`)));
   for (const [index, { total }] of actions.entries()) near(told["To hold in the assets"][index], 100 * total, 0.05);
   assert.match(told["To trade"][1], /^buy [\d.]+$/);
   assert.doesNotMatch(plain(await page.locator("main").innerText()), /NaN|undefined|in stocks/);
-  await page.goto(`${ballast.url}/#/policies/${policy}`);
+  await visit(page, `${ballast.url}/#/policies/${policy}`);
   await page.getByText("It is for World, Bonds A/B and Gold.", { exact: false }).waitFor();
 });
 
@@ -227,7 +227,7 @@ test("a policy of several is trained from a table that is pasted, and its column
   await page.getByLabel(/^Percent/).check();
   await page.getByRole("button", { name: "Read it this way" }).click();
   await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
-  await page.getByLabel("Kind of policy").waitFor({ state: "hidden" });
+  await page.getByLabel("Framework").waitFor({ state: "hidden" });
   await page.getByLabel("How the assets are mixed").selectOption("Less of what varies more");
   await page.getByRole("button", { name: /Take the bank.s rate from rf/ }).click();
   await page.getByRole("group", { name: "Columns" }).getByLabel("Gold").click();
@@ -236,7 +236,7 @@ test("a policy of several is trained from a table that is pasted, and its column
   await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
   await page.getByLabel("Months ahead").fill("2");
   await page.getByText("For the quant", { exact: true }).click();
-  await page.getByLabel("Design points").fill("20");
+  await page.getByLabel("Design points").fill("10");
   const sent = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/train"));
   await page.getByRole("button", { name: "Train", exact: true }).click();
   const { problem } = (await sent).postDataJSON();
@@ -248,9 +248,9 @@ test("a policy of several is trained from a table that is pasted, and its column
 
 test("a session of it is opened with what is held of each", async () => {
   await page.getByRole("link", { name: "Open a session" }).first().click();
-  await page.getByLabel("World held already, %").fill("30");
-  await page.getByLabel("Gold held already, %").fill("12,5");
-  await page.getByLabel("Share of it held already, %").waitFor({ state: "hidden" });
+  await page.getByLabel("World held now, %").fill("30");
+  await page.getByLabel("Gold held now, %").fill("12,5");
+  await page.getByLabel("Held now, %", { exact: true }).waitFor({ state: "hidden" });
   await page.getByText("Use other known returns").click();
   await page.getByLabel("Returns or prices known").fill(["Gold,World,Bonds A/B", ...HISTORY.slice(0, 8).map(([world, bonds, gold]) => [gold, world, bonds].join())].join("\n"));
   const columns = page.getByRole("group", { name: /^Which column/ });
@@ -275,14 +275,7 @@ test("the form is filled from a policy of several by its assets, and trains the 
   const sent = page.waitForResponse((response) => response.request().method() === "POST" && response.url().endsWith("/train"));
   await page.getByRole("button", { name: "Train", exact: true }).click();
   const { job } = await (await sent).json();
-  for (;;) {
-    const now = await call(ballast.url, `/jobs/${job}`);
-    if (now.finished_ms === null) await new Promise((resolve) => setTimeout(resolve, 50));
-    else {
-      assert.equal(now.policy, policy);
-      break;
-    }
-  }
+  assert.equal((await ended(ballast.url, job)).policy, policy);
 });
 
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {

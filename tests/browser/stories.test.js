@@ -70,9 +70,13 @@ test("two tenants in two tabs of one browser see nothing of each other", async (
         const headers = { authorization: `Bearer ${key}`, "content-type": "application/json" };
         while ((await fetch(`${ballast.url}/key`, { headers }).then((answer) => answer.json())).tenant !== tenant) await new Promise((resolve) => setTimeout(resolve, 50));
         const ask = async (path, body) => (await fetch(ballast.url + path, { headers, ...(body ? { method: "POST", body: JSON.stringify(body) } : {}) })).json();
-        const { job } = await ask("/train", { problem: { horizon: 1, rate_per_step: 0.002, history: HISTORY }, design: { count: 20 }, name: `Policy of ${tenant}` });
+        const { job } = await ask("/train", { problem: { horizon: 1, rate_per_step: 0.002, history: HISTORY }, design: { count: 10 }, name: `Policy of ${tenant}` });
         let policy = null;
-        while (!policy) ({ policy } = await ask(`/jobs/${job}`));
+        for (;;) {
+          ({ policy } = await ask(`/jobs/${job}`));
+          if (policy) break;
+          await new Promise((resolve) => setTimeout(resolve, 50));
+        }
         const { session } = await ask("/sessions", { policy, name: `Client of ${tenant}` });
         return { tenant, key, policy, session, job, page: await context.newPage() };
       }),
@@ -111,7 +115,7 @@ test("a service killed while it records a report is started again, and the repor
   const ballast = await service();
   const page = await opened();
   try {
-    const policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 20 } });
+    const policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 10 } });
     const sessions = Array.from({ length: REPORTS }, () => null);
     let next = 0;
     const open = async () => {

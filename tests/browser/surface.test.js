@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
-import { call } from "./ballast.js";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { ballast, page } from "./scene.js";
 
@@ -22,19 +22,10 @@ before(async () => {
     { length: RETURNS },
     (_, k) => 0.005 + 0.03 * Math.sin(7 * k) + 0.02 * Math.cos(3 * k) ** 3,
   );
-  const { job } = await call(ballast.url, "/train", {
+  policy = await trained(ballast.url, {
     problem: { horizon: 3, rate_per_step: 0.002, utility: { kind: "exponential", risk_aversion: 0.01 }, history },
-    design: { count: 100 },
+    design: { count: 20 },
   });
-  for (;;) {
-    const now = await call(ballast.url, `/jobs/${job}`);
-    if (now.state === "succeeded") {
-      policy = now.policy;
-      break;
-    }
-    assert.ok(["queued", "running"].includes(now.state), now.error);
-    await new Promise((resolve) => setTimeout(resolve, 200));
-  }
 });
 
 const map = () => page.getByRole("application", { name: /Share held in stocks/ });

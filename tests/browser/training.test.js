@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { call } from "./ballast.js";
-import { accessible, plain, usable, visitQuiet } from "./page.js";
+import { call, ended } from "./ballast.js";
+import { accessible, plain, sentTraining, usable, visitQuiet } from "./page.js";
 import { ballast, page } from "./scene.js";
 
 const RETURNS = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002, 0.03, -0.02];
@@ -18,11 +18,7 @@ const small = async () => {
   await page.getByLabel("Design points").fill("20");
 };
 const train = () => page.getByRole("button", { name: "Train", exact: true });
-const sent = async () => {
-  const request = page.waitForRequest((request) => request.url().endsWith("/train"));
-  await train().click();
-  return (await request).postDataJSON();
-};
+const sent = () => sentTraining(page, ballast.url);
 
 test("the dates of a record tell the periods a year, and without dates they are a choice that must be made", async () => {
   await go("#/train");
@@ -134,9 +130,7 @@ test("one record has one mean and one deviation, of a month and of a year, from 
   const answered = page.waitForResponse((response) => response.url().endsWith("/train"));
   await train().click();
   const { job } = await (await answered).json();
-  let now;
-  do now = await call(ballast.url, `/jobs/${job}`);
-  while (now.finished_ms === null);
+  const now = await ended(ballast.url, job);
   await go(`#/policies/${now.policy}`);
   const told = page.getByText(/^The record holds 12 returns/);
   await told.waitFor();

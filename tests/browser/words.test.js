@@ -99,9 +99,10 @@ test("a doubt is told in a sentence, with its asset where there are several, and
   const one = (doubt) => doubtWords({ doubts: [doubt] })[0];
   assert.equal(one({ reason: "unusual_return", field: "simple_return", sentence }), "A return of 90.00 % lies 24.8 standard deviations from the record.");
   assert.equal(one({ reason: "unusual_return", field: "simple_returns.Bonds A/B", sentence }), "Bonds A/B: a return of 90.00 % lies 24.8 standard deviations from the record.");
+  assert.equal(one({ reason: "unusual_return", field: "simple_return", sentence: "a return of -90.00 % is unusual" }), "A return of \u221290.00 % is unusual.");
   const gap = (missing) => one({ reason: "missing_periods", field: "date", value: "2026-11-30", sentence, missing });
   assert.equal(gap(["2026-10-31"]), "The period that ends on 31 Oct 2026 is missing before 30 Nov 2026.");
-  assert.equal(gap(["2026-09-30", "2026-10-31"]), "2 periods are missing before 30 Nov 2026: the first ends on 30 Sept 2026, the last on 31 Oct 2026.");
+  assert.equal(gap(["2026-09-30", "2026-10-31"]), "2 periods are missing before 30 Nov 2026: the first ends on 30 Sep 2026, the last on 31 Oct 2026.");
 });
 
 test("a refusal names the field, the value and the rule in the unit of the field", () => {
@@ -117,6 +118,7 @@ test("a refusal names the field, the value and the rule in the unit of the field
     [{ value: "x", rule: "unknown variant `x`, expected one of `log`, `power`" }, "Kind", null, "Kind is \u201cx\u201d; it must be one of log, power."],
     [{ value: -1000, rule: "must leave a wealth that lies in [0.000001, 1000000]" }, "Money added", null, "Money added is -1000; it must leave a wealth that lies from 0.000001 to 1,000,000."],
     [{ value: "31.01.2020", rule: "failed to parse four digit integer as year: invalid digit, expected 0-9 but got ." }, "Last day", null, "Last day is \u201c31.01.2020\u201d; it must be a date such as 2008-09-30."],
+    [{ value: "3/10/2026", rule: "failed to parse four digit integer as year: invalid digit, expected 0-9 but got /" }, "Last day", null, "Last day is \u201c3/10/2026\u201d; it may be 3 Oct 2026 or 10 Mar 2026: write 2026-10-03 or 2026-03-10."],
     [{ value: true, rule: "a rolling session needs a policy that learns" }, "How it continues", null, "How it continues: a rolling session needs a policy that learns."],
     [{ value: [1], rule: "must hold problem.horizon = 12 numbers" }, "Money added", null, "Money added has the wrong form; it must hold 12 numbers."],
     [{ value: 40, rule: "must be at most horizon" }, "Window", null, "Window is 40; it must be at most the number of periods ahead."],
@@ -124,7 +126,16 @@ test("a refusal names the field, the value and the rule in the unit of the field
   ];
   for (const [problem, label, unit, words] of cases) assert.equal(plain(problemWords(problem, label, unit)), words);
   const every = { value: 40, rule: "must be at most the horizon" };
-  assert.equal(problemWords(every, "Retrained every", null, "Looking ahead"), "Retrained every is 40; it must be at most \u201cLooking ahead\u201d.");
+  assert.equal(problemWords(every, "Train every", null, "Periods ahead"), "Train every is 40; it must be at most \u201cPeriods ahead\u201d.");
+});
+
+test("what rounding leaves of wealth in the bank is nothing", async () => {
+  const { inMoneyByName } = await dashboardModule("several.js");
+  const { inMoney } = await dashboardModule("advice.js");
+  const action = { allocation: { A: 0.1, B: 0.9 }, holdings: { A: 0.1 + 2e-16, B: 0.9 }, trade: { A: 0, B: 0 }, total: 0.1 + 0.9 };
+  const { bank } = inMoneyByName({ ...action, allocation: { A: 0.1, B: 0.9 + 3e-16 } }, ["A", "B"], { wealth: 123_456.78, cost: 0 });
+  assert.deepEqual([bank.held, bank.now], [0, 0]);
+  assert.equal(inMoney({ allocation: 1 + 3e-16, holding: 1, trade: 0 }, { wealth: 123_456.78, cost: 0, price: null }).bank, 0);
 });
 
 test("numbers of a column have the digits of each other, and a sentence has minus signs", () => {

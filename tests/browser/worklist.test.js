@@ -3,15 +3,16 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { before, test } from "node:test";
-import { call, trained } from "./ballast.js";
+import { call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
-import { ballast, page } from "./scene.js";
+import { ballast, chromium, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002, 0.14, -0.12];
 const BONDS = HISTORY.map((_, k) => 0.003 + 0.01 * Math.cos(2.3 * k));
 const COST = 0.001;
 const DAY = 86_400_000;
+const PROBLEM = { horizon: 3, rate_per_step: 0.002, periods_per_year: 52, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
 /** What each client has and holds; the fund is of two assets. */
 const CLIENTS = [
   { name: "Little", wealth: 100, holding: 0.1 },
@@ -29,9 +30,8 @@ const work = async () => plain(await page.locator(".work").innerText());
 const shown = (line) => page.locator(".foot").getByText(line, { exact: true }).waitFor();
 
 before(async () => {
-  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 52, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
-  policy = await trained(ballast.url, { problem: { ...problem, history: HISTORY }, design: { count: 40 }, name: "World, weekly" });
-  fund = await trained(ballast.url, { problem: { ...problem, trading_cost: 0, assets: ["Stocks", "Bonds"], history: HISTORY.map((back, k) => [back, BONDS[k]]) }, design: { count: 20 }, name: "Fund" });
+  policy = await trained(ballast.url, { problem: { ...PROBLEM, history: HISTORY }, design: { count: 10 }, name: "World, weekly" });
+  fund = await trained(ballast.url, { problem: { ...PROBLEM, trading_cost: 0, assets: ["Stocks", "Bonds"], history: HISTORY.map((back, k) => [back, BONDS[k]]) }, design: { count: 10 }, name: "Fund" });
   sessions = [];
   for (const client of CLIENTS) sessions.push({ ...client, ...(await call(ballast.url, "/sessions", { policy, ...client })) });
   const of = { name: "Two assets", wealth: 2000, holdings: { Stocks: 0.9, Bonds: 0.05 } };
@@ -126,13 +126,23 @@ test("the orders are saved as a file, and a line tells how many", async () => {
   assert.deepEqual(head.slice(0, 8), ["Client", "Session", "Policy", "Asset", "Order", "Amount", "Held", "To hold"]);
   assert.equal(rows.length, found.length);
   for (const { name, session, asset, amount, held, kept } of found) {
-    const row = rows.find((cells) => cells[1] === session && cells[3] === asset);
+    const row = rows.find((cells) => cells[1] === session && cells[3] === (asset || "risky asset"));
     assert.deepEqual([row[0], row[4]], [name, amount > 0 ? "buy" : "sell"]);
     for (const [index, value] of [[5, Math.abs(amount)], [6, held], [7, kept]]) assert.ok(Math.abs(Number(row[index]) - value) <= 0.0051, `${name}: ${row[index]} for ${value}`);
+    for (const cell of row.slice(8, 10)) assert.match(cell, /^\d+(\.\d{1,4})?$/);
   }
-  const sizes = rows.filter((cells) => cells[3] === "").map((cells) => Number(cells[5]));
+  const sizes = rows.filter((cells) => cells[3] === "risky asset").map((cells) => Number(cells[5]));
   assert.deepEqual(sizes, [...sizes].sort((one, other) => other - one));
   await page.getByText(`Saved ${found.length} orders of ${new Set(found.map(({ session }) => session)).size} sessions.`).waitFor();
+});
+
+test("the days of reports are saved as a calendar", async () => {
+  await go("");
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: "Calendar (.ics)" }).click()]);
+  assert.equal(download.suggestedFilename(), "reports.ics");
+  const text = await readFile(await download.path(), "utf8");
+  const ids = [...text.matchAll(/^UID:(.*)@ballast\r$/gm)].map(([, id]) => id);
+  assert.deepEqual(ids.sort(), sessions.map(({ session }) => session).sort());
 });
 
 test("whose report is due is told, and a link has their lines ready", async () => {
@@ -147,6 +157,83 @@ test("whose report is due is told, and a link has their lines ready", async () =
   await page.getByRole("link", { name: "Report for the 1" }).click();
   await page.getByRole("heading", { level: 1, name: "Report for several" }).waitFor();
   assert.match(await page.getByLabel("Sessions and their returns, %").inputValue(), /^Large/);
+});
+
+test("trades come before reports that are due, and these before what can wait", async () => {
+  const { toDo } = await dashboardModule("worklist.js");
+  const entry = (name, size, next) => ({ name, size, next, state: "active" });
+  const entries = [entry("new", 0, "2026-12-31"), entry("a week late", 0, "2026-11-23"), entry("small", 5, "2026-12-31"), entry("a month late", 0, "2026-10-31"), entry("large and late", 90, "2026-10-31"), entry("old", 0, null), { ...entry("completed", 0, "2026-10-31"), state: "completed" }];
+  assert.deepEqual(toDo(entries, ({ size }) => size, "2026-11-30").map(({ name }) => name), ["large and late", "small", "a month late", "a week late", "new", "old", "completed"]);
+});
+
+test("a report unlike those of its peers is found, by policy and day, for one asset or several", async () => {
+  const { unlikePeers } = await dashboardModule("peers.js");
+  const of = (values, more = {}) => values.map((value, index) => ({ session: `${index}`, policy: "p", date: "2026-11-30", log_return: value === null ? null : Math.log1p(value), log_returns: null, ...more }));
+  const found = (entries) => unlikePeers(entries).map(({ entry }) => Number(entry.session));
+  assert.deepEqual(found(of([0.0213, 0.213, 0.0213, 0.0213])), [1]);
+  assert.deepEqual(found(of([0.0167, 0.01672, 0.01668, null])), [], "rounded otherwise, or missing");
+  assert.deepEqual([found(of([0.0213, 0.213])), found(of([0.01, 0.02, 0.03])), found(of([0.01, 0.01, 0.03, 0.03]))], [[], [], []], "nobody knows who is right");
+  const apart = of([0.0213, 0.213, 0.0213, 0.0213]);
+  apart[1].date = "2026-10-31";
+  apart[2].policy = "q";
+  assert.deepEqual(found(apart), [], "another day, another policy");
+  const assets = of([0, 0, 0], { log_return: 0.5 }).map((entry, index) => ({ ...entry, log_returns: { stocks: 0.01, bonds: index === 2 ? 0.02 : 0.002 } }));
+  assert.deepEqual(unlikePeers(assets).map(({ entry, agree, all }) => [entry.session, agree, all]), [["2", 2, 3]]);
+});
+
+test("the overview names who reported unlike the others, and lists them", async () => {
+  const own = await service();
+  try {
+    const policy = await trained(own.url, { problem: { ...PROBLEM, history: HISTORY }, design: { count: 10 } });
+    for (const [name, simple_return] of [["Ada", 0.0167], ["Ben", 0.0167], ["Jo\u00e3o", 0.167]]) {
+      const { session } = await call(own.url, "/sessions", { policy, name });
+      await call(own.url, "/observe", { session, period: 1, simple_return, date: "2026-11-30", confirm: true });
+    }
+    const other = await (await chromium.newContext()).newPage();
+    await visitQuiet(other, `${own.url}/`);
+    await other.getByText("Jo\u00e3o reported 16.70 % for 30 Nov 2026, where 2 of 3 sessions with its policy reported 1.67 %.", { exact: false }).waitFor();
+    await other.getByRole("button", { name: "Show which" }).click();
+    await other.waitForFunction(() => document.querySelectorAll("tbody th a").length === 1);
+    assert.deepEqual(await other.locator("tbody th a").allInnerTexts(), ["Jo\u00e3o"]);
+    await other.context().close();
+  } finally {
+    await own.stop();
+  }
+});
+
+test("the overview opens with what is to be done first, and another order is kept in this browser alone", async () => {
+  const found = await trades();
+  const size = (name) => found.filter((one) => one.name === name).reduce((all, { amount }) => all + Math.abs(amount), 0);
+  const byTrade = [...new Set(found.map(({ name }) => name))].sort((one, other) => size(other) - size(one));
+  await go("");
+  await page.getByText("What is to be done stands first", { exact: false }).waitFor();
+  assert.ok(byTrade.length >= 3, `${byTrade}`);
+  assert.deepEqual((await names()).slice(0, byTrade.length), byTrade);
+  await page.getByRole("button", { name: "Wealth", exact: true }).click();
+  await page.waitForFunction(() => document.querySelector("[aria-sort=descending]")?.textContent.startsWith("Wealth"));
+  const byWealth = await names();
+  assert.notDeepEqual(byWealth, byTrade);
+  await go("");
+  assert.deepEqual([await names(), new URL(page.url()).hash], [byWealth, ""]);
+  assert.equal(await page.getByRole("columnheader", { name: "Wealth" }).getAttribute("aria-sort"), "descending");
+  const other = await (await chromium.newContext()).newPage();
+  await visitQuiet(other, `${ballast.url}/`);
+  assert.deepEqual((await other.locator("tbody th a").allInnerTexts()).slice(0, byTrade.length), byTrade);
+  await other.context().close();
+  await page.getByRole("button", { name: "Put first what is to be done" }).click();
+  await page.getByText("What is to be done stands first", { exact: false }).waitFor();
+  await go("");
+  assert.deepEqual((await names()).slice(0, byTrade.length), byTrade);
+});
+
+test("damaged sessions are named in that order too", async () => {
+  await page.route("**/sessions?*limit=200*", async (route) => {
+    const response = await route.fetch();
+    await route.fulfill({ response, json: { ...(await response.json()), damaged: ["session_broken"] } });
+  });
+  await go("");
+  await shown("6 of 7. Damaged; ask an operator to restore: session_broken");
+  await page.unrouteAll();
 });
 
 test("a session without advice is left out of the sums and named", async () => {

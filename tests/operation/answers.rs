@@ -25,6 +25,10 @@ struct Store {
     declared: String,
     /// A session of many periods.
     session: String,
+    /// The path of a subscription.
+    subscription: String,
+    /// A link to the letter of the session.
+    link: Value,
 }
 
 impl Store {
@@ -73,12 +77,18 @@ impl Store {
             let change = json!({ "name": format!("{round}") });
             assert_eq!(app.send(Method::PATCH, &named, Some(&change)).await.0, StatusCode::OK);
         }
+        let (_, document) = app.get(&format!("/sessions/{session}/export")).await;
+        std::fs::write(app.folder().join("session.json"), document.to_string()).unwrap();
         let mut stock: Value = serde_json::from_str(include_str!("../../examples/problems/stock.json")).unwrap();
         stock["problem"]["history"] = json!(returns(2000).iter().map(|value| 20.0 + 300.0 * value).collect::<Vec<_>>());
         stock["problem"]["horizon"] = json!(1);
         app.train(&stock).await;
         let declared = std::mem::replace(&mut app.policy, trained.clone());
-        Store { app, jobs, policy: trained, declared, session }
+        let request = json!({ "url": "https://example.com/", "events": ["drift_alarm"] });
+        let subscribed = app.post("/subscriptions", &request).await.1;
+        let subscription = format!("/subscriptions/{}", subscribed["subscription"].as_str().unwrap());
+        let link = app.post(&format!("/sessions/{session}/links"), &json!({})).await.1;
+        Store { app, jobs, policy: trained, declared, session, subscription, link }
     }
 
     /// Returns the largest valid request of an operation, and whether its answer is above 64 KB.
@@ -95,7 +105,9 @@ impl Store {
         match operation {
             "get /" => get("/"),
             "get /action" => large(&format!("/action?session={session}&explain=worst_case")),
+            "post /plan" => ("/plan".into(), Some(json!({ "problem": problem, "paths": 200 })), true),
             "post /advise" => ("/advise".into(), Some(json!({ "problem": problem })), false),
+            "post /sleeve" => ("/sleeve".into(), Some(json!({ "problem": problem })), true),
             "get /audit" => large("/audit?limit=1000"),
             "post /backtest" => body(
                 "/backtest",
@@ -115,6 +127,7 @@ impl Store {
             ),
             "get /guide" => get("/guide"),
             "get /guide/{file}" => get("/guide/requests"),
+            "get /llms.txt" => get("/llms.txt"),
             "get /jobs" => get("/jobs?limit=1000"),
             "get /jobs/{id}" => get(&of_job),
             "delete /jobs/{id}" => get(&of_job),
@@ -128,6 +141,11 @@ impl Store {
                     |k: usize| json!({ "session": format!("session_{k:032x}"), "period": 1, "log_return": 0.001 });
                 let reports: Vec<Value> = std::iter::once(one(251)).chain((0..999).map(unknown)).collect();
                 ("/observe".into(), Some(json!(reports)), true)
+            }
+            "post /mcp" => {
+                let call = json!({ "name": "get_policy", "arguments": { "id": policy } });
+                let body = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": call });
+                ("/mcp".into(), Some(body), true)
             }
             "get /openapi.json" => large("/openapi.json"),
             "get /policies" => large("/policies?limit=1000"),
@@ -146,6 +164,7 @@ impl Store {
                 ),
                 true,
             ),
+            "get /reports.ics" => get("/reports.ics"),
             "get /sessions" => large("/sessions?limit=1000&count=care"),
             "post /sessions" => body("/sessions", labelled(json!({ "policy": policy, "rolling": true }))),
             "get /sessions/{id}/futures" => get(&format!("{of_session}/futures?paths=1000")),
@@ -157,11 +176,37 @@ impl Store {
                 &format!("{of_session}/corrections"),
                 json!({ "correction": 1, "period": 3, "log_return": 0.002, "reason": "\u{10348}".repeat(200), "confirm": true }),
             ),
+            "get /sessions/{id}/export" => large(&format!("{of_session}/export")),
+            // The session is there: it is replayed, and then refused.
+            "post /sessions/import" => {
+                let document = std::fs::read_to_string(self.app.folder().join("session.json")).unwrap();
+                body("/sessions/import", serde_json::from_str(&document).unwrap())
+            }
             "get /sessions/{id}/history" => large(&format!("{of_session}/history")),
+            "post /sessions/{id}/letter" => {
+                let logo = format!("data:image/jpeg;base64,/9j/{}", "A".repeat(270_000));
+                let letter = format!("{of_session}/letter?sensitivity=true");
+                (letter, Some(json!({ "firm": { "logo": logo } })), true)
+            }
+            "get /letter" => get(self.link["path"].as_str().unwrap()),
+            "get /sessions/{id}/links" => get(&format!("{of_session}/links")),
+            "post /sessions/{id}/links" => body(&format!("{of_session}/links"), json!({})),
+            "delete /links/{id}" => get(&format!("/links/{}", self.link["link"].as_str().unwrap())),
             "post /sessions/{id}/renewals" => {
                 body(&format!("{of_session}/renewals"), json!({ "renewal": 1, "policy": policy }))
             }
+            "get /subscriptions" => get("/subscriptions"),
+            "post /subscriptions" => {
+                body("/subscriptions", json!({ "url": "https://example.com/", "events": ["drift_alarm"] }))
+            }
+            "post /subscriptions/{id}/secret" => (format!("{}/secret", self.subscription), None, false),
+            "post /subscriptions/{id}/resend" => (format!("{}/resend", self.subscription), None, false),
+            "delete /subscriptions/{id}" => get(&self.subscription),
             "post /train" => body("/train", labelled(json!({ "problem": problem, "design": { "count": 20 } }))),
+            "post /orders" => body(
+                "/orders",
+                json!({ "session": session, "prices": { "asset": 10.0 }, "units": { "asset": 3.0 }, "cash": 70.0 }),
+            ),
             "post /what-if" => {
                 let range = json!({ "from": 0.01, "to": 2, "points": 30 });
                 let body = json!({ "session": session, "sweep": { "radius_scale": range }, "explain": "worst_case" });

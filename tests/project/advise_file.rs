@@ -81,7 +81,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
         (&["advise", MARKET, "--wealth", "0"], "--wealth is 0: must be a number in"),
         (&["advise", MARKET, "--trading-cost", "0.2"], "--trading-cost is 0.2: must be a number in [0, 0.1]"),
         (&["advise", MARKET, "--half-life", "0.5"], "--half-life is 0.5: must be a number in [1, "),
-        (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
+        (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must be a number in [1, 100]"),
         (
             &["backtest", MARKET, "--out", file, "--window", "1100"],
             "--window is 1100: must be at most 1097: the record has 1109 periods",
@@ -153,7 +153,23 @@ fn the_pages_show_what_commands_print() {
             shown += 1;
         }
     }
-    assert_eq!(shown, 7);
+    assert_eq!(shown, 9);
+}
+
+/// Options by the year are refused by the year, and percent typed as a fraction with them.
+#[test]
+fn a_plan_is_refused_in_the_unit_that_was_typed() {
+    for (option, value, refusal) in [
+        ("--years", "50", "--years is 50: must lie in [1, 43]"),
+        ("--inflation", "3", "--inflation is 3: must be a number in [-0.2, 0.5]"),
+        ("--highest", "13", "--highest is 13: must be a number in [0.000012, 12]"),
+        ("--wanted", "-12", "--wanted is -12: must be a number in [0.000012, "),
+        ("--goal", "-1", "--goal is -1: must be a number in "),
+        ("--certainty", "90", "--certainty is 90: must be a number in [0.5, 0.999]"),
+    ] {
+        let refused = text(&ballast(&["plan", MARKET, &format!("{option}={value}")]).stderr);
+        assert!(refused.starts_with(&format!("ballast: {refusal}")), "{option}: {refused}");
+    }
 }
 
 #[test]
@@ -177,11 +193,12 @@ fn named_columns_are_an_asset_each() {
     let held: serde_json::Value = serde_json::from_str(&text(&held.stdout)).unwrap();
     // At such a cost nothing is bought, and no more sold than what is too much.
     assert!(held["trade"]["utilities"] == 0.0 && held["allocation"]["energy"].as_f64().unwrap() > 0.0, "{held}");
+    let limited = ballast(&[&arguments[..], &["--limits", r#"{"each": {"max": 0.5}}"#, "--json"]].concat());
+    let limited: serde_json::Value = serde_json::from_str(&text(&limited.stdout)).unwrap();
+    assert!((limited["composition"]["energy"].as_f64().unwrap() - 0.5).abs() < 1e-9, "{limited}");
     for (options, refusal) in [
-        (
-            &["--holding", "0.1"][..],
-            "--holding is 0.1: must be COLUMN=SHARE if there are several assets, each column once",
-        ),
+        (&["--limits", r#"{"each": {"max": 0.4}}"#][..], "--limits assets is greatest shares that sum to 0.8: must be"),
+        (&["--holding", "0.1"], "--holding is 0.1: must be COLUMN=SHARE if there are several assets, each column once"),
         (&["--holding", "energy=0.1", "--holding", "energy=0.2"], "--holding is energy=0.2: must be COLUMN=SHARE"),
         (&["--holding", "coal=0.1"], "--holding is coal=0.1: must name one of the assets: energy, utilities"),
         (

@@ -18,7 +18,7 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 41] = [
+const DOCUMENTS: [&str; 48] = [
     "control/assets/advice.rs",
     "control/evaluation/assets/report.rs",
     "control/evaluation/backtest_report.rs",
@@ -26,6 +26,7 @@ const DOCUMENTS: [&str; 41] = [
     "control/evaluation/declared_walk.rs",
     "control/evaluation/frontier/report.rs",
     "control/evaluation/names.rs",
+    "control/evaluation/plan/report.rs",
     "control/evaluation/report.rs",
     "control/policy/advice.rs",
     "control/policy/caution.rs",
@@ -51,14 +52,20 @@ const DOCUMENTS: [&str; 41] = [
     "control/request/framework.rs",
     "control/request/frontier.rs",
     "control/request/learning.rs",
+    "control/request/own_weights.rs",
+    "control/request/plan.rs",
+    "control/request/limits.rs",
     "control/request/means.rs",
     "control/request/radius_rule.rs",
     "control/request/sampling_law.rs",
     "control/request/fund.rs",
+    "control/request/sleeve.rs",
     "control/request/specification.rs",
+    "control/request/spending.rs",
     "control/request/support.rs",
     "control/request/terms.rs",
     "control/request/warnings.rs",
+    "control/sleeve/report.rs",
     "control/solved_step.rs",
 ];
 /// Names no floor and is named by none below `service`: what mathematics and facts look like is not their matter.

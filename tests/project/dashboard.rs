@@ -1,12 +1,14 @@
 //! The files of the dashboard and of the page `/docs`: all of them are served, as what they are, and can do no more than
 //! they must.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
 use std::path::Path;
 
 use crate::support::App;
+use flate2::read::GzDecoder;
 use reqwest::StatusCode;
-use reqwest::header::{ACCEPT, ETAG, IF_NONE_MATCH};
+use reqwest::header::{ACCEPT, ACCEPT_ENCODING, ETAG, IF_NONE_MATCH};
 use serde_json::{Value, json};
 
 fn files() -> BTreeMap<String, Vec<u8>> {
@@ -49,6 +51,50 @@ async fn served(app: &App, address: &str, name: &str, bytes: &[u8]) -> String {
     headers["content-security-policy"].to_str().expect("text").to_owned()
 }
 
+/// The modules that a report alone needs.
+const OF_REPORTS: [&str; 2] = ["report_file.js", "reproduction.js"];
+
+/// A browser asks for one script, and what it decodes it gets compressed.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_page_has_one_script_and_its_text_is_compressed() {
+    let app = App::start().await;
+    let fetched = async |address: &str, coding: &str| {
+        let request = app.client.get(format!("{}{address}", app.url)).header(ACCEPT_ENCODING, coding);
+        let answer = request.send().await.expect("an answer");
+        (answer.headers().clone(), answer.bytes().await.expect("bytes"))
+    };
+    let page = String::from_utf8(files()["index.html"].clone()).expect("UTF-8");
+    let loaded = page.split("=\"/dashboard/").skip(1).filter_map(|rest| rest.split('"').next());
+    let loaded: BTreeSet<String> = loaded.map(|name| format!("/dashboard/{name}")).collect();
+    assert!(loaded.contains("/dashboard/main.js") && loaded.len() < 10, "{loaded:?}");
+    let mut bytes = 0;
+    for address in loaded.iter().map(String::as_str).chain(["/"]) {
+        let (headers, plain) = fetched(address, "gzip;q=0, br").await;
+        assert!(headers.get("content-encoding").is_none(), "{address}");
+        let (coded, packed) = fetched(address, "br, gzip").await;
+        assert!(headers.get_all("vary").iter().any(|vary| vary == "accept-encoding"), "{address}");
+        bytes += packed.len();
+        if coded.get("content-encoding").is_none() {
+            assert_eq!((&packed, &coded[ETAG]), (&plain, &headers[ETAG]), "{address}");
+            continue;
+        }
+        let mut unpacked = Vec::new();
+        GzDecoder::new(packed.as_ref()).read_to_end(&mut unpacked).expect("a gzip");
+        assert!(unpacked == plain && packed.len() < plain.len(), "{address}");
+        assert_ne!(coded[ETAG], headers[ETAG], "{address}: a strong tag is that of the bytes");
+        let again = app.client.get(format!("{}{address}", app.url)).header(ACCEPT_ENCODING, "gzip");
+        let again = again.header(IF_NONE_MATCH, &coded[ETAG]).send().await.expect("an answer");
+        assert_eq!(again.status(), StatusCode::NOT_MODIFIED, "{address}");
+    }
+    assert!(bytes < 300_000, "a first visit loads {bytes} bytes");
+    let script = String::from_utf8(fetched("/dashboard/main.js", "").await.1.to_vec()).expect("UTF-8");
+    let script = format!("\n{script}");
+    for name in files().keys().filter(|name| name.ends_with(".js") && !OF_REPORTS.contains(&name.as_str())) {
+        assert_eq!(script.matches(&format!("\n// {name}\n")).count(), 1, "{name}");
+    }
+    assert!(!script.contains("</script"), "a report holds the modules within its page");
+}
+
 /// The address of a page without its `#`, as people type it, leads there in a browser; a program is told that there is nothing.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_browser_at_an_unknown_path_is_sent_to_the_page_of_that_name() {
@@ -69,7 +115,7 @@ async fn every_file_is_served_as_what_it_is_under_a_strict_policy() {
     let app = App::start().await;
     let files = files();
     assert!(files.contains_key("index.html") && files.contains_key("main.js"), "{:?}", files.keys());
-    for (name, bytes) in &files {
+    for (name, bytes) in files.iter().filter(|(name, _)| *name != "main.js") {
         let policy = served(&app, &format!("/dashboard/{name}"), name, bytes).await;
         assert!(policy.starts_with("default-src 'none'; script-src 'self'; style-src 'self';"), "{policy}");
         assert!(!policy.contains("unsafe"), "{policy}");

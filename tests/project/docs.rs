@@ -296,7 +296,7 @@ fn every_example_fits_its_request() {
         assert_eq!(operations["post"]["requestBody"]["content"]["application/json"]["example"], example, "{path}");
         examples += 1;
     }
-    assert_eq!(examples, 12);
+    assert_eq!(examples, 19);
 }
 
 #[test]

@@ -34,6 +34,16 @@ fn every_response_is_described() {
 }
 
 #[test]
+fn every_operation_has_an_identifier_of_its_own() {
+    let description: Value = serde_json::from_str(CHECKED_IN).unwrap();
+    let operations =
+        description["paths"].as_object().unwrap().values().flat_map(|item| item.as_object().unwrap().values());
+    let identifiers: Vec<&str> = operations.map(|operation| operation["operationId"].as_str().unwrap()).collect();
+    let distinct: std::collections::BTreeSet<&str> = identifiers.iter().copied().collect();
+    assert_eq!(distinct.len(), identifiers.len(), "{identifiers:?}");
+}
+
+#[test]
 fn every_operation_lists_what_its_shape_can_answer() {
     let description: Value = serde_json::from_str(CHECKED_IN).unwrap();
     let mut with_body = 0;
@@ -59,7 +69,7 @@ fn every_operation_lists_what_its_shape_can_answer() {
             }
         }
     }
-    assert_eq!(with_body, 15);
+    assert_eq!(with_body, 23);
 }
 
 #[test]
@@ -75,7 +85,10 @@ fn every_problem_is_in_the_table_and_a_full_quota_is_said_where_it_refuses() {
         operations["post"]["responses"]["413"]["description"].as_str().is_some_and(|meaning| meaning.contains(title))
     });
     let refusing: Vec<&String> = refusing.map(|(path, _)| path).collect();
-    assert_eq!(refusing, ["/backtest", "/evaluate", "/frontier", "/policies/import", "/sessions", "/train"]);
+    assert_eq!(
+        refusing,
+        ["/backtest", "/evaluate", "/frontier", "/policies/import", "/sessions", "/sessions/import", "/train"]
+    );
 }
 
 /// A schema that is named by hand would otherwise be missed when its type is renamed.

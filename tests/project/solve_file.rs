@@ -16,30 +16,29 @@ fn read(path: &str) -> String {
     fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).unwrap()
 }
 
+/// The files that the page of templates solves, with the answers that it shows.
+fn templates(page: &str) -> Vec<(&str, &str)> {
+    let sections = page.split("`cargo run --release -- solve ").skip(1);
+    let shown = sections.map(|section| {
+        let (file, rest) = section.split_once('`').unwrap();
+        (file, rest.split("```text\n").nth(1).unwrap().split("```").next().unwrap())
+    });
+    shown.collect()
+}
+
+/// The answer on the page of templates is tested below.
 #[test]
 fn the_page_shows_the_example_and_its_answer() {
-    let (page, declared) = (read("docs/declared.md"), read(EXAMPLE));
-    assert!(page.contains(&format!("```json\n{declared}```\n")), "the page shows another declaration");
-    let answered = solve(&[EXAMPLE]);
-    let printed = String::from_utf8(answered.stdout).unwrap();
-    assert!(answered.status.success() && page.contains(&format!("```text\n{printed}```\n")), "{printed}");
-    let json = solve(&[EXAMPLE, "--json"]).stdout;
-    let answer: Value = serde_json::from_slice(&json).unwrap();
-    let order = answer["actions"]["order"].as_f64().unwrap();
-    assert!(printed.starts_with(&format!("order: {}\n", (1e4 * order).round() / 1e4)), "{printed} for {order}");
+    let (page, templates_page) = (read("docs/declared.md"), read("docs/templates.md"));
+    assert!(page.contains(&format!("```json\n{}```\n", read(EXAMPLE))), "the page shows another declaration");
+    let (_, answer) = templates(&templates_page).into_iter().find(|(file, _)| *file == EXAMPLE).unwrap();
+    assert!(page.contains(&format!("```text\n{answer}```\n")), "{answer}");
 }
 
 #[test]
 fn the_page_of_templates_shows_what_each_answers() {
     let page = read("docs/templates.md");
-    let shown: Vec<(&str, &str)> = page
-        .split("`cargo run --release -- solve ")
-        .skip(1)
-        .map(|part| {
-            let (file, rest) = part.split_once('`').unwrap();
-            (file, rest.split("```text\n").nth(1).unwrap().split("```").next().unwrap())
-        })
-        .collect();
+    let shown = templates(&page);
     let folder = format!("{}/examples/problems", env!("CARGO_MANIFEST_DIR"));
     assert_eq!(shown.len(), fs::read_dir(folder).unwrap().count(), "a section for each file");
     for (file, expected) in shown {
@@ -47,6 +46,15 @@ fn the_page_of_templates_shows_what_each_answers() {
         assert!(answered.status.success(), "{file}: {}", String::from_utf8_lossy(&answered.stderr));
         assert_eq!(String::from_utf8(answered.stdout).unwrap(), expected, "{file}");
     }
+}
+
+#[test]
+fn the_answer_as_json_is_the_one_in_words() {
+    let file = "examples/problems/regulator.json";
+    let printed = String::from_utf8(solve(&[file]).stdout).unwrap();
+    let answer: Value = serde_json::from_slice(&solve(&[file, "--json"]).stdout).unwrap();
+    let push = answer["actions"]["push"].as_f64().unwrap();
+    assert!(printed.starts_with(&format!("push: {}\n", (1e5 * push).round() / 1e5)), "{printed} for {push}");
 }
 
 #[test]

@@ -234,7 +234,8 @@ async fn a_check_finds_every_kind_of_damage() {
     let copies = tempfile::tempdir().unwrap();
     let references = ("DELETE FROM policies", "a reference from");
     let newer = ("UPDATE _sqlx_migrations SET version = 9999 WHERE version = 1", "newer than");
-    let older = ("DELETE FROM _sqlx_migrations", "older than");
+    let older =
+        ("DELETE FROM _sqlx_migrations WHERE version = (SELECT max(version) FROM _sqlx_migrations)", "older than");
     for (number, (statement, complaint)) in DAMAGES.into_iter().chain([references, newer, older]).enumerate() {
         let folder = copies.path().join(number.to_string());
         let file = folder.join("ballast.sqlite");

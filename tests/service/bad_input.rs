@@ -32,6 +32,16 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/contributions", json!(1e16), "problem.contributions"),
         ("/problem/contributions", json!(-60.0), "problem.initial_wealth"),
         ("/problem/contributions", json!("monthly"), "problem.contributions"),
+        ("/problem/spending", json!({ "lowest": -0.1 }), "problem.spending.lowest"),
+        ("/problem/spending", json!({ "highest": 0.0 }), "problem.spending.highest"),
+        ("/problem/spending", json!({ "lowest": 0.2, "highest": 0.1 }), "problem.spending.highest"),
+        ("/problem/spending", json!({ "discount": 2.0 }), "problem.spending.discount"),
+        ("/problem/spending", json!({ "inflation": 0.5 }), "problem.spending.inflation"),
+        ("/problem/spending", json!({ "survival": [1.0] }), "problem.spending.survival"),
+        ("/problem/spending", json!({ "survival": [1.0, 0.0] }), "problem.spending.survival[1]"),
+        ("/problem/spending", json!({ "bequest": 0.0 }), "problem.spending.bequest"),
+        ("/problem/spending", json!({ "secured": -1.0 }), "problem.spending.secured"),
+        ("/problem/spending", json!({ "secured_left": 1e9 }), "problem.spending.secured_left"),
         ("/problem/trading_cost", json!(0.5), "problem.trading_cost"),
         ("/problem/trading_cost", json!(1e-17), "problem.trading_cost"),
         ("/problem/utility", json!({"kind": "exponential", "risk_aversion": 0.0}), "problem.utility.risk_aversion"),
@@ -207,6 +217,11 @@ fn the_list_covers_every_field() {
         "intensity",
         "on",
         "values",
+        "limits",
+        "each",
+        "groups",
+        "name",
+        "max_turnover",
     ];
     let missing: Vec<_> = described_fields()
         .into_iter()
@@ -243,12 +258,15 @@ fn the_description_is_as_strict_as_the_rules_of_single_fields() {
     assert_eq!(loose, DECIDED_TOGETHER);
 }
 
-const DECIDED_TOGETHER: [&str; 23] = [
+const DECIDED_TOGETHER: [&str; 26] = [
     "problem.action_interval[0]",
     "problem.action_interval[1]",
     "problem.contributions",
     "problem.contributions",
     "problem.initial_wealth",
+    "problem.spending.highest",
+    "problem.spending.survival",
+    "problem.spending.secured_left",
     "problem.trading_cost",
     "problem.utility.risk_aversion",
     "problem.utility.risk_aversion_relative",
@@ -355,6 +373,8 @@ async fn a_name_that_stands_twice_is_refused_in_every_object_of_names() {
             ][..],
         ),
         ("/what-if", r#""session":"s","#, &["holdings", "log_returns", "simple_returns", "prices", "previous_prices"]),
+        ("/orders", r#""session":"s","cash":1,"#, &["prices", "units"]),
+        ("/orders", r#""session":"s","cash":1,"prices":{"a":1},"units":{"a":1},"#, &["lots"]),
         ("/sessions", r#""policy":"p","#, &["holdings", "state"]),
         ("/decide", r#""policy":"p","#, &["state"]),
     ] {
@@ -418,6 +438,8 @@ fn faulty_reports() -> Vec<(&'static str, u16, &'static str)> {
         (r#""period": 1, "log_return": 0.1, "executed_allocation": -0.01"#, 422, "executed_allocation"),
         (r#""period": 1, "log_return": 0.1, "wealth": -1.0"#, 422, "wealth"),
         (r#""period": 1, "log_return": 0.1, "wealth": 0"#, 422, "wealth"),
+        (r#""period": 1, "log_return": 0.1, "spent": -1.0"#, 422, "spent"),
+        (r#""period": 1, "log_return": 0.1, "spent": 1e9"#, 422, "spent"),
         (r#""period": 1, "log_return": 0.1, "missing": true"#, 422, "missing"),
         (r#""period": 1, "missing": "yes""#, 422, "missing"),
         (r#""period": 1, "missing": false"#, 422, "log_return"),
@@ -520,6 +542,10 @@ fn faulty_evaluations() -> Vec<(&'static str, Value, &'static str)> {
         ("/constant_mixes", json!([0.5, 1.01]), "constant_mixes[1]"),
         ("/constant_mixes", json!([0.5, 0.5]), "constant_mixes[1]"),
         ("/constant_mixes", json!(vec![0.5; 102]), "constant_mixes"),
+        ("/weights", json!({"Mine": "mean12 +"}), "weights.Mine"),
+        ("/weights", json!({"Mine": "mean9999"}), "weights.Mine"),
+        ("/weights", json!({"Mine": [0.5]}), "weights.Mine"),
+        ("/weights", json!({"60/40": "1"}), "weights"),
         ("/policies", json!({"adaptive": "none"}), "policies.adaptive"),
         ("/paths", json!(99), "paths"),
         ("/paths", json!(1_000_000), "paths"),
@@ -622,6 +648,10 @@ fn faulty_walk_forwards() -> Vec<(&'static str, Value, &'static str)> {
         ("trading_cost", json!(1e-12), "trading_cost"),
         ("cost_blind", json!(1), "cost_blind"),
         ("weights", json!({ "Mine": [0.5] }), "weights.Mine"),
+        ("weights", json!({ "Mine": 0.5 }), "weights.Mine"),
+        ("weights", json!({ "Mine": [0.5, "half"] }), "weights.Mine[1]"),
+        ("weights", json!({ "Mine": "wealth" }), "weights.Mine"),
+        ("weights", json!({ "Mine": "mean13" }), "weights.Mine"),
         ("weights", json!([0.5]), "weights"),
         ("count", json!(9), "count"),
         ("seed", json!(0.5), "seed"),
@@ -675,6 +705,8 @@ fn faulty_walks_of_assets() -> Vec<(&'static str, Value, &'static str)> {
     vec![
         ("assets", json!(["stocks"]), "assets"),
         ("means", json!({ "kind": "shrunk", "intensity": -0.1 }), "means.intensity"),
+        ("limits", json!({ "each": { "max": 0.4 } }), "limits.assets"),
+        ("limits", json!({ "max_turnover": -0.1 }), "limits.max_turnover"),
         ("assets", json!(["stocks", "stocks"]), "assets[1]"),
         ("assets", json!(["stocks", ""]), "assets[1]"),
         ("assets", json!(["stocks", "bonds", "gold"]), "simple_returns[0]"),
@@ -707,6 +739,7 @@ fn faulty_walks_of_assets() -> Vec<(&'static str, Value, &'static str)> {
         ("support", json!({ "rule": "between", "min": 0.0, "max": 0.2 }), "simple_returns[3][0]"),
         ("risk_aversion", json!(0.9), "risk_aversion"),
         ("weights", json!({ "Mine": [[0.5, 0.5]] }), "weights.Mine"),
+        ("weights", json!({ "Mine": "1/0" }), "weights.Mine"),
         ("trading_cost", json!(0.2), "trading_cost"),
         ("seed", json!(0.5), "seed"),
         ("horizon", json!(4), "horizon"),
@@ -851,6 +884,9 @@ async fn unknown_things_are_refused() {
     let report = json!({"session": "42", "period": 1, "log_return": 0.1});
     assert_refused(&app.post("/observe", &report).await, 404, "session", "42");
     assert_refused(&app.post("/what-if", &json!({"session": "42"})).await, 404, "session", "42");
+    let orders = json!({"session": "42", "prices": {}, "units": {}, "cash": 1.0});
+    assert_refused(&app.post("/orders", &orders).await, 404, "session", "42");
+    assert_refused(&app.post("/sessions/42/letter", &json!({})).await, 404, "session", "42");
     assert_refused(&app.get("/nowhere").await, 404, "path", "/nowhere");
     assert_refused(&app.get("/jobs/%ff").await, 404, "id", "/jobs/%ff");
     assert_refused(&app.send(Method::DELETE, "/train", None).await, 405, "method", "DELETE");

@@ -127,9 +127,9 @@ async fn a_trained_declaration_decides_as_the_command_does(mut app: App) {
 }
 
 async fn a_restart_resumes_to_the_same_policy(mut app: App) {
-    let mut request = stock(8);
+    let mut request = stock(4);
     // A step must take long enough to be stopped in.
-    request["design"]["count"] = json!(60);
+    request["design"]["count"] = json!(40);
     let (status, accepted) = app.post("/train", &request).await;
     assert_eq!(status, StatusCode::ACCEPTED, "{accepted}");
     let job = accepted["job"].as_str().unwrap().to_owned();

@@ -146,7 +146,11 @@ async fn a_return_far_from_the_record_is_doubted_at_any_size(mut app: App) {
     let (reasons, problem) = doubted(&app, 1, json!({ "log_return": mean + 0.42 * DEVIATION })).await;
     assert_eq!(reasons, ["unusual_return"], "{problem}");
     assert!(problem["rule"].as_str().unwrap().contains("a return of 1.16 % lies 4.3 standard deviations"), "{problem}");
-    recorded(&app, 1, json!({ "log_return": mean - 0.39 * DEVIATION })).await;
+    // More than three deviations, and half as far again as any loss or gain of the record.
+    for beyond in [-0.38, 0.38] {
+        assert_eq!(doubted(&app, 1, json!({ "log_return": mean + beyond * DEVIATION })).await.0, ["unusual_return"]);
+    }
+    recorded(&app, 1, json!({ "log_return": mean - 0.29 * DEVIATION })).await;
     let meant = recorded(&app, 2, json!({ "log_return": -0.05, "confirm": true })).await;
     assert_eq!(recorded(&app, 2, json!({ "log_return": -0.05 })).await, meant, "recorded, so nothing to confirm");
 }

@@ -12,14 +12,17 @@ use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 
 /// The routes that a service with keys answers without one.
-const OPEN: [&str; 9] = [
+const OPEN: [&str; 11] = [
     "/",
     "/dashboard/{file}",
     "/docs",
     "/docs/{file}",
     "/guide",
     "/guide/{file}",
+    // It asks for the secret of a link.
+    "/letter",
     "/livez",
+    "/llms.txt",
     "/openapi.json",
     "/readyz",
 ];
@@ -82,7 +85,10 @@ fn operations() -> Vec<(Method, String, Option<String>)> {
 
 async fn ask(app: &App, method: &Method, path: &str) -> (StatusCode, Option<String>, Value) {
     let request = app.client.request(method.clone(), format!("{}{}", app.url, path.replace(['{', '}'], "")));
-    let request = if method == Method::POST { request.json(&json!({})) } else { request };
+    // What is wrong of a message of agents is answered in their protocol and not as a problem document.
+    let ping = json!({ "jsonrpc": "2.0", "id": 1, "method": "ping" });
+    let body = if path == "/mcp" { ping } else { json!({}) };
+    let request = if method == Method::POST { request.json(&body) } else { request };
     let answer = request.send().await.unwrap();
     let scheme = answer.headers().get(WWW_AUTHENTICATE).map(|scheme| scheme.to_str().unwrap().to_owned());
     let (status, body) = read(answer).await;
@@ -167,6 +173,8 @@ fn naming(job: &str, evaluation: &str, policy: &str, session: &str) -> Vec<(Meth
         get(format!("/policies/{policy}/surface")),
         get(format!("/sessions/{session}")),
         get(format!("/sessions/{session}/history")),
+        get(format!("/sessions/{session}/export")),
+        get(format!("/sessions/{session}/links")),
         get(format!("/action?session={session}")),
         get(format!("/action?session={session}&mode=resolve")),
         get(format!("/action?session={session}&explain=worst_case")),
@@ -181,6 +189,9 @@ fn naming(job: &str, evaluation: &str, policy: &str, session: &str) -> Vec<(Meth
         "/what-if",
         json!({ "session": session, "sweep": { "radius_scale": { "from": 0.0, "to": 1.0, "points": 2 } } }),
     ));
+    for path in ["letter", "links"] {
+        calls.push(body(&format!("/sessions/{session}/{path}"), json!({})));
+    }
     calls.push(body("/decide", json!({ "policy": policy })));
     let problem = json!({ "horizon": 1, "rate_per_step": 0.002, "history": [0.01, -0.02, 0.03] });
     calls.push(body("/evaluate", json!({ "problem": problem, "policies": { "adaptive": policy } })));

@@ -65,12 +65,20 @@ async fn put_right_and_renewed(app: &App, session: &str) {
     for (period, date) in [(1, json!("2020-01-31")), (2, Value::Null)] {
         let report = json!({ "session": session, "period": period, "log_return": 0.02, "executed_allocation": 0.5, "date": date });
         assert_eq!(app.post("/observe", &report).await.0, 200);
-        in_step(app, &list(app, &format!("search={session}")).await["sessions"][0]).await;
+        let row = list(app, &format!("search={session}")).await["sessions"][0].clone();
+        in_step(app, &row).await;
+        assert_eq!((&row["log_return"], &row["log_returns"]), (&json!(0.02), &Value::Null));
     }
     let right = json!({ "correction": 1, "period": 1, "log_return": 0.05, "executed_allocation": 0.5, "reason": "revised",
                         "date": "2020-02-01" });
     assert_eq!(app.post(&format!("/sessions/{session}/corrections"), &right).await.0, 200);
-    in_step(app, &list(app, &format!("search={session}")).await["sessions"][0]).await;
+    let row = list(app, &format!("search={session}")).await["sessions"][0].clone();
+    in_step(app, &row).await;
+    assert_eq!(
+        row["log_return"],
+        Value::Null,
+        "the answer to a correction of an earlier period does not tell the last"
+    );
     let renewal = json!({ "renewal": 1, "policy": app.policy });
     assert_eq!(app.post(&format!("/sessions/{session}/renewals"), &renewal).await.0, 200);
     let row = list(app, &format!("search={session}")).await["sessions"][0].clone();

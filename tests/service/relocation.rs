@@ -72,6 +72,45 @@ async fn a_folder_moves_into_a_database_and_goes_on() {
     assert_eq!(found["sessions"][0]["name"], "Moved too", "{found}");
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn renewals_keys_and_the_audit_move_too() {
+    let Some(url) = postgres::database().await else { return };
+    let mut app = App::start().await;
+    app.train(&specification(6)).await;
+    let next = app.policy.clone();
+    app.train(&specification(5)).await;
+    app.open().await;
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+    let path = format!("/sessions/{}", app.session);
+    let (status, renewed) = app.post(&format!("{path}/renewals"), &json!({ "renewal": 1, "policy": next })).await;
+    assert_eq!(status, 200, "{renewed}");
+    let key = app.key("default", "admin").await;
+    app.enter(&key).await;
+    assert_eq!(app.send(Method::PATCH, &path, Some(&json!({ "name": "Renewed" }))).await.0, 200);
+    let paths = [
+        path.clone(),
+        format!("{path}/history"),
+        format!("{path}/export"),
+        format!("/action?session={}", app.session),
+        "/audit?limit=100".into(),
+        "/key".into(),
+    ];
+    let before = shown(&app, &paths).await;
+    assert!(before[4]["entries"].as_array().unwrap().len() >= 6, "{}", before[4]);
+    app.halt().await;
+    let moved = relocate(&app, &url);
+    let output = String::from_utf8_lossy(&moved.stdout).into_owned();
+    assert!(moved.status.success(), "{output} {}", String::from_utf8_lossy(&moved.stderr));
+    for line in ["renewals: 1 rows moved", "access_keys: 1 rows moved", "policies: 2 rows moved"] {
+        assert!(output.contains(line), "{output}");
+    }
+    app.start_over(ballast::service::process::config::StoreLocation::Postgres(url.parse().unwrap())).await;
+    assert_eq!(app.get("/key").await.0, 401, "the key is needed there too");
+    app.hold(&key);
+    assert_eq!(shown(&app, &paths).await, before);
+    assert_eq!(app.observe(2, 0.02).await.0, 200);
+}
+
 async fn shown(app: &App, paths: &[String]) -> Vec<serde_json::Value> {
     let mut shown = Vec::new();
     for path in paths {

@@ -39,6 +39,8 @@ async fn a_search_finds_beginnings_of_words(mut app: App) {
         ("us mon", vec!["US-Equity growth"]),
         ("us \u{e9}t", vec![]),
         ("\u{e9}T", vec!["growing \u{c9}t\u{e9}"]),
+        // Without its accents.
+        ("ete", vec!["growing \u{c9}t\u{e9}"]),
         ("world", vec!["US-Equity growth"]),
         ("%", vec![]),
         (&first, vec!["US-Equity growth"]),

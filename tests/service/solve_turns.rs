@@ -11,7 +11,7 @@ use serde_json::json;
 /// Explains of one tenant under way at a time, over a session of so many returns; and another's returns.
 const EXPLAINS: usize = 32;
 const LONG: usize = 20_000;
-const SHORT: usize = 3_000;
+const SHORT: usize = 8_000;
 /// Largest multiple of the time that another's call takes alone.
 const AT_MOST: u32 = 3;
 const ROUNDS: usize = 9;

@@ -523,7 +523,7 @@ async fn replay(place: &Place, operations: &[Operation]) -> Result<(), TestCaseE
 }
 
 const TABLES: &str = "jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies, \
-                      policy_owners, sessions, entries, renewals";
+                      policy_owners, sessions, reminders, links, entries, renewals";
 
 #[test]
 fn sqlite_does_what_the_model_does() {

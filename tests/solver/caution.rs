@@ -86,7 +86,7 @@ fn nothing_is_held_where_no_premium_is_left() {
         let Some(why) = investor.why_nothing(0.0, &advice).unwrap() else {
             assert!(advice.allocation > 0.0);
             let advisor = advisor(serde_json::to_value(&specification).unwrap());
-            let left = advisor.worst_mean(&advisor.initial_state(None, None).unwrap()) - 1.002;
+            let left = advisor.laws().worst_mean(&advisor.initial_state(None, None).unwrap().law) - 1.002;
             assert!(left > 0.0, "{seed}: {} held, {left} left", advice.allocation);
             continue;
         };

@@ -1,7 +1,7 @@
 //! Policies and rules of a declared problem compared by simulation, against exact enumeration of all paths.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use ballast::control::cache::Cache;
 use ballast::control::error::TrainError;
@@ -36,8 +36,10 @@ fn compared(policies: &[Arc<DeclaredAdvisor>], request: &Value) -> Result<Compar
     comparison.run(trained.collect::<Result<_, TrainError>>()?, &Watch::unwatched())
 }
 
-fn history() -> Vec<f64> {
-    serde_json::from_value(example("stock")["problem"]["history"].clone()).unwrap()
+fn history() -> &'static [f64] {
+    static DEMANDS: LazyLock<Vec<f64>> =
+        LazyLock::new(|| serde_json::from_value(example("stock")["problem"]["history"].clone()).unwrap());
+    &DEMANDS
 }
 
 /// The stock's own formulas, written again.
@@ -49,11 +51,11 @@ fn period(stock: f64, order: f64, demand: f64) -> (f64, f64) {
 /// Mean worth over all 49 pairs of demands, and the mean stock before the second.
 fn enumerated(order: impl Fn(usize, f64, &[f64]) -> f64) -> (f64, f64) {
     let (mut worth, mut second, count) = (0.0, 0.0, history().len() as f64);
-    for first in history() {
+    for &first in history() {
         let (left, earned) = period(4.0, order(0, 4.0, &[]), first);
         second += left / count;
         let again = order(1, left, &[first]);
-        for demand in history() {
+        for &demand in history() {
             let (end, more) = period(left, again, demand);
             worth += (earned + more + 3.0 * end) / (count * count);
         }

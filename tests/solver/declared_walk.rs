@@ -147,8 +147,8 @@ fn gains_of_a_utility_are_of_its_amount() {
     assert!((half.gain.value - (end - start) / 4.0).abs() < 1e-9 * end, "{half:?}");
 }
 
-/// Intervals of 90 % of the mean gain of a rule hold the truth about as often: of 200 records of 60 independent demands, in
-/// 165 to 195. Of that few, percentiles hold a little less often than they say.
+/// Intervals of 90 % of the mean gain of a rule hold the truth about as often: of 60 records of 60 independent demands, in
+/// 50 at least. Of that few, percentiles hold a little less often than they say.
 #[test]
 fn intervals_hold_the_truth_as_often_as_they_say() {
     let law = [9.1, 27.3, 11.6, 19.0, 22.3, 21.1, 18.7];
@@ -159,7 +159,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     };
     let truth = law.iter().map(gain).sum::<f64>() / law.len() as f64;
     let mut held = 0;
-    for number in 0..200 {
+    for number in 0..60 {
         let mut generator = stream(20_261_129, "records", 0, number);
         let mut request = example("stock");
         let record: Vec<f64> =
@@ -168,13 +168,14 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
         request["problem"]["horizon"] = json!(1);
         request["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.1 });
         request["window"] = json!(7);
+        request["frameworks"] = json!(["plug_in"]);
         request["level"] = json!(0.9);
         request["rules"] = json!({ "base": { "order": "25 - stock" } });
         let gain = walked(&request).unwrap().strategies[1].gain;
         held += usize::from(gain.low <= truth && truth <= gain.high);
     }
-    println!("{held} of 200");
-    assert!((165..=195).contains(&held), "{held} of 200");
+    println!("{held} of 60");
+    assert!((50..=60).contains(&held), "{held} of 60");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use ballast_test_support as support;
 
 mod accuracy;
+mod aims;
 mod assets;
 mod bellman;
 mod beyond;
@@ -26,9 +27,14 @@ mod futures;
 mod gp;
 mod hostile_declarations;
 mod learning;
+mod limits;
 mod means;
 mod parametric;
+mod plan;
+mod programme;
 mod sensitivity;
+mod sleeve;
+mod spending;
 mod streams;
 mod surrogate;
 mod templates;

@@ -136,5 +136,5 @@ def test_both_take_the_same_arguments(service: Service, returns: pd.DataFrame) -
     of_skfolio = set(inspect.signature(BaseOptimization.__init__).parameters) - {"self"}
     assert set(optimiser.get_params()) - of_skfolio == set(RobustAllocation().get_params())
     fields = {"rate_per_step", *RobustAllocation._PROBLEM}
-    of_a_policy = {"composition", "horizon", "trading_cost", "contributions"}
+    of_a_policy = {"composition", "horizon", "trading_cost", "contributions", "spending"}
     assert fields == set(wire.AssetsProblem.__annotations__) - {"assets", "history"} - of_a_policy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import subprocess
@@ -225,6 +226,42 @@ def test_pictures_show_the_frames(ballast: Ballast) -> None:
     # The lines upwards and those downwards each sum to 1.
     for law, sign in ((seen, 1.0), (worst, -1.0)):
         assert sum(np.asarray(path.vertices)[1, 1] for path in law.get_paths()) == pytest.approx(sign)
+
+
+def test_plots_of_an_evaluation_show_the_strategies_chosen(ballast: Ballast) -> None:
+    found = ballast.evaluate(
+        {
+            "problem": {"horizon": 2, "rate_per_step": 0.002, "history": RETURNS},
+            "design": {"count": 10},
+            "frameworks": ["adaptive", "plug_in"],
+            "paths": 100,
+        }
+    )
+    report = found.report()
+    worth = {one["strategy"]: one["certainty_equivalent"] for one in report["strategies"]}
+    assert len(worth) >= 13
+
+    axes = found.plot()
+    best_first = sorted(worth, key=lambda name: worth[name]["value"], reverse=True)
+    assert sorted(label.get_text() for label in axes.get_yticklabels()) == sorted(worth)
+    values = [worth[label.get_text()]["value"] for label in axes.get_yticklabels()]
+    assert values == sorted(worth[name]["value"] for name in best_first)
+    # Every name has room of its own, within the figure.
+    axes.figure.draw_without_rendering()  # type: ignore[union-attr]
+    boxes = [label.get_window_extent() for label in axes.get_yticklabels()]
+    assert all(below.y1 <= above.y0 for below, above in itertools.pairwise(boxes))
+    assert min(box.x0 for box in boxes) >= 0.0
+
+    chosen = ["All in stocks", "Cautious, learns"]
+    axes = found.plot(strategies=chosen)
+    assert [label.get_text() for label in axes.get_yticklabels()] == sorted(
+        chosen, key=lambda name: worth[name]["value"]
+    )
+    reach = axes.containers[0].lines[2][0].get_segments()[0]  # type: ignore[attr-defined]
+    lowest = worth[axes.get_yticklabels()[0].get_text()]
+    assert reach[:, 0].tolist() == pytest.approx([lowest["low"], lowest["high"]])
+    with pytest.raises(ValueError, match=r"strategies has 'Gold': must be one of Cautious, learns; .*All in the bank"):
+        plots.evaluation(report, strategies=["All in stocks", "Gold"])
 
 
 def missing(package: str, call: str) -> str:

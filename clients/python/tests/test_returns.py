@@ -345,6 +345,18 @@ def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:
     assert from_series.policy().id == train(ballast, periods_per_year=12).policy().id
 
 
+def test_a_strategy_of_one_s_own_is_a_formula_or_shares_by_period(ballast: Ballast) -> None:
+    dates = [f"{2000 + month // 12}-{1 + month % 12:02}" for month in range(40)]
+    returns = [0.01 * ((7 * month) % 5 - 1.9) for month in range(40)]
+    trend = [0.0 if month < 3 else float(sum(returns[month - 3 : month]) > 0) for month in range(40)]
+    own: dict[str, str | list[float]] = {"Formula": "if(mean3 > 0, 1, 0)", "Shares": trend}
+    choices: dict[str, Any] = {"window": 24, "every": 4, "alpha": [0.5], "count": 10, "weights": own}
+    report = ballast.backtest(returns, kind="simple", rate=0.001, dates=dates, **choices).report()
+    wealth = {line["strategy"]: line["wealth"] for line in report["periods"]}
+    assert set(trend[24:]) == {0.0, 1.0}
+    np.testing.assert_allclose(wealth["Formula"], wealth["Shares"], rtol=1e-12)
+
+
 def test_nothing_imports_pandas_or_numpy() -> None:
     code = "import ballast, sys; sys.exit(bool({'pandas', 'numpy'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
@@ -353,7 +365,7 @@ def test_nothing_imports_pandas_or_numpy() -> None:
 def test_what_is_learned_from_is_read_everywhere_by_one_rule(ballast: Ballast) -> None:
     public = [getattr(Ballast, name) for name in dir(Ballast) if not name.startswith("_")]
     calls = [call for call in public if callable(call) and "kind" in signature(call).parameters]
-    assert len(calls) == 7
+    assert len(calls) == 9
     for call in calls:
         defaults = {name: signature(call).parameters[name].default for name in ("kind", "choices")}
         assert defaults == {"kind": None, "choices": None}, call

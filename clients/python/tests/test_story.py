@@ -66,6 +66,37 @@ def test_advice_without_a_policy(ballast: Ballast) -> None:
     assert refusal.value.field == "problem.horizon"
 
 
+def test_a_plan(ballast: Ballast) -> None:
+    simple = [math.expm1(value) for value in RETURNS]
+    terms: dict[str, Any] = {"kind": "simple", "rate_per_step": 0.002, "radius": {"rule": "fixed", "radius": 1e-3}}
+    plan = ballast.plan(
+        simple, horizon=12, wealth=250.0, wanted=10.0, paths=500, spending={"inflation": 0.001}, **terms
+    )
+    assert len(plan["periods"]) == 12 and plan["sentences"] and 0.0 <= plan["wanted"]["lasts"]["worst"]["value"] <= 1.0
+    spending = plan["advice"].get("spending")
+    assert spending is not None and spending["amount"] == pytest.approx(250.0 * spending["share"])
+    aimed = ballast.plan(simple, horizon=12, wealth=250.0, goal=280.0, saved=1.0, aim="goal", paths=500, **terms)
+    states = aimed.get("states")
+    assert states is not None and states["described_by"] == "funded" and not aimed["periods"]
+    limited = ballast.plan(simple, horizon=12, drawdown_limit=0.1, drawdown=0.02, paths=500, **terms)
+    assert limited["strategies"][0]["max_drawdown"]["worst"]["value"] <= 0.1 + 1e-9
+    with pytest.raises(package.InvalidField) as refusal:
+        ballast.plan(simple, horizon=12, certainty=1.0, **terms)
+    assert refusal.value.field == "certainty"
+
+
+def test_the_share_of_a_strategy(ballast: Ballast) -> None:
+    terms: dict[str, Any] = {"kind": "log", "rate_per_step": 0.0, "caution": {"scale": 0.2}}
+    sleeve = ballast.sleeve(RETURNS, record_of="trades", **terms)
+    advised = ballast.advise(RETURNS, utility={"kind": "log"}, **terms)
+    assert sleeve["share"] == advised["allocation"] and sleeve["read"]
+    kelly = sleeve["kelly"]
+    assert kelly is not None and sleeve["share"] <= kelly and sleeve["sentences"]
+    with pytest.raises(package.InvalidField) as refusal:
+        ballast.sleeve(RETURNS, utility={"kind": "power", "risk_aversion": 3}, **terms)
+    assert refusal.value.field == "problem.utility.kind"
+
+
 def test_a_declared_problem(ballast: Ballast) -> None:
     declared = json.loads((REPOSITORY / "examples/problems/stock.json").read_text())
     declared["problem"]["horizon"], declared["design"] = 2, {"count": 20}
@@ -360,11 +391,21 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     own = policy.session(history=RETURNS[:5], kind="simple")
     own.action(mode="resolve")
     own.what_if(radius_scale=0.5)
+    ordered = own.orders({"asset": 10.0}, {"asset": 3.0}, 70.0, lots={"asset": 0.5})
+    assert ordered["wealth"] == 100.0 and ordered["cash"] >= 0.0
     assert own.futures(20)["period"] == 1
     own.observe(log_return=0.01).correct(1, "revised", log_return=0.02)
     own.renew(policy.id)
     own.refresh().history()
     own.label(name="Ada")
+    letter = own.letter({"name": "The <firm>", "closing": "Please call us."}, currency="EUR")
+    assert "<h2>Ada</h2>" in letter and "The &lt;firm&gt;" in letter and "Amounts in EUR." in letter
+    with pytest.raises(package.InvalidField, match="currency"):
+        own.letter(currency="euro")
+    document, wealth = own.export(), own.wealth
+    own.delete()
+    own = ballast.import_session(document)
+    assert own.wealth == wealth
     policy.label(name="World")
     assert own.id in [entry["session"] for entry in ballast.sessions()]
     own.delete()
@@ -378,7 +419,20 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     policy.delete()
     assert training.id in [job["job"] for job in ballast.jobs()]
     assert ballast.training(training.id).cancel().job["state"] == "succeeded"
+    told = ballast.subscribe("https://example.com/hook", ["advice_changed"], sessions=[session.id], least_change=0.1)
+    assert told["secret"].startswith("whsec_")
+    assert ballast.rotate_secret(told["subscription"])["secret"] != told["secret"]
+    assert [listed["least_change"] for listed in ballast.subscriptions()] == [0.1]
+    assert ballast.resend(told["subscription"]) == 0
+    ballast.unsubscribe(told["subscription"])
+    assert ballast.subscriptions() == []
+    made = session.make_link(7, {"currency": "EUR"})
+    assert [link["link"] for link in session.links()] == [made["link"]]
+    session.delete_link(made["link"])
+    assert ballast.sleeve(RETURNS, kind="log", rate_per_step=0.002)["share"] >= 0.0
+    assert ballast.calendar().startswith("BEGIN:VCALENDAR")
     assert ballast.health()["status"] == "ok"
+    assert len(ballast.plan(RETURNS, kind="log", rate_per_step=0.002, horizon=2, paths=200)["periods"]) == 2
     evaluation = compare(ballast)
     assert ballast.evaluation(evaluation.id).report()["reference"] == "All in the bank"
     walked = walk(ballast)
@@ -398,10 +452,14 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
         policy.id: "{id}",
         own.id: "{id}",
         session.id: "{id}",
+        told["subscription"]: "{id}",
+        made["link"]: "{id}",
     }
     reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}
     paths = json.loads((REPOSITORY / "api/openapi.json").read_text())["paths"]
     described = {(method.upper(), path) for path, item in paths.items() for method in item if for_clients(item)}
+    # A client's browser opens this one, with the secret of a link.
+    described.remove(("GET", "/letter"))
     assert len(described) >= 17
     assert described - reached == set()
 
@@ -462,7 +520,8 @@ def test_every_hypothesis_is_an_argument() -> None:
 
 
 def for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
-    return all(operation["tags"] != ["operations"] for operation in item.values())
+    """Returns false for what operators call, and for what agents call by a protocol of their own."""
+    return all(operation["tags"] not in (["operations"], ["agents"]) for operation in item.values())
 
 
 def test_every_field_of_a_specification_is_an_argument() -> None:

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use ballast::control::assets::AssetsSolution;
+use ballast::control::problem::compositions::{CompositionSet, GroupRange};
 use ballast::control::request::support::Support;
 use clap::Args;
 use serde::Serialize;
@@ -36,6 +37,9 @@ pub struct AssetsBench {
     /// funds at once
     #[arg(long, default_value_t = 1.3)]
     radius: f64,
+    /// Limit the share of each asset in the composition to this, and that of the first half of the assets to a half
+    #[arg(long, value_name = "SHARE")]
+    most: Option<f64>,
     /// Print a line of JSON for each row, with the last window's answer
     #[arg(long)]
     json: bool,
@@ -141,6 +145,7 @@ fn measure(
     for end in rows.len() + 1 - bench.windows..=rows.len() {
         let window = &rows[end - months..end];
         let (step, radius) = ordinary_step(window, sup, Support::None {}, bench.radius);
+        let step = step.within(bench.most.map(|most| limits(assets, most)));
         let started = Instant::now();
         let found = step.solve(None);
         cold.push(started.elapsed().as_secs_f64());
@@ -168,6 +173,12 @@ fn measure(
         allocation,
         value,
     })
+}
+
+/// Returns the compositions with a greatest share of each asset, and at most half in the first half of the assets.
+fn limits(assets: usize, most: f64) -> CompositionSet {
+    let members = (0..assets / 2).collect();
+    CompositionSet::new(vec![[0.0, most]; assets], vec![GroupRange { members, least: 0.0, most: 0.5 }])
 }
 
 /// Returns the gap between a value and its bound, in basis points.

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use ballast::control::error::FieldError;
 use ballast::control::policy::advice::{Advice, AdviceSource};
 use ballast::control::policy::worst_case::WorstCase;
-use ballast::numerics::machine::digits::percent;
+use ballast::numerics::machine::digits::{fixed, grouped, percent};
 use ballast::service::advice::advise::Advised;
 
 pub use several::describe_several;
@@ -102,8 +102,8 @@ fn worst(worst: &WorstCase, noun: &str) -> String {
     let Some((share, lowest)) = moved.filter(|(share, _)| *share > 0.0) else {
         return "No law among them does worse than the returns seen.".into();
     };
-    let (one_in, size) = ((1.0 / share).round(), percent(lowest.exp_m1().abs(), 0));
-    let is_many = one_in < 3.0;
+    let (one_in, size) = (grouped(&fixed(1.0 / share, 0)), percent(lowest.exp_m1().abs(), 0));
+    let is_many = 1.0 / share < 2.5;
     if lowest >= 0.0 {
         let best = if is_many { format!("{} of {noun}s", percent(share, 0)) } else { format!("{noun} in {one_in}") };
         return format!("That law counts the best {best} as only {size}.");

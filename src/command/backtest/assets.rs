@@ -3,9 +3,10 @@
 use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsChoices};
 use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsWalked};
 use ballast::control::progress::Watch;
+use ballast::control::request::own_weights::OwnShares;
 use ballast::report::FileError;
 
-use super::weights::OwnStrategy;
+use super::weights::{OwnStrategy, own_strategies};
 use super::{BacktestArgs, BacktestError, ReportOfRecord, Window, page, refused};
 use crate::command::progress::Parts;
 use crate::command::returns::SeveralReturns;
@@ -75,6 +76,7 @@ impl BacktestArgs {
             means: self.means.unwrap_or_default(),
             risk_aversion: self.risk_aversion,
             trading_cost: self.trading_cost()?,
+            limits: self.limits.given(),
             seed: self.seed,
         };
         let names_columns = self.returns.names_columns();
@@ -86,8 +88,8 @@ impl BacktestArgs {
         };
         let backtest = AssetsBacktest::new(record, choices).map_err(named)?;
         let AssetsRecord { assets, dates, .. } = &backtest.record;
-        let rows = |own: &OwnStrategy| Ok((own.name.clone(), own.rows(assets, dates, backtest.first)?));
-        let weights = self.weights.iter().map(rows).collect::<Result<_, BacktestError>>()?;
+        let rows = |own: &OwnStrategy| Ok(OwnShares::Given(own.rows(assets, dates, backtest.first)?));
+        let weights = own_strategies(&self.weights, &self.formula, rows)?;
         Ok(backtest.with_own(weights)?)
     }
 }

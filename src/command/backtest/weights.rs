@@ -1,7 +1,10 @@
-//! Strategies of the user's own, from files: shares of wealth by date.
+//! Strategies of the user's own: shares of wealth by date from files, or a formula.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::str::FromStr;
+
+use ballast::control::request::own_weights::OwnShares;
 
 use super::{BacktestError, refused};
 
@@ -24,6 +27,46 @@ impl FromStr for OwnStrategy {
                 Ok(OwnStrategy { name: name.trim().to_owned(), file: file.into() })
             }
             _ => Err("must be NAME=FILE"),
+        }
+    }
+}
+
+/// Returns the strategies of files and of formulas by name, given how the shares of a file are read.
+///
+/// # Errors
+/// A file that cannot be read; a name that stands twice.
+pub fn own_strategies<S>(
+    files: &[OwnStrategy],
+    formulas: &[OwnRule],
+    shares: impl Fn(&OwnStrategy) -> Result<OwnShares<S>, BacktestError>,
+) -> Result<BTreeMap<String, OwnShares<S>>, BacktestError> {
+    let mut all = BTreeMap::new();
+    let of_files = files.iter().map(|own| (OPTION, &own.name, shares(own)));
+    let of_formulas = formulas.iter().map(|own| ("--formula", &own.name, Ok(OwnShares::Formula(own.formula.clone()))));
+    for (option, name, own) in of_files.chain(of_formulas) {
+        if all.insert(name.clone(), own?).is_some() {
+            return Err(refused(option, name, "must not name a strategy twice"));
+        }
+    }
+    Ok(all)
+}
+
+/// A strategy, and the formula of its shares.
+#[derive(Debug, Clone)]
+pub struct OwnRule {
+    pub name: String,
+    pub formula: String,
+}
+
+impl FromStr for OwnRule {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.split_once('=') {
+            Some((name, formula)) if !name.trim().is_empty() && !formula.trim().is_empty() => {
+                Ok(OwnRule { name: name.trim().to_owned(), formula: formula.trim().to_owned() })
+            }
+            _ => Err("must be NAME=FORMULA"),
         }
     }
 }

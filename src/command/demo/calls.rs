@@ -27,7 +27,7 @@ pub struct DemoAdvice {
     pub worst_case: Option<DemoWorstCase>,
 }
 
-/// Fields for several assets, by their names.
+/// Fields for several assets, by name.
 #[derive(Debug, Clone, Deserialize)]
 pub struct DemoAssetsAdvice {
     pub period: usize,

@@ -37,6 +37,28 @@ fn the_sentence_says_what_was_read() {
     }
 }
 
+/// Trades in percent are not taken for fractions: a gain of 60 % would be one of 6,000 %.
+#[test]
+fn whether_trades_are_percent_is_asked_or_plain() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("trades.csv");
+    let trades = |text: &str, unit: Option<Unit>| {
+        std::fs::write(&file, text).unwrap();
+        let choices = Choices { unit, ..Choices::default() };
+        ReturnsFile { file: file.clone(), rate: None, periods_per_year: None, choices }.trades()
+    };
+    let percent = trades("60\n40\n-0.5\n30\n20\n", None).unwrap();
+    assert!((percent.log_returns[0] - 0.6_f64.ln_1p()).abs() < 1e-15, "{percent:?}");
+    let open = "0.6\n-0.4\n0.5\n0.3\n-0.5\n";
+    let question = trades(open, None).unwrap_err().to_string();
+    assert!(
+        question.starts_with("Are the returns fractions or percent? What is 0.6?\n  --unit fraction"),
+        "{question}"
+    );
+    let fractions = trades(open, Some(Unit::Fraction)).unwrap();
+    assert!((fractions.log_returns[0] - 0.6_f64.ln_1p()).abs() < 1e-15, "{fractions:?}");
+}
+
 #[test]
 fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
     let rows = |gain: &str| format!("day,fund,index\n01/02/2008,{gain},7\n01/03/2008,-0.2,8\n01/04/2008,0.1,6\n");

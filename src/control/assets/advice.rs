@@ -1,4 +1,4 @@
-//! The advice of one robust step with several assets, by their names.
+//! The advice of one robust step with several assets, by name.
 
 use std::collections::BTreeMap;
 
@@ -32,8 +32,9 @@ pub struct AssetsAdvice {
     pub floor: f64,
     /// Radius of the ball, in log-return.
     pub radius: f64,
-    /// Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs
-    /// low: by little if assets move together, by more than a tenth for a dozen that are independent.
+    /// Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. The
+    /// search for it may end too low: by little if assets move together, by more than a tenth for a dozen that are
+    /// independent.
     pub radius_factor: f64,
     /// The levels of caution, if one of them is followed: found for the fund of inverse volatilities.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -46,7 +47,7 @@ pub struct AssetsAdvice {
     pub caution: Vec<Caution>,
 }
 
-/// The one-step problem of several assets, by their names.
+/// The one-step problem of several assets, by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct OneStep {
     /// Shares of wealth that are best when looking one period ahead.

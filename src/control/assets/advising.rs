@@ -17,7 +17,7 @@ use crate::control::request::support::{LawExtent, Support};
 use crate::control::uncertainty::joint::radius_factor;
 
 /// Returns up to which the allocation at each level is also solved: a fraction of a second.
-const SOLVED_BY_LEVEL: usize = 6000;
+pub const SOLVED_BY_LEVEL: usize = 6000;
 
 /// Returns the utility of the investor, relative to what the bank makes of their wealth.
 pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
@@ -109,9 +109,12 @@ impl AssetsAdvice {
         let fund = fund.problem();
         let radius = ball.radius_at(fund.caution_level().unwrap_or(CautionLevel::Paper));
         let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
-        let solution = step(problem, fund, rows, radius).solve_from(holdings, cost, None);
-        let total_of =
-            |step: PortfolioStep| step.solve_from(holdings, cost, Some(&solution)).allocation.iter().sum::<f64>();
+        let compositions = problem.compositions(holdings);
+        let within = |step: PortfolioStep| step.within(compositions.clone());
+        let solution = within(step(problem, fund, rows, radius)).solve_from(holdings, cost, None);
+        let total_of = |step: PortfolioStep| {
+            within(step).solve_from(holdings, cost, Some(&solution)).allocation.iter().sum::<f64>()
+        };
         let total_within = |radius: f64| total_of(step(problem, fund, rows, radius));
         let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let crashes = floors(fund.support_rule(), rows).into_iter().any(|floor| floor < lowest);
@@ -120,6 +123,10 @@ impl AssetsAdvice {
         let level = |share: f64| is_short.then(|| total_within(share * ball.radius));
         let followed = fund.caution_level().zip(ball.levels.as_deref());
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
+        let composition = match &compositions {
+            Some(compositions) => compositions.nearest(composition),
+            None => composition,
+        };
         let trade: Vec<f64> = solution.allocation.iter().zip(holdings).map(|(share, held)| share - held).collect();
         let advice = AssetsAdvice {
             allocation: named(names, &solution.allocation),

@@ -46,16 +46,21 @@ impl Interior<'_> {
         });
         let steepest = |gradient: &[f64]| gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let along = dot(&gradient, shares);
-        let upper = |slopes: &[f64], step: &PortfolioStep| mean + step.trading.most(slopes, step.total) - along;
-        let among = upper(&gradient, self.step);
+        let rise = |slopes: &[f64], step: &PortfolioStep| step.greatest_rise(&step.trading, slopes);
         let mut slopes = others.clone();
         self.held.iter().zip(&gradient).for_each(|(&asset, slope)| slopes[asset] = *slope);
-        let all = upper(&slopes, self.whole);
-        if all - among > ENTERING * (among - self.lower) {
-            self.held.iter().for_each(|&asset| others[asset] = f64::NEG_INFINITY);
-            let (among, outside) = (steepest(&gradient), steepest(&others));
-            let counts = |asset: &usize| others[*asset] - among > ENTERING_TOO * (outside - among);
-            self.entering = (0..others.len()).filter(counts).collect();
+        let most = rise(&slopes, self.whole);
+        let all = mean + most.bound - along;
+        if assets < others.len() && self.whole.compositions.is_some() {
+            self.entering = self.entering_within(&most, &gradient, mean - along);
+        } else if assets < others.len() {
+            let among = mean + rise(&gradient, self.step).bound - along;
+            if all - among > ENTERING * (among - self.lower) {
+                self.held.iter().for_each(|&asset| others[asset] = f64::NEG_INFINITY);
+                let (among, outside) = (steepest(&gradient), steepest(&others));
+                let counts = |asset: &usize| others[*asset] - among > ENTERING_TOO * (outside - among);
+                self.entering = (0..others.len()).filter(counts).collect();
+            }
         }
         if all < self.upper {
             (self.upper, self.tangent) = (all, Some(Tangent { shares: shares.to_vec(), mean, slopes }));

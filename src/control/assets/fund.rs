@@ -8,6 +8,10 @@
 //! stays a valid promise for any proposal rule. Checked by:
 //! `tests/service/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
 //!
+//! With limits, both compositions are the nearest ones that keep them. The limits come before the promise: it is kept as
+//! long as the composition held keeps them. Checked by:
+//! `tests/service/fund_limits.rs::a_session_keeps_the_limits_of_its_fund`.
+//!
 //! If trading costs, a proposal must also pay for its trade, by a rule that is not an optimum. The policy's gain from
 //! it is spread equally over the periods left. One period's part must exceed the extra cost of the trade compared with
 //! staying.
@@ -62,6 +66,7 @@ impl AssetsProblem {
             assets: self.assets.clone(),
             ground_norm: self.ground_norm,
             composition: self.composition.clone(),
+            limits: self.limits.clone(),
             means: self.means,
             radius_factor: None,
             history: self.history.clone(),
@@ -78,6 +83,7 @@ impl AssetsProblem {
             assets: fund.assets.clone(),
             ground_norm: fund.ground_norm,
             composition: fund.composition.clone(),
+            limits: fund.limits.clone(),
             means: fund.means,
             horizon: Some(problem.horizon),
             rate_per_step: problem.rate_per_step,
@@ -86,6 +92,7 @@ impl AssetsProblem {
             action_interval: problem.action_interval,
             trading_cost: problem.trading_cost,
             contributions: problem.contributions.clone(),
+            spending: problem.spending.clone(),
             risk_aversion: None,
             utility: problem.utility,
             radius: Some(problem.radius_rule().scaled(fund.radius_factor.unwrap_or(1.0).recip())),
@@ -157,8 +164,8 @@ impl Fund {
         self.composition.iter().map(|share| total * share).collect()
     }
 
-    /// Returns the outcome of a period in which the shares of wealth `executed` were held. `rate` and `flow` replace
-    /// those of the policy's terms.
+    /// Returns the outcome of a period in which the shares of wealth `executed` were held and nothing was spent. `rate` and
+    /// `flow` replace those of the policy's terms.
     pub fn outcome(
         &self,
         executed: &[f64],
@@ -172,6 +179,7 @@ impl Fund {
             rate,
             flow,
             traded: Some(self.traded(executed)),
+            spent: 0.0,
         }
     }
 
@@ -213,6 +221,11 @@ impl Fund {
         let (rows, mut solution) = (self.centred(), None);
         let of_fund = |composition: &[f64]| fund_returns(&rows, composition);
         let with = |returns: &[f64]| State { law: problem.learning.law(returns), ..*state };
+        let compositions = fund.limits.as_ref().map(|limits| limits.compositions(&fund.assets, &self.holdings));
+        let allowed = |composition: Vec<f64>| match &compositions {
+            Some(compositions) => compositions.nearest(composition),
+            None => composition,
+        };
         let proposed = fund.composition.composition(&self.rows, || {
             let even = with(&of_fund(&inverse_volatility(&self.rows)));
             let law = ReturnScenarios {
@@ -225,7 +238,7 @@ impl Fund {
             let total = ActionInterval { lowest, highest };
             let step = PortfolioStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
             // A cold start, so that the proposal depends on the returns seen alone.
-            solution.insert(step.solve(None)).clone()
+            solution.insert(step.within(compositions.clone()).solve(None)).clone()
         });
         let left = (problem.horizon - step) as f64;
         // The policy's value of the fund, and that value less the cost of the trade.
@@ -237,7 +250,7 @@ impl Fund {
             let net = gain / left - problem.trading_cost * self.traded(&executed);
             varies.then_some([gain, net])
         };
-        let chosen = accept_if_no_worse(self.composition.clone(), proposed, value);
+        let chosen = accept_if_no_worse(allowed(self.composition.clone()), allowed(proposed), value);
         let state = with(&of_fund(&chosen));
         self.take(chosen);
         (state, solution)

@@ -10,11 +10,13 @@
 //! A barrier of mu p_j for each move makes it smooth, with the best t_j. Steps are Newton's on
 //! `slack x multiplier = mu p_j`; they raise the barrier function, which also sets the step's length. If the
 //! adversary's answer lies far below the known value, the search halves its step back, and mu stays as large as a share
-//! of that gap. If trading costs, u_i >= |a_i - h_i| join the point, and `p sum u_i` is subtracted (`trading.rs`).
+//! of that gap. If trading costs, u_i >= |a_i - h_i| join the point, and `p sum u_i` is subtracted (`trading.rs`). If
+//! turnover is limited, w_i join it (`problem/compositions.rs`).
 //! Sources: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7; Reemtsen and Rueckmann (1998),
 //! Semi-Infinite Programming, chapter 7 (exchange methods).
 
 mod newton;
+mod start;
 
 use self::newton::Direction;
 use super::PortfolioStep;
@@ -50,12 +52,6 @@ const TOP_TOLERANCE: f64 = 1e-10;
 const MOST_PRODUCT: f64 = 1e100;
 /// Smallest radius used in the search.
 const LEAST_RADIUS: f64 = 1e-9;
-/// Weight of the default start in a warm start, which keeps it inside the bounds.
-const DRAWN_INSIDE: f64 = 0.002;
-/// Above the least sum allowed, the shares of a start sum to at most this over the risk aversion.
-const SHARE_AT_START: f64 = 0.5;
-/// Smallest width of the interval for the sum of the shares.
-const LEAST_ROOM: f64 = 1e-6;
 
 /// `offset + direction . (a, gamma) >= 0`, with its multiplier.
 #[derive(Debug, Clone)]
@@ -73,13 +69,14 @@ impl BarrierConstraint {
 
 /// The state of the interior point search.
 pub(super) struct Interior<'a> {
-    /// The step with the assets searched among, which are `held` of the `whole`.
+    /// The step that is searched: the step `whole`, with the assets `held` alone.
     pub step: &'a PortfolioStep,
     pub whole: &'a PortfolioStep,
     pub held: &'a [usize],
     /// Other assets, which would raise the value by more than the remaining gap among these.
     pub entering: Vec<usize>,
-    /// The shares, then the price gamma, then the trade in each asset if trading costs.
+    /// The shares, then the price gamma, then the trade in each asset if trading costs, then its move if turnover is
+    /// limited.
     pub point: Vec<f64>,
     pub bounds: Vec<BarrierConstraint>,
     /// Barrier of a bound, over that of all atoms.
@@ -126,73 +123,6 @@ fn top(cuts: &[Cut], barrier: f64) -> f64 {
 }
 
 impl<'a> Interior<'a> {
-    /// Starts the search. `near` is a warm start: shares of the assets searched among, and a price.
-    pub fn start(
-        step: &'a PortfolioStep,
-        whole: &'a PortfolioStep,
-        held: &'a [usize],
-        near: Option<(Vec<f64>, f64)>,
-        barrier: f64,
-        reach: f64,
-    ) -> Self {
-        let assets = step.assets();
-        let highest = step.total.highest;
-        let lowest = step.total.lowest.min(highest - LEAST_ROOM);
-        // Halfway between the bounds of the sum, or at a sum whose total loss still weighs little. Further inside,
-        // utilities of a risk aversion of 20 and more are so large that rounding exceeds the gain of a step.
-        let weighs_little = SHARE_AT_START / step.utility.risk_aversion();
-        let middle = (0.5 * (lowest + highest)).min(lowest + weighs_little);
-        let even = middle / assets as f64;
-        let mut point = vec![even; assets];
-        if let Some((shares, _)) = &near {
-            let inside = |(share, near): (&mut f64, &f64)| *share = DRAWN_INSIDE * *share + (1.0 - DRAWN_INSIDE) * near;
-            point.iter_mut().zip(shares).for_each(inside);
-        }
-        point.push(near.as_ref().map_or(middle, |(_, price)| price.max(LEAST_ROOM)));
-        point.extend(&step.trading.holdings);
-        let size = point.len();
-        let unit = |index: usize| (0..size).map(|other| if other == index { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-        let sum = |sign: f64| (0..size).map(|other| if other < assets { sign } else { 0.0 }).collect::<Vec<f64>>();
-        let mut lines: Vec<(Vec<f64>, f64)> = (0..=assets).map(|index| (unit(index), 0.0)).collect();
-        lines.push((sum(-1.0), highest));
-        if lowest > 0.0 {
-            lines.push((sum(1.0), -lowest));
-        }
-        for (asset, held) in step.trading.holdings.iter().enumerate() {
-            for sign in [1.0, -1.0] {
-                let mut line = unit(assets + 1 + asset);
-                line[asset] = sign;
-                lines.push((line, -sign * held));
-            }
-        }
-        let bound = |(direction, offset)| BarrierConstraint { direction, offset, multiplier: 0.0 };
-        let mut interior = Interior {
-            step,
-            whole,
-            held,
-            entering: Vec::new(),
-            best: point[..assets].to_vec(),
-            best_price: point[assets],
-            point,
-            bounds: lines.into_iter().map(bound).collect(),
-            bound_weight: 1.0 / assets as f64,
-            barrier,
-            reach,
-            branches: Branches::default(),
-            cuts: Cuts::default(),
-            known_before: Cuts::default(),
-            lower: f64::NEG_INFINITY,
-            upper: f64::INFINITY,
-            tangent: None,
-            evaluations: 0,
-            steps: 0,
-        };
-        interior.open();
-        interior.ask();
-        interior.learn();
-        interior
-    }
-
     /// Computes the adversary's answer at the point. Returns the dual there, which is a lower bound.
     fn ask(&mut self) -> f64 {
         let (shares, price) = self.point.split_at(self.step.assets());
@@ -324,7 +254,8 @@ impl<'a> Interior<'a> {
     /// Returns the barrier function at the point. Sets t of every atom to its optimum, and so the slacks.
     fn merit(&mut self) -> f64 {
         let (assets, barrier) = (self.step.assets(), self.barrier);
-        let traded: f64 = self.point[assets + 1..].iter().sum();
+        let trades = self.step.trading.holdings.len();
+        let traded: f64 = self.point[assets + 1..][..trades].iter().sum();
         let mut merit = -self.point[assets] * self.radius() - self.step.trading.price * traded;
         for bound in &self.bounds {
             merit += barrier * self.bound_weight * bound.slack(&self.point).ln();

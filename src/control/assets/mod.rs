@@ -27,6 +27,8 @@ pub mod composition;
 mod cuts;
 pub mod fund;
 mod interior;
+mod limited;
+mod outcome;
 mod renewal;
 mod trading;
 pub mod worst;
@@ -38,6 +40,7 @@ use self::trading::{Tangent, Trading};
 use self::worst::RobustValue;
 use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::compositions::CompositionSet;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::MOST_ASSETS;
 use crate::numerics::transport::water_filling::GroundMetric;
@@ -75,6 +78,8 @@ pub struct PortfolioStep {
     utility: CentredUtility,
     total: ActionInterval,
     trading: Trading,
+    /// The compositions allowed; all if there are no limits.
+    compositions: Option<CompositionSet>,
 }
 
 /// The law of the coming returns and the set around it.
@@ -146,6 +151,7 @@ impl PortfolioStep {
             utility: utility.into(),
             total,
             trading: Trading::default(),
+            compositions: None,
         }
     }
 
@@ -191,34 +197,31 @@ impl PortfolioStep {
     }
 
     /// Returns the assets that a search begins with: those held or in the warm start; if there are none, the one of
-    /// highest mean under `GroundMetric::Sup`, and otherwise all.
+    /// highest mean under `GroundMetric::Sup`, and otherwise all. Those that limits need are among them.
     fn first_held(&self, near: Option<&AssetsSolution>) -> Vec<usize> {
         let counts =
             |asset: usize| self.trading.holding(asset) > 0.0 || near.is_some_and(|near| near.allocation[asset] > 0.0);
         let held: Vec<usize> = (0..self.assets).filter(|&asset| counts(asset)).collect();
+        if held.is_empty() && !self.ground.is_sup() {
+            return (0..self.assets).collect();
+        }
+        if let Some(compositions) = &self.compositions {
+            return compositions.supporting(held, &self.means());
+        }
         if !held.is_empty() {
             return held;
         }
-        if !self.ground.is_sup() {
-            return (0..self.assets).collect();
-        }
+        let means = self.means();
+        (0..self.assets).max_by(|&left, &right| means[left].total_cmp(&means[right])).into_iter().collect()
+    }
+
+    /// Returns the mean growth of each asset over the bank.
+    fn means(&self) -> Vec<f64> {
         let mut means = vec![0.0; self.assets];
         for (atom, mass) in self.masses.iter().enumerate() {
             means.iter_mut().zip(self.growth(atom)).for_each(|(mean, growth)| *mean += mass * growth);
         }
-        (0..self.assets).max_by(|&left, &right| means[left].total_cmp(&means[right])).into_iter().collect()
-    }
-
-    /// Leaves all in the bank if the search found nothing better and the bank is allowed, even if the search failed.
-    /// Caps the bound at the best growth seen.
-    fn at_least_the_bank(&self, found: AssetsSolution) -> AssetsSolution {
-        let most = self.most_growth();
-        let bound = if found.bound < most && found.bound >= found.value { found.bound } else { most };
-        if found.value >= 0.0 || self.total.lowest > 0.0 {
-            return AssetsSolution { value: found.value.min(bound), bound, ..found };
-        }
-        let nothing = vec![0.0; self.assets];
-        AssetsSolution { allocation: nothing.clone(), value: 0.0, bound: bound.max(0.0), mean_moves: nothing, ..found }
+        means
     }
 
     /// Searches among the assets `held`, and adds others once they would raise the value. Moves of the adversary within
@@ -251,28 +254,6 @@ impl PortfolioStep {
         }
     }
 
-    fn solution_from(&self, interior: &Interior<'_>, upper: f64, evaluations: usize) -> AssetsSolution {
-        let (mut shares, price) = (interior.best.clone(), interior.best_price);
-        let total: f64 = shares.iter().sum();
-        shares.iter_mut().filter(|share| **share < LEAST_SHARE).for_each(|share| *share = 0.0);
-        let left: f64 = shares.iter().sum();
-        if left > 0.0 {
-            shares.iter_mut().for_each(|share| *share *= total / left);
-        }
-        let mut value = self.value_at(&shares, price);
-        if value < interior.lower - TOLERANCE {
-            (shares, value) = (interior.best.clone(), interior.lower);
-        }
-        AssetsSolution {
-            allocation: interior.of_all(&shares),
-            value: self.utility.inverse(value - ROUNDING * value.abs()),
-            bound: self.utility.inverse(upper.max(value)),
-            multiplier: price,
-            mean_moves: interior.mean_moves(),
-            evaluations,
-        }
-    }
-
     /// Returns the step with some of the assets alone.
     fn among(&self, held: &[usize]) -> PortfolioStep {
         let of = |row: &[f64]| held.iter().map(|&asset| row[asset]).collect::<Vec<f64>>();
@@ -282,6 +263,7 @@ impl PortfolioStep {
             least_growths: of(&self.least_growths),
             masses: self.masses.clone(),
             trading: self.trading.among(held),
+            compositions: self.compositions.as_ref().map(|compositions| compositions.among(held)),
             ground: match &self.ground {
                 GroundMetric::Sup => GroundMetric::Sup,
                 GroundMetric::Weighted(weights) => GroundMetric::Weighted(of(weights)),

@@ -6,17 +6,23 @@ use crate::control::request::specification::Specification;
 use crate::control::request::support::Interval;
 
 impl Specification {
-    /// Returns the specification of the next policy: the same, with the returns `record`, date after date, and the last
-    /// observed `rate`. If the problem depends on wealth, present wealth replaces initial wealth and the design interval
-    /// is scaled with it. Renewals of sessions and walk-forwards of several assets call it.
+    /// Returns the specification of the policy that follows after `elapsed` periods: the same, with the returns `record`,
+    /// date after date, and the last observed `rate`. If the problem depends on wealth or secures spending, present wealth replaces initial
+    /// wealth and the design interval is scaled with it. With spending the horizon comes nearer, and otherwise not.
+    /// Renewals of sessions and walk-forwards of several assets call it.
     ///
     /// # Errors
     /// The record breaks a rule.
-    pub fn next(&self, record: &[f64], rate: Option<f64>, wealth: f64) -> Result<Self, FieldError> {
+    pub fn next(&self, record: &[f64], rate: Option<f64>, wealth: f64, elapsed: usize) -> Result<Self, FieldError> {
         let mut next = self.clone();
         let problem = &mut next.problem;
         problem.rate_per_step = rate.unwrap_or(problem.rate_per_step);
-        if problem.depends_on_wealth() {
+        let secures = problem.spending.as_ref().is_some_and(|spending| spending.secures());
+        if let Some(spending) = &mut problem.spending {
+            **spending = spending.after(elapsed);
+            problem.horizon = problem.horizon.saturating_sub(elapsed).max(1);
+        }
+        if problem.depends_on_wealth() || secures {
             let factor = wealth / problem.initial_wealth;
             problem.initial_wealth = wealth;
             let moved = |Interval { min, max }| Interval { min: min * factor, max: max * factor };

@@ -136,7 +136,7 @@ impl PortfolioStep {
         let kept = |(held, share): (&f64, &f64)| if (share - held).abs() < LEAST_TRADE { *held } else { *share };
         let kept: Vec<f64> = trading.holdings.iter().zip(&found.allocation).map(kept).collect();
         let whole: f64 = kept.iter().sum();
-        let fits = (self.total.lowest..=self.total.highest).contains(&whole);
+        let fits = (self.total.lowest..=self.total.highest).contains(&whole) && self.allows(&kept);
         let worth = |allocation: &[f64]| {
             let utility = self.value_at(allocation, found.multiplier) + trading.utility_cost(allocation);
             self.utility.inverse(utility) + (-cost * trading.turnover(allocation)).ln_1p()
@@ -160,7 +160,7 @@ impl PortfolioStep {
         let slopes: Vec<f64> = tangent.slopes.iter().map(|rise| slope * rise).collect();
         let free = Trading { holdings: trading.holdings.clone(), price: cost / (1.0 - lost) };
         let along: f64 = slopes.iter().zip(&tangent.shares).map(|(slope, share)| slope * share).sum();
-        self.utility.inverse(tangent.mean) + (-lost).ln_1p() + free.most(&slopes, self.total) - along
+        self.utility.inverse(tangent.mean) + (-lost).ln_1p() + self.greatest_rise(&free, &slopes).bound - along
             + free.utility_cost(&tangent.shares)
     }
 

@@ -28,6 +28,13 @@ pub enum ControlledValue {
     Constant(f64),
     /// Gains predicted from the features of a state.
     Surrogate(Box<ValueSurrogate>),
+    /// Gains at ascending values of the only feature, with local cubics between.
+    Tabulated {
+        /// Two at least.
+        at: Vec<f64>,
+        /// One for each.
+        gains: Vec<f64>,
+    },
 }
 
 impl ControlledValue {
@@ -46,6 +53,7 @@ impl ControlledValue {
         match self {
             ControlledValue::Constant(gain) => *gain,
             ControlledValue::Surrogate(surrogate) => surrogate.prediction(features)[0],
+            ControlledValue::Tabulated { at, gains } => interpolated(at, gains, features.first()),
         }
     }
 
@@ -54,6 +62,9 @@ impl ControlledValue {
         match self {
             ControlledValue::Surrogate(surrogate) if surrogate.uses_first() => {
                 surrogate.predictions(features, firsts.iter().copied())
+            }
+            ControlledValue::Tabulated { at, gains } => {
+                firsts.iter().map(|first| interpolated(at, gains, *first)).collect()
             }
             _ => vec![self.gain(features); firsts.len()],
         }
@@ -64,6 +75,9 @@ impl ControlledValue {
         let [least, most] = TABLE_NODES;
         if high - low <= ROUNDING * low.abs().max(high.abs()) {
             return vec![low];
+        }
+        if let ControlledValue::Tabulated { .. } = self {
+            return even(low, high, most);
         }
         let mut nodes = even(low, high, least);
         let mut gains = self.gains_along(features, &nodes);
@@ -101,9 +115,18 @@ pub struct GainTable {
 impl GainNodes {
     /// Returns the gain at a place.
     pub fn gain(&self, at: f64) -> f64 {
-        let (first, weights) = local_cubic(&self.at, at);
-        self.gains[first..].iter().zip(weights).map(|(gain, weight)| gain * weight).sum()
+        cubic(&self.at, &self.gains, at)
     }
+}
+
+/// Returns the gain at a place, or at the nearest end of the table.
+fn interpolated(nodes: &[f64], gains: &[f64], at: f64) -> f64 {
+    cubic(nodes, gains, at.clamp(nodes[0], nodes[nodes.len() - 1]))
+}
+
+fn cubic(nodes: &[f64], gains: &[f64], at: f64) -> f64 {
+    let (first, weights) = local_cubic(nodes, at);
+    gains[first..].iter().zip(weights).map(|(gain, weight)| gain * weight).sum()
 }
 
 impl GainTable {

@@ -18,6 +18,9 @@
 //!
 //!   w(a, z) = ln( s ((1-a)(1+r) + a e^z) / (1+r) + 1 - s ) + g_next( G(y, a, z) ).
 //!
+//! With spending, g is the gain of what is left after it, and the floor gain of the state follows by one formula
+//! (`control/problem/spending.rs`).
+//!
 //! Uncertainty sets differ in how an action is priced (`Pricing`); the search for the best one is shared.
 
 mod action_search;
@@ -127,7 +130,7 @@ impl BellmanStep<'_> {
         let curvature = utility.relative_risk_aversion() * set.variance();
         let largest = self.problem.largest_gain(self.step, state);
         let (solution, (floor_gains, policy_targets)) = self.optimum(state, &set, actions, |pricing, found| {
-            let gain = |trade: Trade| utility.inverse(pricing.value(trade));
+            let gain = |trade: Trade| dynamics.gain(utility.inverse(pricing.value(trade)));
             let target = |&side: &Side| {
                 let end = match side {
                     Side::Buying => found.band.low,
@@ -154,7 +157,7 @@ impl BellmanStep<'_> {
         DesignSolution { solution: solution.at_least_the_bank(), floor_gains, policy_targets }
     }
 
-    /// Returns the worth of one action, the best or not.
+    /// Returns the worth of one action, which need not be the best.
     pub fn price(&self, state: &State, action: f64) -> RobustSolution {
         let only = ActionInterval { lowest: action, highest: action };
         self.optimum(state, &self.problem.laws.uncertainty_set(&state.law), only, |_, _| ()).0
@@ -180,7 +183,7 @@ impl BellmanStep<'_> {
         let largest = self.problem.largest_gain(self.step, state);
         let field = |returns| GainField::tabulate(self.problem, self.step, self.next, utility, state, returns);
         best_response(set, actions, (dynamics, state.holding), field, |pricing, best| {
-            let solution = solution(best, utility, largest);
+            let solution = solution(best, (utility, dynamics), largest);
             let more = then(pricing, &solution);
             (solution, more)
         })
@@ -284,17 +287,18 @@ fn not_above(largest: f64, gain: f64) -> f64 {
 /// Converts the primal and the dual value to gains. Neither is above the `largest` gain, because no law of the set is
 /// better in every period than its best return. If wealth is so large that its utility no longer grows, both may be
 /// that.
-fn solution(best: BestResponse, utility: RelativeUtility, largest: f64) -> RobustSolution {
+fn solution(best: BestResponse, (utility, dynamics): (RelativeUtility, Dynamics), largest: f64) -> RobustSolution {
     let BestResponse { band, trade, worst } = best;
-    let gain = |value: f64| not_above(largest, utility.inverse(value));
+    let gain = |value: f64| dynamics.gain(not_above(largest, utility.inverse(value)));
     let floor_gain = gain(worst.value);
+    let slope = dynamics.slope_of_gain(utility.inverse(worst.value)) * utility.inverse_slope(worst.value);
     RobustSolution {
         action: trade.action,
         band,
         floor_gain,
         duality_gap: floor_gain - gain(worst.dual),
         multiplier: worst.multiplier,
-        radius_cost: worst.multiplier * utility.inverse_slope(worst.value),
+        radius_cost: worst.multiplier * slope,
         adversary: worst.adversary,
         certified: worst.certified,
     }

@@ -63,7 +63,7 @@ impl Problem {
         self.dynamics(step).in_hand(state.wealth, 0.0)
     }
 
-    /// Returns the terminal all-bank wealth from a state at `step`.
+    /// Returns the worth of a state at `step` if all wealth stays in the bank.
     pub fn floor(&self, step: usize, state: &State) -> f64 {
         self.dynamics(step).floor(state.wealth, state.holding, self.specification.problem.horizon - step)
     }
@@ -74,6 +74,13 @@ impl Problem {
     /// # Errors
     /// The bank runs dry; the field is `wealth`.
     pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
+        if let Some(reserve) = self.dynamics(0).spending.map(|own| own.reserve)
+            && reserve > 0.0
+            && state.wealth <= reserve
+        {
+            let rule = format!("must be above {reserve}, which pays from the bank for what problem.spending secures");
+            return Err(FieldError::new("wealth", state.wealth, rule));
+        }
         let liquidated = state.wealth * self.dynamics(0).liquidation(state.holding);
         let periods = &self.periods[..self.periods.len() - 1];
         check_bank(periods, liquidated).map_err(|rule| FieldError::new("wealth", state.wealth, rule))

@@ -29,12 +29,13 @@ const LEAST_ALLOCATION: f64 = 1e-4;
 /// Halvings of the path: to a millionth of it.
 const HALVINGS: usize = 20;
 
-/// The radii from the largest to 0 with the allocation advised at each; linear between them.
+/// The advised allocation as a function of the radius, from the largest radius to 0: given at some radii, and linear
+/// between these.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllocationCurve {
-    /// Ascending.
+    /// Advised allocations, ascending.
     allocations: Vec<f64>,
-    /// Descending.
+    /// Radii at which they are advised, descending.
     radii: Vec<f64>,
 }
 

@@ -83,6 +83,7 @@ impl Specification {
             horizon: 1,
             caution: Some(CautionLevel::Paper),
             levels: None,
+            spending: None,
             ..self.problem.clone()
         };
         let base = Specification::of(base, self.seed);

@@ -139,12 +139,22 @@ impl PathOutcome {
 
 /// Returns terminal wealth and largest fall of a constant mix.
 pub fn mix_ended(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &[f64]) -> PathOutcome {
-    let step = |(ended, holding): (PathOutcome, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
-        let allocation = dynamics.highest_action(ended.wealth, mix);
+    shares_ended(periods, initial_wealth, std::iter::repeat(mix), returns)
+}
+
+/// Returns terminal wealth and largest fall of holding these shares, period after period.
+pub fn shares_ended(
+    periods: &[Dynamics],
+    initial_wealth: f64,
+    shares: impl Iterator<Item = f64>,
+    returns: &[f64],
+) -> PathOutcome {
+    let step = |(ended, holding): (PathOutcome, f64), ((dynamics, &log_return), share): ((&Dynamics, &f64), f64)| {
+        let allocation = dynamics.highest_action(ended.wealth, share);
         let (wealth, holding) = dynamics.next(ended.wealth, holding, allocation, log_return);
         (ended.after(wealth, dynamics.contribution), holding)
     };
-    periods.iter().zip(returns).fold((PathOutcome::at(initial_wealth), 0.0), step).0
+    periods.iter().zip(returns).zip(shares).fold((PathOutcome::at(initial_wealth), 0.0), step).0
 }
 
 /// Mean, volatility and Sharpe ratio per year, from per-period returns. The mean is compounded, the ratio's excess over
@@ -155,7 +165,7 @@ pub struct Annual {
     pub mean: f64,
     /// Standard deviation of simple returns, per square root of a year.
     pub volatility: f64,
-    /// Mean excess over the bank divided by its deviation; 0 if no return ever exceeds the bank.
+    /// Mean excess over the bank divided by its deviation; 0 if the excess never varies.
     pub sharpe_ratio: f64,
 }
 

@@ -5,6 +5,7 @@ use jiff::civil::Date;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::analysis::{Analysis, StrategyLine};
 use crate::control::evaluation::names::{StrategyKind, at_level, check_own_names, mix_name};
+use crate::control::evaluation::own::shares_of_one;
 use crate::control::evaluation::walk_forward::{ActualPeriod, Decision, Strategy, WalkForward};
 use crate::control::evaluation::yearly_worth::Scale;
 use crate::control::problem::actions::Band;
@@ -32,6 +33,8 @@ pub struct Backtest {
     pub periods: Vec<ActualPeriod>,
     /// Strategies with their kinds and names: the adaptive ones first, in the order of their levels.
     pub strategies: Vec<((StrategyKind, String), Strategy)>,
+    /// Strategies of the user's own by name, with their shares in the periods that are decided.
+    own: Vec<(String, Vec<f64>)>,
     days: Vec<Date>,
 }
 
@@ -85,7 +88,11 @@ impl Backtest {
             .map_err(|error| renamed(error, field))?;
         let strategies = strategies(&request);
         check_own_names(request.weights.keys(), strategies.iter().map(|((_, name), _)| name.clone()))?;
+        let log_returns: Vec<f64> = periods.iter().map(|period| period.log_return).collect();
+        let bank = |period: usize| periods[period].bank_return;
+        let own = shares_of_one(&request.weights, &log_returns, bank, walk.window)?;
         Ok(Backtest {
+            own,
             frequency: request.frequency()?,
             periods_per_year: given(request.periods_per_year),
             days: request.days(),
@@ -159,9 +166,9 @@ impl Backtest {
         let names = self.strategies.iter().map(|(name, _)| name.clone());
         let mut lines: Vec<StrategyLine> =
             names.zip(decisions).map(|(name, decisions)| StrategyLine::new(name, decisions, lived, cost)).collect();
-        let own = self.request.weights.iter().map(|(name, shares)| {
+        let own = self.own.iter().map(|(name, shares)| {
             let decision = |share: &f64| Decision { band: Band::of(&[*share]), radius: 0.0, source: None };
-            let decisions = shares[self.walk.window..].iter().map(decision).collect();
+            let decisions = shares.iter().map(decision).collect();
             StrategyLine::new((StrategyKind::Own, name.clone()), decisions, lived, cost)
         });
         lines.extend(own);

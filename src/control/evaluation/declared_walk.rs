@@ -57,7 +57,7 @@ pub struct WalkedStrategy {
     pub gain: Estimate,
     /// Gain less that of the first strategy, in the same periods. Null for that strategy itself.
     pub difference: Option<Estimate>,
-    /// Period by period.
+    /// The periods that the strategy went through, in order.
     pub periods: Vec<WalkedPeriod>,
 }
 

@@ -11,13 +11,16 @@ use rayon::prelude::*;
 use crate::control::cache::Cache;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{PathOutcome, mix_ended};
+use crate::control::evaluation::own::ended_on_path;
 use crate::control::policy::advice::AdviceSource;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::problem::dynamics::Dynamics;
+use crate::control::problem::own_formula::OwnFormula;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::framework::Framework;
+use crate::control::request::own_weights::parsed;
 use crate::control::request::rules;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::Specification;
@@ -36,6 +39,8 @@ pub struct Evaluation {
     pub request: EvaluationRequest,
     /// The log-returns that each group of paths starts from.
     pub histories: Vec<Vec<f64>>,
+    /// The user's own strategies by name.
+    pub own: Vec<(String, OwnFormula)>,
     law: ContinuousLaw,
     kept: Cache,
 }
@@ -58,7 +63,7 @@ pub struct Lived {
 /// One path: the result of every strategy, and every step of every framework, framework by framework.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Results strategy by strategy: frameworks, then constant mixes.
+    /// Results strategy by strategy: frameworks, constant mixes, and the user's own.
     pub ended: Vec<PathOutcome>,
     /// Steps of each framework, one framework after another.
     pub lived: Vec<Lived>,
@@ -106,7 +111,7 @@ impl Evaluation {
             InitialHistories::Given => vec![request.problem.history.clone()],
             InitialHistories::Drawn { count } => (0..count).map(|index| drawn_history(&request, &law, index)).collect(),
         };
-        Ok(Evaluation { request, histories, law, kept: Cache::default() })
+        Ok(Evaluation { own: parsed(&request.weights)?, request, histories, law, kept: Cache::default() })
     }
 
     /// Uses the cache `kept`.
@@ -129,7 +134,8 @@ impl Evaluation {
                 return Err(FieldError::new(format!("histories[{index}]"), value, rule));
             }
         }
-        Ok(Evaluation { law: true_law(&request), request, histories, kept: Cache::default() })
+        let (own, law) = (parsed(&request.weights)?, true_law(&request));
+        Ok(Evaluation { own, law, request, histories, kept: Cache::default() })
     }
 
     /// Returns a framework with its policy, trained on the current pool, or without one if each history has its own.
@@ -261,18 +267,14 @@ impl Simulator<'_> {
         let mut outcome = Outcome { ended: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
         let mut seconds = 0.0;
         for advisor in advisors {
-            outcome.ended.push(self.follow(
-                advisor,
-                history,
-                &returns,
-                &distances,
-                &mut outcome.lived,
-                &mut seconds,
-            )?);
+            let ended = self.follow(advisor, history, &returns, &distances, &mut outcome.lived, &mut seconds)?;
+            outcome.ended.push(ended);
         }
         for &mix in self.evaluation.request.mixes() {
             outcome.ended.push(mix_ended(&self.periods, problem.initial_wealth, mix, &returns));
         }
+        let Evaluation { own, histories, .. } = self.evaluation;
+        outcome.ended.extend(ended_on_path(own, problem, &self.periods, &histories[history], &returns)?);
         self.report_path();
         Ok((outcome, seconds))
     }

@@ -53,11 +53,11 @@ pub struct Costs {
 pub struct StrategyReport {
     /// Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like.
     pub strategy: String,
-    /// The framework; null for constant mixes.
+    /// The framework; null for constant mixes and strategies of your own.
     pub framework: Option<Framework>,
-    /// The allocation of a constant mix.
+    /// The allocation of a constant mix; null for others.
     pub constant_mix: Option<f64>,
-    /// The policy followed; null for constant mixes, and if each history had its own.
+    /// The policy followed; null for strategies without one, and if each history had its own.
     pub policy: Option<String>,
     /// Utility of terminal wealth, measured from `floor`: `(U(x) - U(floor)) / (floor U'(floor))`. This form loses no
     /// digits at high risk aversion or wealth.
@@ -68,7 +68,7 @@ pub struct StrategyReport {
     pub wealth: WealthReport,
     /// This strategy less the reference, on the same returns; null for the reference.
     pub difference: Option<Difference>,
-    /// Comparison with the constant mix of its own average; null for constant mixes.
+    /// Comparison with the constant mix of its own average; null for strategies without a policy.
     pub own_mix: Option<OwnMix>,
     /// Counts of the bins between `histogram_edges`.
     pub histogram: Vec<usize>,

@@ -39,7 +39,7 @@ impl EvaluationReport {
     ) -> serde_json::Result<Self> {
         let request = &evaluation.request;
         let sample = Clustered::new(evaluation.histories.len(), request.paths, request.level);
-        let count = request.frameworks.len() + request.mixes().len();
+        let count = request.frameworks.len() + request.mixes().len() + evaluation.own.len();
         let wealth: Vec<Vec<f64>> = (0..count)
             .map(|index| outcomes.outcomes.iter().map(|outcome| outcome.ended[index].wealth).collect())
             .collect();
@@ -123,13 +123,17 @@ impl SimulationTable<'_> {
     fn strategy(&self, index: usize) -> serde_json::Result<StrategyReport> {
         let request = &self.evaluation.request;
         let follower = self.followers.get(index);
-        let mix = index.checked_sub(self.followers.len()).and_then(|mix| request.mixes().get(mix)).copied();
+        let beyond = index.checked_sub(self.followers.len());
+        let mix = beyond.and_then(|mix| request.mixes().get(mix)).copied();
+        let own = beyond.and_then(|place| place.checked_sub(request.mixes().len()));
+        let own = own.and_then(|place| self.evaluation.own.get(place)).map(|(name, _)| name.clone());
+        let fixed = || own.unwrap_or_else(|| mix_name(mix.unwrap_or_default()));
         let advisor = follower.and_then(|follower| follower.advisor.as_ref());
         let utilities = self.utilities[index].as_slice();
         let named = |follower: &Follower| framework_name(follower.framework).to_owned();
         let policy = advisor.map(|advisor| advisor.policy().to_json()).transpose()?;
         Ok(StrategyReport {
-            strategy: follower.map_or_else(|| mix_name(mix.unwrap_or_default()), named),
+            strategy: follower.map_or_else(fixed, named),
             framework: follower.map(|follower| follower.framework),
             constant_mix: mix,
             policy: policy.map(|json| content_hash(&json)),

@@ -18,7 +18,7 @@ const FEWEST_YEARS: usize = 30;
 /// A hundredth of a millionth of the initial wealth: a smaller difference is rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Returns one statement each, the most important first.
+/// Returns what the figures say in sentences, the most important first.
 pub fn sentences(walked: &Walked) -> Vec<String> {
     let Walked { backtest, lines, analysis } = walked;
     let (figures, main) = (&analysis.figures, backtest.main_line());

@@ -3,7 +3,7 @@
 
 use std::sync::OnceLock;
 
-use super::advice::{Advice, AdviceSource, Uncertainty};
+use super::advice::{Advice, AdviceSource, SpendingAdvice, Uncertainty};
 use super::document::Policy;
 use super::prepared_step::{PreparedStep, prepared_bytes};
 use crate::control::bellman::BellmanStep;
@@ -17,6 +17,7 @@ use crate::control::problem::actions::Band;
 use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::request::specification::Specification;
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
+use crate::control::uncertainty::laws::Laws;
 use crate::control::uncertainty::radius::Measure;
 
 /// Count of numbers that takes some hundreds of microseconds to read.
@@ -82,14 +83,14 @@ impl Advisor {
         self.problem.actions(step, state).highest
     }
 
+    /// Returns the uncertainty sets of laws.
+    pub fn laws(&self) -> &Laws {
+        &self.problem.laws
+    }
+
     /// Returns the bytes it holds, without bridges and factors.
     pub fn bytes(&self) -> usize {
         prepared_bytes(&self.policy)
-    }
-
-    /// Returns the bytes of the largest bridges of a session of `periods` periods that starts from `sample_size` returns.
-    pub fn heaviest_bridges(&self, sample_size: usize, periods: usize) -> usize {
-        self.problem.laws.radii.heaviest(sample_size, periods)
     }
 
     /// Returns the policy.
@@ -254,17 +255,20 @@ impl Advisor {
     }
 
     fn advice(&self, inputs: &AdviceInputs, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
-        let floor = self.problem.floor(inputs.step, inputs.state);
-        let holding = inputs.state.holding;
+        let (dynamics, floor) = (self.problem.dynamics(inputs.step), self.problem.floor(inputs.step, inputs.state));
+        let (holding, wealth) = (inputs.state.holding, inputs.state.wealth);
+        let spending = dynamics.spending.map(|own| SpendingAdvice::of(&own, floor_gain, wealth));
+        let (band, secured) = SpendingAdvice::of_wealth(spending, band, wealth);
         let allocation = band.nearest(holding);
         Advice {
             allocation,
             holding,
             band,
-            trade: allocation - holding,
-            contribution: self.problem.dynamics(inputs.step).contribution,
-            certainty_equivalent: floor * floor_gain.exp(),
-            floor,
+            trade: allocation * (1.0 - SpendingAdvice::share_of(spending)) - holding,
+            spending,
+            contribution: dynamics.contribution,
+            certainty_equivalent: secured + floor * floor_gain.exp(),
+            floor: secured + floor,
             radius: inputs.radius,
             sample_size: inputs.state.law.sample_size(),
             effective_size: self.problem.laws.effective_size(&inputs.state.law),
@@ -321,11 +325,6 @@ impl Advisor {
         let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
         let same_wealth = !problem.depends_on_wealth() || state.wealth == trained;
         same_law && same_wealth
-    }
-
-    /// Returns the least mean of e^Z, Z the return, among the laws of a state's ball.
-    pub fn worst_mean(&self, state: &State) -> f64 {
-        self.problem.laws.worst_mean(&state.law)
     }
 
     /// Returns sample size, moments, quantile and radius of a state.

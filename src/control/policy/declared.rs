@@ -76,7 +76,7 @@ impl Decided {
     /// Trains a declared problem on the current rayon pool, and decides its first period.
     ///
     /// # Errors
-    /// Those of [`DeclaredPolicy::train`] and [`DeclaredAdvisor::decide`].
+    /// The errors of [`DeclaredPolicy::train`] and [`DeclaredAdvisor::decide`].
     pub fn first(declared: &DeclaredSpecification, watch: &Watch) -> Result<Self, TrainError> {
         Ok(DeclaredPolicy::train(declared, watch)?.prepared(Cache::default())?.decide(1, None, &[])?)
     }

@@ -5,7 +5,7 @@ use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use super::document::Policy;
 use super::levels::{LevelsAdvised, WhyNothing};
-use super::sensitivity::{Sensitivity, check_learning};
+use super::sensitivity::{AdviceVariants, Premium, Sensitivity, check_learning};
 use super::worst_case::WorstCase;
 use crate::control::cache::Cache;
 use crate::control::error::FieldError;
@@ -16,6 +16,7 @@ use crate::control::request::framework::Framework;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::solved_step::StepSolution;
 use crate::control::uncertainty::radius::RadiusEstimator;
+use crate::numerics::law::empirical::EmpiricalDistribution;
 
 /// An investor whose horizon is the end of this period.
 pub struct OnePeriod {
@@ -89,14 +90,14 @@ impl OnePeriod {
         Ok(Some(WhyNothing {
             premium_seen,
             standard_error,
-            premium_left: Some(self.advisor.worst_mean(&state) - (1.0 + problem.rate_per_step)),
+            premium_left: Some(self.advisor.laws().worst_mean(&state.law) - (1.0 + problem.rate_per_step)),
             at_half_the_caution: (problem.radius_rule().paths() > 0).then(half),
         }))
     }
 
     /// Returns the bytes of the bridges that its radius needs.
     pub fn bridges(&self) -> usize {
-        self.advisor.heaviest_bridges(self.problem().history.len(), 1)
+        self.advisor.laws().radii.heaviest(self.problem().history.len(), 1)
     }
 
     /// Returns the advice for an investor with the share `holding` of the initial wealth in the asset, and the worst
@@ -116,17 +117,68 @@ impl OnePeriod {
     /// # Errors
     /// A holding that is no share.
     pub fn sensitivity(&self, holding: f64, advice: &Advice) -> Result<Sensitivity, FieldError> {
+        self.of_variants(holding, advice, |variants| variants.sensitivity())
+    }
+
+    /// Returns the mean at which `advice`, of an investor who holds nothing yet, leaves the bank, as
+    /// [`Sensitivity::premium`] does. Cost: some thirty robust steps.
+    ///
+    /// # Errors
+    /// As [`Self::advise`].
+    pub fn premium(&self, advice: &Advice) -> Result<Premium, FieldError> {
+        self.of_variants(0.0, advice, |variants| variants.premium_now())
+    }
+
+    /// Returns the number of further returns, of the law of the record, after which `advice` is more than `share`; `None`
+    /// as for [`Premium::periods_more`]. Cost: some fifteen robust steps.
+    ///
+    /// # Errors
+    /// As [`Self::advise`].
+    pub fn periods_until(&self, advice: &Advice, share: f64) -> Result<Option<usize>, FieldError> {
+        self.of_variants(0.0, advice, |variants| variants.periods_until(share))
+    }
+
+    /// Answers from the variants of `advice` for an investor with the share `holding` in the asset.
+    fn of_variants<T>(
+        &self,
+        holding: f64,
+        advice: &Advice,
+        answer: impl FnOnce(&AdviceVariants<'_>) -> T,
+    ) -> Result<T, FieldError> {
         let state = self.state(holding)?;
+        let of = self.by_record(&state);
+        Ok(self.advisor.with_variants(0, &state, &self.problem().history, (advice, &of), answer))
+    }
+
+    /// Returns the allocation that `count` further returns of this size would lead to. Cost: a robust step.
+    ///
+    /// # Errors
+    /// As [`Self::advise`].
+    pub fn after(&self, log_return: f64, count: usize) -> Result<f64, FieldError> {
+        let state = self.state(0.0)?;
+        let record = [&self.problem().history[..], &vec![log_return; count]].concat();
+        Ok(self.by_record(&state)(&record))
+    }
+
+    /// Returns the law of the record.
+    ///
+    /// # Errors
+    /// As [`Self::radius`].
+    pub fn law(&self) -> Result<EmpiricalDistribution, FieldError> {
+        Ok(self.state(0.0)?.law)
+    }
+
+    /// Returns the allocation in `state` as a function of the record. A calibrated radius keeps its factor.
+    fn by_record<'a>(&'a self, state: &'a State) -> impl Fn(&[f64]) -> f64 + Sync + 'a {
         let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).calibrated_rule());
-        let of = |record: &[f64]| {
+        move |record: &[f64]| {
             // The rule found already includes the level's share.
             let caution = Some(CautionLevel::Paper);
             let problem = ProblemSpecification { history: record.to_vec(), radius, caution, ..self.problem().clone() };
             let law = self.problem().learning.law(record);
-            let state = State { law, ..state };
+            let state = State { law, ..*state };
             self.of(problem).advisor.advise(0, &state, AdviceMode::Resolve).allocation
-        };
-        Ok(self.advisor.sensitivity_by(0, &state, &self.problem().history, advice, &of))
+        }
     }
 
     /// Checks that some return changes the advice, and that other records can be advised.

@@ -26,7 +26,7 @@ pub struct PreparedStep {
     pub factor: Factor,
 }
 
-/// Cache key of the process behind the predicted deviation, which does not depend on the targets.
+/// Cache key of the Gaussian process behind the predicted deviation, which does not depend on the targets.
 pub struct Factor(Key);
 
 impl PreparedStep {
@@ -57,7 +57,7 @@ impl Factor {
         kept.has(&self.0)
     }
 
-    /// Returns the process; `None` if the matrix does not factor.
+    /// Returns the Gaussian process; `None` if the matrix does not factor.
     pub fn process(&self, kept: &Cache, stored: &StepSurrogates) -> Arc<Option<GaussianProcess>> {
         kept.get_or_make(&self.0, factor_bytes(stored), || {
             let zeros = vec![0.0; stored.count()];
@@ -66,7 +66,7 @@ impl Factor {
     }
 }
 
-/// Returns the bytes of the process of a step.
+/// Returns the bytes of the Gaussian process of a step.
 pub fn factor_bytes(stored: &StepSurrogates) -> usize {
     GaussianProcess::bytes_of(stored.count(), stored.inputs.len())
 }
@@ -77,7 +77,7 @@ pub fn prepared_bytes(policy: &Policy) -> usize {
     steps_bytes(policy.steps()) + 2 * rows * size_of::<f64>()
 }
 
-/// Returns the number of design points of the largest step, and the bytes of its process.
+/// Returns the number of design points of the largest step, and the bytes of its Gaussian process.
 pub fn largest_design(steps: &[StepSolution]) -> (usize, usize) {
     let design = |step: &StepSolution| match &step.solution {
         Solution::Single(_) => (1, 0),

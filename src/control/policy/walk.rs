@@ -2,7 +2,7 @@
 
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
-use crate::control::problem::state::{PeriodOutcome, State};
+use crate::control::problem::state::State;
 use crate::control::request::specification::{InitialLaws, Specification};
 
 /// Share of the largest effective sample size from which a record counts as settled.
@@ -23,7 +23,7 @@ impl Iterator for Walk<'_> {
     fn next(&mut self) -> Option<Advice> {
         let log_return = *self.returns.get(self.step)?;
         let advice = self.advisor.advise(self.step, &self.state, AdviceMode::Surrogate);
-        self.state = self.advisor.advance(self.step, &self.state, &PeriodOutcome::of(advice.allocation, log_return));
+        self.state = self.advisor.advance(self.step, &self.state, &advice.followed(log_return));
         self.step += 1;
         Some(advice)
     }
@@ -51,6 +51,9 @@ impl Advisor {
         };
         if design.initial_laws != InitialLaws::Resampled {
             return refused("whose design.initial_laws is resampled");
+        }
+        if problem.spending.is_some() {
+            return refused("without spending, whose horizon does not come nearer");
         }
         if problem.depends_on_wealth() {
             return refused("whose advice does not depend on wealth; use power or log utility and no contributions");

@@ -4,7 +4,7 @@ use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::policy::worst_case::WorstCase;
-use crate::control::problem::state::{PeriodOutcome, State};
+use crate::control::problem::state::State;
 use crate::control::request::{radius_rules, rules};
 
 /// The hypothetical changes; everything else stays as it is. They apply in the order of the fields.
@@ -125,8 +125,8 @@ impl Advisor {
             let rule = "must be absent: the coming period is the last, so there is none after it to advise";
             return Err(FieldError::new("log_return", log_return, rule));
         };
-        let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
-        let then = self.advance(step, &now, &PeriodOutcome::of(advised, log_return));
+        let advised = self.advise(step, &now, AdviceMode::Surrogate);
+        let then = self.advance(step, &now, &advised.followed(log_return));
         let (low, high) = rules::WEALTH;
         if !(low..=high).contains(&then.wealth) {
             let rule = format!("must leave a wealth in [{low}, {high}]");

@@ -21,8 +21,8 @@ pub struct WorstCase {
     /// Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius.
     pub multiplier: f64,
     /// Loss of log certainty equivalent per unit of extra radius: the slope at this radius, for this period's ball
-    /// alone. A wider ball costs at most this times the extra radius, and at most the whole worth of the advice above
-    /// the floor.
+    /// alone. A wider ball costs at most this slope times the extra radius. It never costs more than the whole worth of
+    /// the advice above the floor.
     pub radius_cost: f64,
     /// The transport of mass; empty in the parametric frameworks.
     pub transport: Vec<TransportedMass>,
@@ -165,11 +165,12 @@ fn transport_sentence(
         format!(
             "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} {moves}. Against the \
              worst laws \
-             of this period and of any later ones, the allocation is still worth {:.2} for certain at the horizon; the bank \
+             of this period and of any later ones, the allocation is still worth {:.2} for certain {}; the bank \
              alone pays {:.2}. A ball of this period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that worth.",
             100.0 * advice.allocation,
             advice.radius,
             advice.certainty_equivalent,
+            when(advice),
             advice.floor,
             most_cost(RADIUS_UNIT, radius_cost, advice)
         )
@@ -180,6 +181,11 @@ fn transport_sentence(
             advice.radius
         )
     }
+}
+
+/// Says when the certainty equivalent of an advice is had: with spending in every period.
+fn when(advice: &Advice) -> &'static str {
+    advice.spending.map_or("at the horizon", |_| "in every period, in money of now")
 }
 
 fn normal_sentence(worst: NormalLaw, estimate: NormalLaw, advice: &Advice) -> String {
@@ -196,13 +202,14 @@ fn normal_sentence(worst: NormalLaw, estimate: NormalLaw, advice: &Advice) -> St
         "Against an allocation of {:.1} %, the worst normal law in the confidence region has a mean log-return of {:.2} % \
          and a variance of {:.2e} a period; the estimates are {:.2} % and {:.2e}. Against the worst laws of this \
          period and of any \
-         later ones, the allocation is still worth {:.2} for certain at the horizon; the bank alone pays {:.2}.",
+         later ones, the allocation is still worth {:.2} for certain {}; the bank alone pays {:.2}.",
         100.0 * advice.allocation,
         100.0 * worst.mean,
         worst.variance,
         100.0 * estimate.mean,
         estimate.variance,
         advice.certainty_equivalent,
+        when(advice),
         advice.floor
     )
 }

@@ -57,3 +57,17 @@ pub trait Controlled: Sync {
         baseline + gain
     }
 }
+
+/// A controlled problem whose states one number describes.
+pub trait Gridded: Controlled {
+    /// Returns ascending numbers at which the states of a step are solved: one for the first step, else two at least.
+    fn nodes(&self, step: usize) -> Vec<f64>;
+
+    /// Returns a state of a step that a number describes.
+    fn at(&self, step: usize, number: f64) -> Self::State;
+
+    /// Returns the gain of a state, given that of its robust step. They differ if something is decided before it.
+    fn gain_before(&self, _step: usize, gain: f64) -> f64 {
+        gain
+    }
+}

@@ -15,11 +15,19 @@
 //! any return of the asset, if P is negative and also before late contributions. So the reserve
 //! `D = max(0, (D' - C) / (1 + r))` stays in the bank, and bounds the actions by `1 - D / (x (1 - c))`.
 //!
+//! With spending, a share of wealth is spent at the start of the period, before anything else moves
+//! (`control/problem/spending.rs`), and worths are levels of spending. The reserve for what is secured then counts as
+//! money that is still to be paid, and actions are shares of the surplus, which is all of total wealth. [`Advisor`] turns
+//! them into shares of wealth.
+//!
+//! [`Advisor`]: crate::control::policy::advisor::Advisor
+//!
 //! The simulator, live sessions and the accounts of a backtest call these functions. The tables of the robust step hold
 //! the same formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/solver/bellman.rs`
 //! compares.
 
 use crate::control::problem::actions::Band;
+use crate::control::problem::spending::PeriodSpending;
 use crate::control::request::specification::ProblemSpecification;
 
 /// Least margin of a starting wealth over the reserve, as a share of it. At the reserve itself nothing is left to
@@ -35,10 +43,12 @@ pub struct Dynamics {
     pub trading_cost: f64,
     /// C, money added at the end of the period; negative if it is withdrawn.
     pub contribution: f64,
-    /// P, the present value of this contribution and all later ones, by the bank.
+    /// P, the present value of this contribution and all later ones, by the bank; less the reserve for what is secured.
     pub to_come: f64,
     /// D, the wealth that must stay in the bank through the period to pay every future withdrawal.
     pub reserve: f64,
+    /// Spending at the start of the period, if there is any.
+    pub spending: Option<PeriodSpending>,
 }
 
 /// The trade from a holding to an action.
@@ -64,11 +74,14 @@ impl Dynamics {
     pub fn of(problem: &ProblemSpecification) -> Vec<Self> {
         let mut after = Dynamics::plain(problem.rate_per_step, problem.trading_cost);
         let mut periods = vec![after];
+        let spending = PeriodSpending::of(problem);
         for step in (0..problem.horizon).rev() {
             let (contribution, bank) = (problem.contributions.at(step), 1.0 + problem.rate_per_step);
             let to_come = (contribution + after.to_come) / bank;
             let reserve = ((after.reserve - contribution) / bank).max(0.0);
-            after = Dynamics { contribution, to_come, reserve, ..after };
+            let spending = spending.get(step).copied();
+            let to_come = spending.map_or(to_come, |own| -own.reserve);
+            after = Dynamics { contribution, to_come, reserve, spending, ..after };
             periods.push(after);
         }
         periods.reverse();
@@ -77,7 +90,7 @@ impl Dynamics {
 
     /// Returns the dynamics of a period without any contributions.
     pub fn plain(rate_per_step: f64, trading_cost: f64) -> Self {
-        Dynamics { rate_per_step, trading_cost, contribution: 0.0, to_come: 0.0, reserve: 0.0 }
+        Dynamics { rate_per_step, trading_cost, contribution: 0.0, to_come: 0.0, reserve: 0.0, spending: None }
     }
 
     /// Returns the growth of a unit of wealth after trading: `(1-a)(1+r) + a e^z`.
@@ -114,20 +127,41 @@ impl Dynamics {
         (next, if next > 0.0 { (share * (grown / next)).min(1.0) } else { share })
     }
 
-    /// Returns total wealth: the wealth after selling everything, plus future contributions, `x (1 - c h) + P`.
+    /// Returns total wealth: the wealth after selling everything, plus the present value of future contributions, `x (1
+    /// - c h) + P`.
     pub fn total(self, wealth: f64, holding: f64) -> f64 {
         wealth * self.liquidation(holding) + self.to_come
     }
 
     /// Returns the share of total wealth that is in hand after selling everything, `x (1 - c h) / (x (1 - c h) + P)`: 1
-    /// without future contributions.
+    /// without future contributions, and of the surplus.
     pub fn in_hand(self, wealth: f64, holding: f64) -> f64 {
+        if self.spending.is_some() {
+            return 1.0;
+        }
         wealth * self.liquidation(holding) / self.total(wealth, holding)
     }
 
-    /// Returns the terminal wealth of selling everything and staying in the bank for `steps` steps.
+    /// Returns the worth of a unit of total wealth in the bank for `steps` steps: at the horizon, or with spending the
+    /// level that it pays for.
+    pub fn safe_worth(self, steps: usize) -> f64 {
+        let grown = || (1.0 + self.rate_per_step).powf(steps as f64);
+        self.spending.map_or_else(grown, |spending| spending.safe_worth())
+    }
+
+    /// Returns the worth of selling everything and staying in the bank for `steps` steps.
     pub fn floor(self, wealth: f64, holding: f64, steps: usize) -> f64 {
-        self.total(wealth, holding) * (1.0 + self.rate_per_step).powf(steps as f64)
+        self.total(wealth, holding) * self.safe_worth(steps)
+    }
+
+    /// Returns the floor gain of a state, given that of what is left after spending: both are one without.
+    pub fn gain(self, left: f64) -> f64 {
+        self.spending.map_or(left, |spending| spending.gain(left))
+    }
+
+    /// Returns the derivative of [`Self::gain`].
+    pub fn slope_of_gain(self, left: f64) -> f64 {
+        self.spending.map_or(1.0, |spending| spending.slope(left))
     }
 
     /// Returns the wealth that pays for every future withdrawal, with a hundredth to spare, even if all of it is held

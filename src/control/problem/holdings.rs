@@ -14,7 +14,7 @@ pub const HOLDINGS: usize = 17;
 /// Number of holdings if there is a single law, and hundreds of steps may follow each other.
 pub const HOLDINGS_OF_ONE_LAW: usize = 257;
 
-/// Even holdings from 0 to the highest action, at which a function of the holding is given.
+/// Evenly spaced holdings from 0 to the highest action, at which a function of the holding is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Holdings {
     count: usize,

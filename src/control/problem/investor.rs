@@ -4,7 +4,7 @@
 use super::actions::{ActionInterval, ActionSet};
 use super::controlled::Controlled;
 use super::dynamics::Dynamics;
-use super::utility::RelativeUtility;
+use super::utility::{relative_utility, worth_of_utility};
 use crate::control::request::specification::ProblemSpecification;
 
 /// The problem of a specification, without its law.
@@ -62,11 +62,11 @@ impl Controlled for Investor {
     }
 
     fn utility(&self, worth: f64, from: f64) -> f64 {
-        RelativeUtility::new(self.problem.utility, from).value((worth / from).ln())
+        relative_utility(self.problem.utility, worth, from)
     }
 
     fn certainty_equivalent(&self, utility: f64, from: f64) -> f64 {
-        from * RelativeUtility::new(self.problem.utility, from).inverse(utility).exp()
+        worth_of_utility(self.problem.utility, utility, from)
     }
 
     /// Returns ln(worth / baseline).

@@ -22,12 +22,14 @@ pub struct PeriodOutcome {
     pub flow: Option<f64>,
     /// Share of wealth bought and sold for it, if it differs from the change of the holding, as with several assets.
     pub traded: Option<f64>,
+    /// Share of wealth spent at its start.
+    pub spent: f64,
 }
 
 impl PeriodOutcome {
-    /// Returns a period with the rate, the contribution and the trade of the problem.
+    /// Returns a period with the rate, the contribution and the trade of the problem, in which nothing was spent.
     pub fn of(action: f64, log_return: f64) -> Self {
-        PeriodOutcome { action, log_return: Some(log_return), rate: None, flow: None, traded: None }
+        PeriodOutcome { action, log_return: Some(log_return), rate: None, flow: None, traded: None, spent: 0.0 }
     }
 
     /// Returns the dynamics of the period with the rate and the flow that were realised.
@@ -37,9 +39,9 @@ impl PeriodOutcome {
         Dynamics { rate_per_step, contribution, ..dynamics }
     }
 
-    /// Returns the share of wealth bought and sold, from the share `holding`.
+    /// Returns the share of wealth bought and sold, from the share `holding`, of which none is spent.
     pub fn turnover(&self, holding: f64) -> f64 {
-        self.traded.unwrap_or_else(|| f64::abs(self.action - holding))
+        self.traded.unwrap_or_else(|| f64::abs(self.action * (1.0 - self.spent) - holding))
     }
 }
 
@@ -80,7 +82,8 @@ impl State {
     pub fn next_state(&self, dynamics: Dynamics, realised: &PeriodOutcome) -> State {
         let PeriodOutcome { action, log_return, .. } = *realised;
         let (dynamics, traded) = (realised.dynamics(dynamics), realised.turnover(self.holding));
-        let (wealth, holding) = dynamics.next_after(self.wealth, traded, action, log_return.unwrap_or(0.0));
+        let left = self.wealth * (1.0 - realised.spent);
+        let (wealth, holding) = dynamics.next_after(left, traded, action, log_return.unwrap_or(0.0));
         let mut law = self.law.clone();
         log_return.into_iter().for_each(|seen| law.push(seen.max(LEAST_LEARNED)));
         State { wealth, holding, law }

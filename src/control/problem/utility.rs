@@ -34,6 +34,16 @@ pub enum RelativeUtility {
     Log,
 }
 
+/// Returns the utility of a worth relative to another: 0 there, with slope 1 in the log of their ratio.
+pub fn relative_utility(utility: UtilitySpecification, worth: f64, from: f64) -> f64 {
+    RelativeUtility::new(utility, from).value((worth / from).ln())
+}
+
+/// Returns the worth whose utility relative to another is `relative`: the inverse of [`relative_utility`].
+pub fn worth_of_utility(utility: UtilitySpecification, relative: f64, from: f64) -> f64 {
+    from * RelativeUtility::new(utility, from).inverse(relative).exp()
+}
+
 impl RelativeUtility {
     /// Builds the utility relative to a floor of terminal wealth `floor`.
     pub fn new(utility: UtilitySpecification, floor: f64) -> Self {

@@ -12,13 +12,16 @@ use super::contributions::Contributions;
 use super::framework::Framework;
 use super::fund::{CompositionRule, FundSpecification, GroundNorm};
 use super::learning::Learning;
+use super::limits::WeightLimits;
 use super::means::MeansRule;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::{InitialLaws, ProblemSpecification, Specification, UtilitySpecification, defaults};
+use super::spending::Spending;
 use super::support::Support;
 use super::text::check_text;
 use crate::control::error::FieldError;
+use crate::control::problem::compositions::CompositionSet;
 use crate::numerics::bridge::funds::fund_returns;
 use crate::numerics::transport::water_filling::inverse_volatility;
 
@@ -27,7 +30,7 @@ pub const MOST_ASSETS: usize = 30;
 /// Allowed number of assets in a request.
 pub const ASSETS: std::ops::RangeInclusive<usize> = 2..=MOST_ASSETS;
 /// Allowed number of dates in a history. The most dates of the most assets take some seconds of search.
-pub const DATES: std::ops::RangeInclusive<usize> = 2..=2000;
+pub const DATES: std::ops::RangeInclusive<usize> = 2..=10_000;
 /// Allowed number of characters in an asset's name.
 pub const NAME_LENGTH: std::ops::RangeInclusive<usize> = 1..=100;
 
@@ -44,6 +47,9 @@ pub struct AssetsProblem {
     /// How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`.
     #[serde(default)]
     pub composition: CompositionRule,
+    /// Limits on the composition, for advice and for every period of a policy. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<WeightLimits>,
     /// The means of the assets under the law at the centre. Default: `sample`.
     #[serde(default)]
     pub means: MeansRule,
@@ -70,10 +76,13 @@ pub struct AssetsProblem {
     /// Money added at the end of each period, or withdrawn if negative. Default 0. Advice accepts no other value.
     #[serde(default)]
     pub contributions: Contributions,
+    /// Spending that the policy chooses, period after period. Default: none. Advice accepts none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spending: Option<Box<Spending>>,
     /// Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub risk_aversion: Option<f64>,
-    /// Utility of wealth at the horizon. Default: power utility with risk aversion 3.
+    /// Utility of wealth at the horizon, or of spending. Default: power utility with risk aversion 3.
     #[serde(default = "UtilitySpecification::not_given")]
     pub utility: UtilitySpecification,
     /// Radius rule of the inverse-volatility fund; its radius is then widened to cover all funds at once. Default:
@@ -87,7 +96,7 @@ pub struct AssetsProblem {
     /// The log-returns of each asset that the adversary may use. Default: `worst_seen`.
     #[serde(default)]
     pub support: Option<Support>,
-    /// Log-returns by date, oldest first, 2 to 2000 dates; each date has one value for each asset.
+    /// Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset.
     pub history: Vec<Vec<f64>>,
 }
 
@@ -107,11 +116,13 @@ impl AssetsProblem {
             let rule = "must be 0 or left out: train a policy to add or withdraw money";
             return Err(FieldError::new("problem.contributions", "not 0", rule));
         }
+        let problem = self.of_fund();
+        problem.check_without_spending("this call advises one period. Train a policy")?;
         if self.trading_cost != 0.0 && matches!(self.utility, UtilitySpecification::Exponential { .. }) {
             let rule = "must be 0 or left out under exponential utility; power and log utility allow a trading cost";
             return Err(FieldError::new("problem.trading_cost", self.trading_cost, rule));
         }
-        Specification::of(ProblemSpecification { horizon: 1, ..self.of_fund() }, seed).completed()
+        Specification::of(ProblemSpecification { horizon: 1, ..problem }, seed).completed()
     }
 
     /// Returns the investor's problem with the inverse-volatility fund as the only asset.
@@ -124,6 +135,7 @@ impl AssetsProblem {
             action_interval: self.action_interval,
             trading_cost: self.trading_cost,
             contributions: self.contributions.clone(),
+            spending: self.spending.clone(),
             risk_aversion: self.risk_aversion,
             utility: self.utility,
             radius: self.radius,
@@ -145,7 +157,13 @@ impl AssetsProblem {
             return Err(FieldError::new("problem.radius.rule", rule.name(), allowed));
         }
         self.means.check("problem.means", self.support)?;
-        check_composition("problem.composition", &self.composition, self.assets.len())
+        check_composition("problem.composition", &self.composition, self.assets.len())?;
+        self.limits.as_ref().map_or(Ok(()), |limits| limits.check("problem.limits", &self.assets))
+    }
+
+    /// Returns the compositions that the limits allow from `holdings`, which are shares of wealth; `None` without limits.
+    pub fn compositions(&self, holdings: &[f64]) -> Option<CompositionSet> {
+        self.limits.as_ref().map(|limits| limits.compositions(&self.assets, holdings))
     }
 }
 
@@ -283,6 +301,7 @@ pub(super) fn check_fund(
     check_rows("fund.history", &fund.history, &fund.assets, problem.support)?;
     fund.means.check("fund.means", problem.support)?;
     check_composition("fund.composition", &fund.composition, fund.assets.len())?;
+    fund.limits.as_ref().map_or(Ok(()), |limits| limits.check("fund.limits", &fund.assets))?;
     if let Some(factor) = fund.radius_factor {
         rules::within("fund.radius_factor", factor, FACTOR.0, FACTOR.1)?;
     }

@@ -13,7 +13,7 @@ use crate::control::request::centre::CentreSpecification;
 use crate::control::request::centre_rules::check_walked;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
-use crate::control::request::own_weights::{OwnWeights, check_weights};
+use crate::control::request::own_weights::{OwnShares, OwnWeights, check_weights};
 use crate::control::request::radius_rules::{ALPHA, RADIUS_SCALE};
 use crate::control::request::rules::{
     COUNT, HISTORY_LENGTH, HORIZON, LOG_RETURNS, RATE, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST,
@@ -93,10 +93,10 @@ pub struct BacktestRequest {
     #[serde(default)]
     pub cost_blind: bool,
     /// Strategies of your own by name, at most 10: the share of wealth that each holds in every period of the record,
-    /// 0 to 1. Those of the first window are not used. A share may use only what was known before its period: nothing
-    /// here can check that.
+    /// 0 to 1, or a formula for it over the returns before, such as `if(mean12 > bank, 1, 0)`. Shares of the first window
+    /// are not used. Given shares may use only what was known before their period: nothing here can check that.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    #[schema(value_type = std::collections::HashMap<String, Vec<f64>>)]
+    #[schema(value_type = std::collections::HashMap<String, OwnShares<f64>>)]
     pub weights: OwnWeights,
     /// Number of design points per step, 10 to 10,000. Default 100.
     #[serde(default = "defaults::count")]

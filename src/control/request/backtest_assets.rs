@@ -12,8 +12,9 @@ use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, fre
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::declared_backtest::DeclaredBacktest;
 use super::frequency::Frequency;
+use super::limits::WeightLimits;
 use super::means::MeansRule;
-use super::own_weights::OwnAssetsWeights;
+use super::own_weights::{OwnAssetsWeights, OwnShares};
 use super::radius_rules::ALPHA;
 use super::rules::{
     COUNT, HORIZON, LOG_RETURNS, RELATIVE_RISK_AVERSION, SIMPLE_RETURNS, TRADING_COST, return_bounds, same_length,
@@ -101,11 +102,16 @@ pub struct AssetsBacktestRequest {
     /// into account. Default 0.
     #[serde(default)]
     pub trading_cost: f64,
+    /// Limits on the composition, for every strategy but your own: rules that are not optimised take the nearest
+    /// composition that keeps them. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<WeightLimits>,
     /// Strategies of your own by name, at most 10: for every period of the record the shares of wealth in the assets, in
-    /// their order, which add up to at most 1. Those of the longest window are not used. Shares may use only what was
-    /// known before their period: nothing here can check that.
+    /// their order, which add up to at most 1, or a formula for the share of each asset over its returns before, such as
+    /// `1/deviation60`; formulas that add up to more than 1 are divided by their sum. Shares of the longest window are not
+    /// used. Given shares may use only what was known before their period: nothing here can check that.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    #[schema(value_type = std::collections::HashMap<String, Vec<Vec<f64>>>)]
+    #[schema(value_type = std::collections::HashMap<String, OwnShares<Vec<f64>>>)]
     pub weights: OwnAssetsWeights,
     /// Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1.
     #[serde(default = "default_seed")]

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::error::FieldError;
 
-/// Returns the values in the order of `names`, each of which must have one. A `noun` says what is named.
+/// Returns the values in the order of `names`. Every name must have a value. Errors call what is named a `noun`.
 ///
 /// # Errors
-/// Another name, or a name without a value.
+/// A value has a name that is not in `names`, or a name has no value.
 pub fn by_name<T: Copy + Serialize>(
     field: &str,
     noun: &str,
@@ -33,7 +33,8 @@ pub fn by_name<T: Copy + Serialize>(
     names.iter().map(of).collect()
 }
 
-/// Reads an object by name, and refuses a name that stands twice: the last would be taken in silence.
+/// Reads an object with one value for each name, and refuses a name that occurs twice. Otherwise its last value would
+/// silently replace the first.
 pub fn distinct<'de, D: Deserializer<'de>, V: Deserialize<'de>>(source: D) -> Result<BTreeMap<String, V>, D::Error> {
     Distinct::deserialize(source).map(|Distinct(found)| found)
 }

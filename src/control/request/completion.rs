@@ -35,6 +35,26 @@ fn utility(given: UtilitySpecification, risk_aversion: Option<f64>) -> Result<Ut
     }
 }
 
+impl UtilitySpecification {
+    /// Returns the exponential utility of this absolute risk aversion.
+    pub fn exponential(risk_aversion: f64) -> Self {
+        UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: None }
+    }
+
+    /// Returns the utility with its risk aversion per unit of wealth, for an investor who starts with `initial_wealth`:
+    /// `risk_aversion = risk_aversion_relative / initial_wealth`.
+    /// Checked by: `tests/service/advise.rs::a_relative_risk_aversion_is_of_the_wealth_at_the_start`.
+    #[must_use]
+    pub fn absolute(self, initial_wealth: f64) -> Self {
+        match self {
+            UtilitySpecification::Exponential { risk_aversion_relative: Some(relative), .. } => {
+                UtilitySpecification::exponential(relative / initial_wealth)
+            }
+            absolute => absolute,
+        }
+    }
+}
+
 impl Specification {
     /// Checks every rule, and fills in the fields that depend on others.
     ///

@@ -6,10 +6,13 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::evaluation::names::{check_own_names, framework_name, mix_name};
+use crate::control::problem::own_formula::{OwnFormula, ReturnSums};
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::completion::DEFAULT_COUNT_WEALTH_ALONE;
 use crate::control::request::framework::Framework;
+use crate::control::request::own_weights::{OwnFormulas, parsed};
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::{self, within};
 use crate::control::request::sampling_law::SamplingLaw;
@@ -51,6 +54,11 @@ pub struct EvaluationRequest {
     /// steps of 0.1, up to the highest action.
     #[serde(default)]
     pub constant_mixes: Option<Vec<f64>>,
+    /// Strategies of your own by name, at most 10: a formula for the share of wealth over the returns before each period,
+    /// the history's and the path's, such as `if(mean12 > bank, 1, 0)`. Default: none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(value_type = std::collections::HashMap<String, String>)]
+    pub weights: OwnFormulas,
     /// Trained policies to use, by framework. Policies for the other frameworks are trained inside the job.
     #[serde(default)]
     #[schema(value_type = std::collections::HashMap<String, String>)]
@@ -122,6 +130,7 @@ impl EvaluationRequest {
                 "must be left out: list the frameworks in `frameworks`",
             ));
         }
+        self.problem.check_without_spending("an evaluation compares terminal wealth; a plan compares spending")?;
         if let CentreSpecification::Conditional { .. } = self.problem.centre {
             let rule =
                 "must be another centre: the returns of a path are drawn from one law, whatever came before them";
@@ -135,7 +144,8 @@ impl EvaluationRequest {
         self.problem.risk_aversion = None;
         self.check_frameworks()?;
         self.complete_mixes()?;
-        if self.frameworks.is_empty() && self.mixes().is_empty() {
+        self.check_own()?;
+        if self.frameworks.is_empty() && self.mixes().is_empty() && self.weights.is_empty() {
             return Err(FieldError::new("frameworks", "[]", "must name a framework if there are no constant_mixes"));
         }
         self.check_sizes()?;
@@ -162,6 +172,20 @@ impl EvaluationRequest {
             }
         }
         Ok(())
+    }
+
+    /// Checks that the user's own strategies have names of their own, and a share of wealth after the history.
+    fn check_own(&self) -> Result<(), FieldError> {
+        let frameworks = self.frameworks.iter().map(|framework| framework_name(*framework).to_owned());
+        check_own_names(self.weights.keys(), frameworks.chain(self.mixes().iter().map(|mix| mix_name(*mix))))?;
+        let history = &self.problem.history;
+        let sums = ReturnSums::of(history.iter().copied());
+        let wanted = |own: &OwnFormula, known| own.wanted(&sums, known, self.problem.rate_per_step);
+        parsed(&self.weights)?.iter().try_for_each(|(_, own)| {
+            wanted(own, history.len())?;
+            // A formula has no value while there are fewer returns than it looks back.
+            own.check_fractions((0..=history.len()).filter_map(|known| wanted(own, known).ok()))
+        })
     }
 
     fn complete_mixes(&mut self) -> Result<(), FieldError> {

@@ -147,7 +147,10 @@ impl FrontierRequest {
             return Err(FieldError::new("problem.caution", given.name(), rule));
         }
         let (assets, mut fund) = match &self.problem {
-            FrontierProblem::Assets(assets) => (assets.clone(), assets.fund(self.seed)?),
+            FrontierProblem::Assets(assets) => {
+                check_turnover(assets)?;
+                (assets.clone(), assets.fund(self.seed)?)
+            }
             FrontierProblem::Asset(problem) => {
                 check_static(problem)?;
                 let fund = Specification::of(problem.clone(), self.seed).completed()?;
@@ -196,6 +199,13 @@ impl FrontierRequest {
     }
 }
 
+/// Rejects a limit on the turnover.
+fn check_turnover(problem: &AssetsProblem) -> Result<(), FieldError> {
+    let Some(most) = problem.limits.as_ref().and_then(|limits| limits.max_turnover) else { return Ok(()) };
+    let rule = "must be left out: a frontier starts without holdings";
+    Err(FieldError::new("problem.limits.max_turnover", most, rule))
+}
+
 /// Rejects options that do not apply to a resampled record.
 fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
     let name = problem.framework.name();
@@ -224,6 +234,7 @@ fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
         let rule = "must be empirical: a frontier centres its balls on the law of the record alone";
         return Err(FieldError::new("problem.centre.kind", problem.centre.name(), rule));
     }
+    problem.check_without_spending("a frontier compares wealth after one period")?;
     if !problem.contributions.are_none() {
         return Err(FieldError::new("problem.contributions", "not 0", "must be left out"));
     }
@@ -242,9 +253,11 @@ pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSp
         ground_norm: GroundNorm::default(),
         means: MeansRule::default(),
         composition: CompositionRule::default(),
+        limits: None,
         horizon: None,
         trading_cost: 0.0,
         contributions: Contributions::default(),
+        spending: None,
         rate_per_step: problem.rate_per_step,
         periods_per_year: problem.periods_per_year,
         initial_wealth: problem.initial_wealth,

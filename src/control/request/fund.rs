@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::limits::WeightLimits;
 use super::means::MeansRule;
 use crate::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
 
@@ -17,6 +18,9 @@ pub struct FundSpecification {
     pub ground_norm: GroundNorm,
     /// How the shares of the assets within the risky holdings are chosen.
     pub composition: CompositionRule,
+    /// Limits on the composition. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<WeightLimits>,
     /// The means of the assets under the law at the centre. Default: `sample`.
     #[serde(default)]
     pub means: MeansRule,

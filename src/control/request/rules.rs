@@ -128,6 +128,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         let rule = format!("must be 0 or at least {SMALLEST_TRADING_COST:e}");
         return Err(FieldError::new("problem.trading_cost", problem.trading_cost, rule));
     }
+    problem.spending.as_ref().map_or(Ok(()), |spending| spending.check(problem))?;
     contributions(problem)?;
     utility(problem)?;
     problem.learning.check()?;

@@ -14,6 +14,7 @@ use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::spending::Spending;
 use crate::control::request::support::{Interval, Support};
 
 /// A complete training job.
@@ -72,10 +73,13 @@ pub struct ProblemSpecification {
     /// Money added at the end of each period, or withdrawn if negative: one number, or `horizon` numbers. Default 0.
     #[serde(default)]
     pub contributions: Contributions,
+    /// Spending that the policy chooses, period after period. Default: none, and utility is of terminal wealth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spending: Option<Box<Spending>>,
     /// Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub risk_aversion: Option<f64>,
-    /// Utility of terminal wealth. Default: power utility with risk aversion 3.
+    /// Utility of terminal wealth, or of spending. Default: power utility with risk aversion 3.
     #[serde(default = "UtilitySpecification::not_given")]
     pub utility: UtilitySpecification,
     /// Weights of older returns in the learned law. Default: `equal`.
@@ -138,6 +142,15 @@ impl UtilitySpecification {
             risk_aversion => UtilitySpecification::Power { risk_aversion },
         }
     }
+
+    /// Returns the power of a utility of relative amounts: one less the relative risk aversion, and 0 for the logarithm.
+    /// Exponential utility, which spending excludes, has no power and gives 0.
+    pub fn power(self) -> f64 {
+        match self {
+            UtilitySpecification::Power { risk_aversion } => 1.0 - risk_aversion,
+            UtilitySpecification::Log {} | UtilitySpecification::Exponential { .. } => 0.0,
+        }
+    }
 }
 
 impl Default for UtilitySpecification {
@@ -155,24 +168,6 @@ impl UtilitySpecification {
     pub(super) fn is_given(self) -> bool {
         !matches!(self, UtilitySpecification::Power { risk_aversion } if risk_aversion.is_nan())
     }
-
-    /// Returns the exponential utility of this absolute risk aversion.
-    pub fn exponential(risk_aversion: f64) -> Self {
-        UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: None }
-    }
-
-    /// Returns the utility with its risk aversion per unit of wealth, for an investor who starts with `initial_wealth`:
-    /// `risk_aversion = risk_aversion_relative / initial_wealth`.
-    /// Checked by: `tests/service/advise.rs::a_relative_risk_aversion_is_of_the_wealth_at_the_start`.
-    #[must_use]
-    pub fn absolute(self, initial_wealth: f64) -> Self {
-        match self {
-            UtilitySpecification::Exponential { risk_aversion_relative: Some(relative), .. } => {
-                UtilitySpecification::exponential(relative / initial_wealth)
-            }
-            absolute => absolute,
-        }
-    }
 }
 
 impl ProblemSpecification {
@@ -187,6 +182,7 @@ impl ProblemSpecification {
             action_interval: defaults::action_interval(),
             trading_cost: 0.0,
             contributions: Contributions::default(),
+            spending: None,
             risk_aversion: None,
             utility: UtilitySpecification::default(),
             learning: Learning::default(),

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::numerics::law::empirical::EmpiricalDistribution;
+use crate::numerics::law::moments::CentralMoments;
 use crate::numerics::statistics::summary::range;
 
 /// Number of standard deviations on either side of the mean that `worst_seen` always includes, however calm the
@@ -71,6 +73,13 @@ impl LawExtent {
         let mean = log_returns.clone().sum::<f64>() / count;
         let variance = log_returns.clone().map(|z| (z - mean).powi(2)).sum::<f64>() / count;
         LawExtent { ends: range(log_returns), mean, variance }
+    }
+
+    /// Computes the extent of a law.
+    pub fn of_law(law: &EmpiricalDistribution) -> Self {
+        let moments = CentralMoments::of(law);
+        let ends = [law.atoms().first(), law.atoms().last()].map(|end| end.copied().unwrap_or_default());
+        LawExtent { ends, mean: moments.mean(), variance: moments.variance() }
     }
 }
 

@@ -22,6 +22,9 @@ pub struct Terms {
     pub contributions: Contributions,
     /// Weights of older returns in the learned law.
     pub learning: Learning,
+    /// True if the policy plans spending to its horizon, which no renewal moves.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ends: bool,
     /// Number of periods in a year. A period reported without a date gets the next due date, found from this number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<f64>,
@@ -40,6 +43,7 @@ impl Terms {
             trading_cost: problem.trading_cost,
             contributions: problem.contributions.clone(),
             learning: problem.learning,
+            ends: problem.spending.is_some(),
             periods_per_year: problem.periods_per_year,
             means: specification.means(),
         }

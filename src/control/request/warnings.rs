@@ -13,10 +13,13 @@ use crate::control::request::centre::CentreSpecification;
 use crate::control::request::centre_rules::LEAST_LIKE;
 use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::law::conditional::{effective, kernel_weights};
+use crate::numerics::statistics::summary::quantile;
 use crate::numerics::statistics::tail_index::{TailIndex, tail_indices};
 
 /// Annual rates above this are rarely paid in a currency that keeps its value.
 const HIGH_RATE_A_YEAR: f64 = 0.15;
+/// Rises of prices above this in a year are rarely planned for: a rate of a year given for a quarter is higher.
+const HIGH_INFLATION_A_YEAR: f64 = 0.08;
 /// Annual deviations of log-returns above this are those of daily or monthly returns in percent. Shares have 0.15 to 1,
 /// coins up to 2.5; the returns of an index in percent have from 10 (months) to 16 (days).
 const LARGE_DEVIATION_A_YEAR: f64 = 3.0;
@@ -29,6 +32,14 @@ const HIGH_TRADING_COST: f64 = 0.02;
 const NEEDED_MOMENT: f64 = 2.0;
 /// Standard errors between the estimate of a tail index and its upper bound: 95 %, one-sided.
 const TAIL_ERRORS: f64 = 1.645;
+
+/// A return so many times as far from the median as any other may be a slip of the keyboard. Of the 1,098 windows of 12
+/// months in the bundled market 10 have one as far out, of those of 24 months 2, and of those of 60 months none.
+const LONE: f64 = 4.0;
+/// A lone return this near to the median is no slip worth asking about, in log-return.
+const NEAR: f64 = 0.02;
+/// With fewer returns one of them may well be alone.
+const LEAST_LONE: usize = 12;
 
 /// Something in a valid request that may be a mistake.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -55,9 +66,13 @@ pub enum WarningCode {
     RecordInPercent,
     /// Trading costs more than 2 %.
     TradingCostHigh,
+    /// Prices rise more than 8 % a year. Without `periods_per_year` a period counts as a year.
+    InflationHigh,
     /// A tail of the record is so heavy that moments above the second may not exist, and the returns have no bounds: the
     /// tail index is below 2 by 1.645 standard errors.
     TailHeavy,
+    /// One return of the record lies more than 4 times as far from the median as any other.
+    LoneReturn,
     /// At the bandwidth of a conditional centre fewer than 30 returns count, so it is widened.
     FewAlike,
     /// A formula of a declared problem jumps as a state or the noise moves.
@@ -105,6 +120,29 @@ impl ProblemSpecification {
         Some(warning(WarningCode::TailHeavy, "problem.history", text))
     }
 
+    /// Warns of one return that lies far beyond all others: a month of 5.7 % that was typed as 57 %.
+    ///
+    /// Checked by: `one_return_far_beyond_all_others_is_warned_of`.
+    fn lone_return(&self) -> Option<Warning> {
+        if self.history.len() < LEAST_LONE {
+            return None;
+        }
+        let middle = quantile(&self.history, 0.5);
+        let mut far: Vec<f64> = self.history.iter().map(|log_return| log_return - middle).collect();
+        far.sort_by(|one, other| other.abs().total_cmp(&one.abs()));
+        let (lone, next) = (far[0], far[1].abs());
+        if lone.abs() < NEAR || lone.abs() <= LONE * next {
+            return None;
+        }
+        let beyond = match lone.abs() / next {
+            times if times.is_finite() => format!("{times:.1} times as far from the median as any other"),
+            _ => "while all others are equal".to_owned(),
+        };
+        let one = 100.0 * (middle + lone).exp_m1();
+        let text = format!("has one return of {one:.2} %, {beyond}. Make sure that it is not a slip");
+        Some(warning(WarningCode::LoneReturn, "problem.history", text))
+    }
+
     /// Warns of a present figure that so few returns resemble that the bandwidth is widened.
     ///
     /// Checked by: `tests/solver/conditional.rs::figures_that_would_be_misread_are_refused_by_name`.
@@ -138,6 +176,15 @@ impl ProblemSpecification {
                  year"
             )
         };
+        let inflation = self.inflation();
+        let prices_a_year = compounded(inflation, periods.unwrap_or(1.0));
+        let prices_rise = || {
+            let a_year = percent(prices_a_year);
+            format!(
+                "is {inflation}, which is {a_year} a year {year}. Give the rise of prices of one period as a fraction, not \
+                 that of a year"
+            )
+        };
         let rate_above = || {
             format!(
                 "is {rate}, above the mean simple return of problem.history, {mean:.6}: over the record the bank paid \
@@ -166,9 +213,12 @@ impl ProblemSpecification {
             (rate > mean).then(|| warning(WarningCode::RateAboveRecord, "problem.rate_per_step", rate_above())),
             (cost > HIGH_TRADING_COST)
                 .then(|| warning(WarningCode::TradingCostHigh, "problem.trading_cost", cost_high())),
+            (prices_a_year > HIGH_INFLATION_A_YEAR)
+                .then(|| warning(WarningCode::InflationHigh, "problem.spending.inflation", prices_rise())),
             in_percent("problem.history", self.deviation()),
             assumed.and_then(|deviation| in_percent("problem.centre.history", deviation)),
             self.tail_heavy(),
+            self.lone_return(),
             self.few_alike(),
         ]
         .into_iter()
@@ -195,6 +245,7 @@ mod tests {
 
     use super::*;
     use crate::control::request::framework::Framework;
+    use crate::control::request::spending::Spending;
     use crate::control::request::support::Support;
     use crate::numerics::machine::streams::stream;
 
@@ -232,6 +283,48 @@ mod tests {
         assert_eq!(warned(0.0001, None, 0.0, 1.1), [RecordInPercent]);
         assert_eq!(warned(0.0025, months, 0.05, 0.045), [TradingCostHigh]);
         assert_eq!(warned(0.2, months, 0.05, 1.5), [RateHigh, RateAboveRecord, TradingCostHigh, RecordInPercent]);
+    }
+
+    #[test]
+    fn one_return_far_beyond_all_others_is_warned_of() {
+        let months = [0.012, -0.031, 0.02, 0.044, -0.012, 0.008, 0.057, -0.027, 0.016, 0.002, -0.044, 0.03];
+        let warned = |slip: f64| {
+            let history = months.iter().map(|&month| f64::ln_1p(if month == 0.057 { slip } else { month })).collect();
+            let warnings = ProblemSpecification::of(history, 0.001).warnings();
+            warnings.into_iter().filter(|one| one.code == WarningCode::LoneReturn).map(|one| one.message).next()
+        };
+        assert_eq!([0.057, 0.15, -0.15, 0.0].map(warned), [None, None, None, None]);
+        let message = "problem.history has one return of 57.00 %, 7.7 times as far from the median as any other. Make sure \
+                       that it is not a slip.";
+        assert_eq!(warned(0.57).as_deref(), Some(message));
+        assert!(warned(-0.57).is_some());
+        let bank = |last: f64| {
+            let history = std::iter::repeat_n(0.002, 20).chain([last]).collect();
+            ProblemSpecification::of(history, 0.001).lone_return().map(|one| one.message)
+        };
+        assert_eq!(bank(0.003), None);
+        assert!(bank(0.3).unwrap().contains("while all others are equal"));
+    }
+
+    /// 2 % of a year given for a month is 26.8 % a year, and for a quarter 8.2 %.
+    #[test]
+    fn a_yearly_rise_of_prices_given_by_the_period_is_warned_of() {
+        let warned = |inflation: f64, periods_per_year: Option<f64>| {
+            let spending = Some(Spending { inflation, ..Spending::default() }.into());
+            let history = vec![0.08, -0.01, 0.05];
+            let problem =
+                ProblemSpecification { periods_per_year, spending, ..ProblemSpecification::of(history, 0.002) };
+            problem.warnings().into_iter().map(|one| (one.code, one.field.into_owned())).collect::<Vec<_>>()
+        };
+        for (inflation, periods) in [(0.0017, Some(12.0)), (0.02, None), (0.02, Some(1.0)), (-0.01, Some(12.0))] {
+            assert_eq!(warned(inflation, periods), []);
+        }
+        for (inflation, periods) in [(0.02, Some(12.0)), (0.02, Some(4.0)), (0.1, None)] {
+            assert_eq!(
+                warned(inflation, periods),
+                [(WarningCode::InflationHigh, "problem.spending.inflation".to_owned())]
+            );
+        }
     }
 
     #[test]

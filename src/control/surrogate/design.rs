@@ -26,7 +26,6 @@ use crate::control::uncertainty::centre::Centre;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law::confidence_region::{self, ConfidenceRegion, NormalLaw};
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::law::moments::CentralMoments;
 use crate::numerics::machine::streams::stream;
 
 /// Largest number of states that set the guard: 5 of them lie beyond a guard that 99.5 % pass.
@@ -163,10 +162,9 @@ impl Design {
     /// Returns the return of a leap after `law`. Leaps are spread evenly over the support, or over the support that a
     /// record has by default; if that is not all, those that go far are spread over all, at distances that grow.
     fn leap(&self, law: &EmpiricalDistribution, leap: &Leap) -> f64 {
-        let moments = CentralMoments::of(law);
-        let ends = [law.atoms().first(), law.atoms().last()].map(|end| end.copied().unwrap_or_default());
-        let extent = LawExtent { ends, mean: moments.mean(), variance: moments.variance() };
-        let usual = Support::default().around(|| extent).unwrap_or(Interval { min: ends[0], max: ends[1] });
+        let extent = LawExtent::of_law(law);
+        let [min, max] = extent.ends;
+        let usual = Support::default().around(|| extent).unwrap_or(Interval { min, max });
         let whole = self.problem.support_rule().around(|| extent);
         let Interval { min, max } = whole.unwrap_or(Interval { min: usual.min - FREE_FALL, ..usual });
         let place = ((1.0 + 2.0 * AT_THE_ENDS) * leap.place - AT_THE_ENDS).clamp(0.0, 1.0);

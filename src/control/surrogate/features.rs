@@ -31,6 +31,11 @@ pub struct FeatureSelection {
 pub struct Features(pub(super) Vec<f64>);
 
 impl Features {
+    /// Returns the first feature; NaN if there is none.
+    pub fn first(&self) -> f64 {
+        self.0.first().copied().unwrap_or(f64::NAN)
+    }
+
     /// Returns the features of a law after those of a physical state.
     pub fn after(self, mut described: Vec<f64>) -> Features {
         described.extend(self.0);

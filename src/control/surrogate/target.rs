@@ -1,5 +1,6 @@
 //! The regression target of the value surrogate, and its map back to the floor gain.
 
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::{certainty_equivalent, utility};
 use crate::control::request::specification::{Specification, SurrogateTarget, UtilitySpecification};
 
@@ -9,7 +10,7 @@ pub struct TargetMap {
     target: SurrogateTarget,
     utility: UtilitySpecification,
     wealth_matters: bool,
-    /// Growth of a unit of wealth in the bank until the horizon.
+    /// The worth of a unit of wealth in the bank.
     bank: f64,
 }
 
@@ -21,12 +22,11 @@ impl TargetMap {
             target: specification.surrogate.target,
             utility: problem.utility,
             wealth_matters: problem.depends_on_wealth(),
-            bank: (1.0 + problem.rate_per_step).powf((problem.horizon - step) as f64),
+            bank: Dynamics::of(problem)[step].safe_worth(problem.horizon - step),
         }
     }
 
-    /// Returns the terminal all-bank wealth that is the unit of the value; it uses unit wealth if wealth does not
-    /// matter.
+    /// Returns the worth in the bank, the unit of the value; it is that of unit wealth if wealth does not matter.
     fn floor(&self, total: f64) -> f64 {
         (if self.wealth_matters { total } else { 1.0 }) * self.bank
     }

@@ -82,13 +82,13 @@ impl ValueSurrogate {
         self.scaling.active.first() == Some(&0)
     }
 
-    /// Returns the nearest input to `features` from which the process predicts.
+    /// Returns the input at which the value at `features` is predicted: the nearest one within reach.
     fn within_reach(&self, features: &Features) -> Vec<f64> {
         let inputs = self.scaling.apply(features).into_iter().enumerate();
         inputs.map(|(place, input)| self.nearest(place, input)).collect()
     }
 
-    /// Returns the nearest value of the input at a place.
+    /// Returns the nearest value within reach of the input with the index `place`.
     fn nearest(&self, place: usize, input: f64) -> f64 {
         let [low, high] = self.reach[place];
         input.max(low).min(high)

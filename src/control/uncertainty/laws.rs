@@ -143,7 +143,7 @@ impl Laws {
 
     /// Returns the least mean of e^Z, Z the return, among the laws of the ball around a law.
     pub fn worst_mean(&self, law: &EmpiricalDistribution) -> f64 {
-        let lowest = self.lowest_return(|| extent(law, CentralMoments::of(law), None));
+        let lowest = self.least_return(law);
         let radius = self.radii.of_returns(self.radius(law), law.effective_size());
         ExponentialMean::of(law).worst(radius, lowest).mean
     }
@@ -238,6 +238,11 @@ impl Laws {
         let WorstExponential { mean, variance } = worst;
         let [robust_excess, robust_variance] = [mean / self.bank - 1.0, variance / (self.bank * self.bank)];
         LawSummary { moments, radii, robust_excess, robust_variance }
+    }
+
+    /// Returns the least return that the support around a law allows, minus infinity without a support.
+    pub fn least_return(&self, law: &EmpiricalDistribution) -> f64 {
+        self.lowest_return(|| extent(law, CentralMoments::of(law), None))
     }
 
     /// Returns the least return to which a seen return may be moved.

@@ -241,8 +241,8 @@ impl RadiusEstimator {
         Radii { radius: known, radius_ahead }
     }
 
-    /// Returns the radii of laws of one size, each at every one of `alphas` instead of the rule's own. They equal those
-    /// of [`Self::radius`] and [`Self::radii`] one by one, to 5e-6 of themselves.
+    /// Returns the radii of laws with the same number of values, each at every one of `alphas` instead of the rule's
+    /// own alpha. They differ from [`Self::radius`] and [`Self::radii`] of each law by at most 5e-6 of themselves.
     ///
     /// Checked by: `laws_measured_together_are_measured_as_one_by_one`.
     pub fn radii_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<Radii>> {

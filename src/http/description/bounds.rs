@@ -23,24 +23,31 @@ use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
+use crate::control::request::limits::{GroupLimit, ShareRange, WeightLimits};
 use crate::control::request::means::MeansRule;
+use crate::control::request::plan::PlanQuestion;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::sampling_law::{MixtureComponent, SamplingLaw};
 use crate::control::request::specification::{
     DesignSpecification, HyperparameterBounds, ProblemSpecification, SurrogateSpecification, UtilitySpecification,
 };
+use crate::control::request::spending::Spending;
 use crate::control::request::support::Support;
 use crate::service::advice::advise::Advise;
 use crate::service::advice::advise_assets::AdviseAssets;
 use crate::service::advice::decide::Decide;
+use crate::service::advice::orders::OrdersQuestion;
 use crate::service::advice::policy_map::InputRange;
 use crate::service::advice::returns::ReadReturns;
 use crate::service::advice::sweep::SweepRange;
 use crate::service::advice::what_if::WhatIf;
 use crate::service::entries::report::{Correct, Observe, Report};
 use crate::service::field_bounds::LISTED_REPORTS;
+use crate::service::letter::links::MakeLink;
+use crate::service::letter::request::{Firm, SmallestTrade};
 use crate::service::sessions::opening::SessionStart;
 use crate::service::sessions::plan::{Renew, Renewing};
+use crate::service::subscriptions::Subscribe;
 use crate::store::Relabel;
 
 /// Adds to every schema the bounds of its fields.
@@ -81,6 +88,12 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<HyperparameterBounds>(),
         of::<AssetsProblem>(),
         of::<FundSpecification>(),
+        of::<Spending>(),
+        of::<PlanQuestion>(),
+        of::<PlanQuestion<AssetsProblem>>(),
+        of::<WeightLimits>(),
+        of::<ShareRange>(),
+        of::<GroupLimit>(),
         of::<MeansRule>(),
         of::<EvaluationRequest>(),
         of::<InitialHistories>(),
@@ -96,6 +109,10 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<Decide>(),
         of::<InputRange>(),
         of::<WhatIf>(),
+        of::<OrdersQuestion>(),
+        of::<Firm>(),
+        of::<SmallestTrade>(),
+        of::<MakeLink>(),
         of::<SweepRange>(),
         of::<Report>(),
         of::<Observe>(),
@@ -105,6 +122,7 @@ fn schemas() -> Vec<(Cow<'static, str>, &'static [FieldBounds])> {
         of::<Renew>(),
         of::<Renewing>(),
         of::<ReadReturns>(),
+        of::<Subscribe>(),
         ("OpenSession".into(), SessionStart::BOUNDS),
         of::<Relabel>(),
         ("OpenSession".into(), Relabel::BOUNDS),

@@ -17,8 +17,8 @@ use crate::http::site::asset::{Asset, HTML, SCRIPT, STYLE};
 /// because anybody may request it at any rate.
 pub type Published = &'static LazyLock<String>;
 
-/// The dashboard's policy, except that Swagger UI has pictures in its style sheet and makes markup from text, which it
-/// sanitises.
+/// The dashboard's content security policy, except that Swagger UI has pictures in its style sheet and makes markup from
+/// text, which it sanitises.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 

@@ -10,25 +10,19 @@ use utoipa::openapi::path::{Operation, ParameterIn};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::{ContentBuilder, OpenApi, Ref, RefOr, Response, ResponseBuilder};
 
+use crate::http::description::operations;
 use crate::http::gate::access::{Access, access};
 use crate::http::problem::ProblemKind;
 
 /// Operations that touch no store and take no input: except for addressing problems, they cannot fail while the process
 /// lives.
-const INFALLIBLE: [&str; 4] = ["/livez", "/openapi.json", "/docs", "/"];
+const INFALLIBLE: [&str; 5] = ["/livez", "/openapi.json", "/docs", "/llms.txt", "/"];
 
 /// Adds the missing problems; those that a handler describes itself stay.
 pub fn with_every_problem(description: &mut OpenApi) {
     for (path, item) in &mut description.paths.paths {
         let is_infallible = INFALLIBLE.contains(&path.as_str());
-        let operations = [
-            ("GET", &mut item.get),
-            ("POST", &mut item.post),
-            ("PATCH", &mut item.patch),
-            ("DELETE", &mut item.delete),
-        ];
-        for (method, operation) in operations {
-            let Some(operation) = operation else { continue };
+        for (method, operation) in operations(item) {
             if is_infallible {
                 describe(operation, &ADDRESSED);
                 continue;
@@ -91,7 +85,9 @@ fn by_deed(method: &str, path: &str) -> &'static [ProblemKind] {
         ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier") => {
             &[Kind::StorageFull, Kind::QuotaExceeded, Kind::QueueFull]
         }
-        ("POST", "/sessions" | "/policies/import") | ("PATCH", _) => &[Kind::StorageFull, Kind::QuotaExceeded],
+        ("POST", "/sessions" | "/sessions/import" | "/policies/import") | ("PATCH", _) => {
+            &[Kind::StorageFull, Kind::QuotaExceeded]
+        }
         _ => &[Kind::StorageFull],
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Some operations are open to everybody. `/livez` and `/readyz` answer with one word, and orchestrators call them
 //! without keys. The dashboard's page and files are the same for everybody, and people type their key there.
-//! `/openapi.json`, the page `/docs` and the guide describe a published program.
+//! `/openapi.json`, the page `/docs` and the guide describe a published program. `/letter` needs the secret of a link, and
+//! shows no more than that link's letter.
 //! Everything else reveals somebody's data, so it needs a key. This includes `/health` and `/metrics`, whose figures
 //! cover all tenants. An operation that is in no line of the table is for admins alone.
 //!
@@ -50,22 +51,39 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         (
             _,
             "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs" | "/docs/{file}" | "/guide"
-            | "/guide/{file}",
+            | "/guide/{file}" | "/llms.txt" | "/letter",
         ) => Access::Open,
-        ("POST", "/sessions" | "/observe" | "/sessions/{id}/corrections" | "/sessions/{id}/renewals")
+        (
+            "POST",
+            "/sessions"
+            | "/sessions/import"
+            | "/observe"
+            | "/sessions/{id}/corrections"
+            | "/sessions/{id}/renewals"
+            | "/sessions/{id}/links"
+            | "/subscriptions"
+            | "/subscriptions/{id}/secret"
+            | "/subscriptions/{id}/resend",
+        )
+        | ("DELETE", "/subscriptions/{id}" | "/links/{id}")
         | ("DELETE" | "PATCH", "/sessions/{id}") => Access::Role(KeyRole::Operate),
         ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier" | "/jobs/{id}/cancel" | "/policies/import")
         | ("DELETE", "/jobs/{id}" | "/policies/{id}")
         | ("PATCH", "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", "/key") => Access::AnyKey,
-        ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise" | "/decide" | "/returns") => Access::Role(KeyRole::Read),
+        ("GET" | "HEAD", _)
+        | (
+            "POST",
+            "/what-if" | "/orders" | "/advise" | "/plan" | "/sleeve" | "/decide" | "/returns" | "/sessions/{id}/letter",
+        )
+        | (_, "/mcp") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),
     }
 }
 
-/// The route of the one body that is large by nature.
-const LARGE_BODY: &str = "/policies/import";
+/// The routes whose bodies are large by nature.
+const LARGE_BODIES: [&str; 2] = ["/policies/import", "/sessions/import"];
 /// The route whose body holds a text, and its limit in bytes: the longest text that is read, with every second letter
 /// escaped.
 const TEXT_BODY: (&str, usize) = ("/returns", 12_000_000);
@@ -74,7 +92,7 @@ const TEXT_BODY: (&str, usize) = ("/returns", 12_000_000);
 #[derive(Clone)]
 pub struct Gate {
     pub service: Arc<Service>,
-    /// Limit on the body of an imported policy.
+    /// Limit on the body of an imported policy or session.
     pub large_body_bytes: usize,
     /// Limit on the body of any other request.
     pub body_bytes: usize,
@@ -107,7 +125,7 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
     }
     let access = access(request.method().as_str(), route);
     let limit = match route {
-        Some(LARGE_BODY) => gate.large_body_bytes,
+        Some(route) if LARGE_BODIES.contains(&route) => gate.large_body_bytes,
         Some(route) if route == TEXT_BODY.0 => gate.large_body_bytes.min(TEXT_BODY.1),
         _ => gate.body_bytes,
     };
@@ -222,7 +240,7 @@ impl Call {
     fn counted(self, class: Class) -> Result<Self, Refused> {
         match class {
             Class::Heavy => self.turn.count()?,
-            class => self.caller.allowance.take(class).map_err(|refused| Refused::TooOften(class, refused))?,
+            class => self.caller.allowance.take(class)?,
         }
         Ok(self)
     }

@@ -49,7 +49,7 @@ impl JsonBytes {
     /// other calls.
     ///
     /// # Errors
-    /// Those of `decode`, or if no permit came in time.
+    /// The errors of `decode`, or no permit became free in time.
     pub async fn decoded<T: Send + 'static>(
         self,
         decode: impl FnOnce(&[u8]) -> Result<T, ProblemDocument> + Send + 'static,

@@ -14,6 +14,11 @@ use crate::store::{OverQuota, Quota, StoreError};
 /// Wait before a tenant whose own work is in the way may call again.
 const OWN_WORK: Duration = Duration::from_secs(1);
 
+/// The rule of an idempotency key that was used.
+const SAME_BODY: &str = "must come with the same body as the first time; send another body with a new key";
+/// The rule of a session that is imported.
+const ELSEWHERE: &str = "must name a session that this service does not have; delete it here first";
+
 impl From<ServiceError> for ProblemDocument {
     fn from(error: ServiceError) -> Self {
         use ProblemKind as Kind;
@@ -25,12 +30,12 @@ impl From<ServiceError> for ProblemDocument {
                 problem(Kind::NotFound).naming(what, id, format!("must name a {what}"))
             }
             ServiceError::KeyConflict { key } => {
-                let rule = "must come with the same body as the first time; send another body with a new key";
-                problem(Kind::IdempotencyConflict).naming("Idempotency-Key", key, rule)
+                problem(Kind::IdempotencyConflict).naming("Idempotency-Key", key, SAME_BODY)
             }
             ServiceError::PolicyInUse { policy, .. } => {
                 problem(Kind::InUse).naming("policy", policy, "must not be used by any session")
             }
+            ServiceError::SessionExists { session } => problem(Kind::InUse).naming("session", session, ELSEWHERE),
             ServiceError::Refused(Refused::TooManyStreams { most }) => {
                 problem(Kind::TooManyRequests).naming("streams", most, format!("must be at most {most} at a time"))
             }

@@ -73,7 +73,7 @@ struct AdviseShape {
 
 #[derive(Deserialize)]
 pub(super) struct ProblemShape {
-    horizon: Option<IgnoredAny>,
+    pub(super) horizon: Option<IgnoredAny>,
     pub(in crate::http) assets: Option<IgnoredAny>,
     pub(in crate::http) states: Option<IgnoredAny>,
 }

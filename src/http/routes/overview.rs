@@ -1,5 +1,6 @@
 //! The list of sessions: searched, sorted, and page by page.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::extract::State;
@@ -16,6 +17,7 @@ use crate::http::routes::page::{self, Page};
 use crate::http::routes::wire::{SessionStatus, session_state};
 use crate::service::Service;
 use crate::service::catalogue::overview::Listed;
+use crate::service::entries::answer::StateSummary;
 use crate::service::entries::drift::DriftLevel;
 use crate::service::process::memory::Large;
 use crate::store::{
@@ -83,6 +85,11 @@ pub struct SessionEntry {
     pub holding: Option<f64>,
     /// Change of wealth in the last period; null before the first.
     pub wealth_change: Option<f64>,
+    /// Log-return of the last period, by which sessions that see one return can be compared. That of several assets is
+    /// the return of their fund. Null if it is missing, or if an earlier period was corrected since.
+    pub log_return: Option<f64>,
+    /// Log-returns of several assets in the last period, by name. Null as `log_return` is, and after any correction.
+    pub log_returns: Option<BTreeMap<String, Option<f64>>>,
     /// Last day that was reported.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
@@ -105,12 +112,15 @@ pub struct SessionEntry {
 
 impl From<Listed> for SessionEntry {
     fn from(Listed { row, stands, next, care }: Listed) -> Self {
+        let stands = stands.as_ref();
         SessionEntry {
             period: row.observations + 1,
             state: session_state(row.observations, row.horizon, row.is_due),
             wealth: stands.map_or(row.account.map(|account| account.wealth), |stands| stands.wealth),
             holding: stands.map_or(row.account.map(|account| account.holding), |stands| stands.holding),
             wealth_change: stands.and_then(|stands| stands.wealth_change),
+            log_return: stands.and_then(StateSummary::last_return),
+            log_returns: stands.and_then(StateSummary::last_returns).cloned(),
             date: stands.and_then(|stands| stands.date),
             drift: stands.map_or(DriftLevel::None, |stands| stands.drift.level),
             last_report_ms: row.last.map(|(_, reported_ms)| reported_ms),

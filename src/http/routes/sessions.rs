@@ -161,7 +161,7 @@ pub struct ActionQuery {
 /// A boolean query parameter, which arrives as text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Flag {
+pub(super) enum Flag {
     True,
     False,
 }

@@ -188,7 +188,7 @@ pub struct OpenSession {
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset at the start. Default: 0.
     pub holding: Option<f64>,
-    /// Share of wealth in each of several assets at the start, by their names. Default: 0.
+    /// Share of wealth in each of several assets at the start, by name. Default: 0.
     #[serde(default, deserialize_with = "distinct_if_given")]
     pub holdings: Option<BTreeMap<String, f64>>,
     /// States of a declared problem at the start, by name. Default: the problem's own start.

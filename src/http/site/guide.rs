@@ -1,7 +1,8 @@
 //! The documents of this project as a site, embedded, at `/guide` and below `/guide/`.
 //!
 //! The pages are the Markdown files of the repository, turned into HTML at the first request. So they describe the
-//! running version, and can be read on a machine without a network.
+//! running version, and can be read on a machine without a network. Programs read the same pages as Markdown, and
+//! `/llms.txt` lists them.
 
 use std::sync::LazyLock;
 
@@ -10,8 +11,9 @@ use axum::response::Response;
 
 use crate::http::gate::extract::Id;
 use crate::http::problem::ProblemDocument;
-use crate::http::site::asset::{Asset, HTML, STYLE};
+use crate::http::site::asset::{Asset, HTML, MARKDOWN, STYLE};
 
+mod markdown;
 mod page;
 
 /// The policy of the pages, which allows no script at all.
@@ -51,11 +53,16 @@ const PARTS: &[(&str, &[GuidePage])] = documents! {
         "beside" "Compared with other tools" "docs/beside.md",
     ],
     "How to": [
+        "plan" "Plan what to spend" "docs/plan.md",
+        "sleeve" "Size a strategy" "docs/sleeve.md",
+        "letters" "Write letters to clients" "docs/letters.md",
         "backtest" "Run a walk-forward" "docs/backtest.md",
         "evaluation" "Evaluate a policy" "docs/evaluation.md",
         "declared" "Solve a problem of your own" "docs/declared.md",
         "templates" "Start from one of eight problems" "docs/templates.md",
         "python" "Use it from Python" "clients/python/README.md",
+        "agents" "Use it from an agent" "docs/agents.md",
+        "subscriptions" "Be told of events" "docs/subscriptions.md",
         "keys" "Give out keys" "docs/keys.md",
         "operating" "Operate it" "docs/operating.md",
         "replicas" "Run replicas" "docs/replicas.md",
@@ -81,6 +88,24 @@ fn documents() -> impl Iterator<Item = &'static GuidePage> {
 
 static PAGES: LazyLock<Vec<Asset>> =
     LazyLock::new(|| documents().map(|document| Asset::new((document.name, HTML, page::made(document)))).collect());
+
+static MARKDOWN_PAGES: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+    let name = |document: &GuidePage| &*format!("{}.md", document.name).leak();
+    documents().map(|document| Asset::new((name(document), MARKDOWN, markdown::made(document).as_bytes()))).collect()
+});
+
+/// Returns the name and the title of every page.
+pub fn titles() -> impl Iterator<Item = (&'static str, &'static str)> {
+    documents().map(|document| (document.name, document.title))
+}
+
+/// Returns a page as Markdown; `None` if there is no page of this name.
+pub fn markdown(name: &str) -> Option<&'static str> {
+    let page = documents().zip(MARKDOWN_PAGES.iter()).find(|(document, _)| document.name == name);
+    page.and_then(|(_, page)| std::str::from_utf8(page.bytes()).ok())
+}
+
+static LIST: LazyLock<Asset> = LazyLock::new(|| Asset::new(("llms.txt", MARKDOWN, markdown::list().leak().as_bytes())));
 
 /// The policy of a picture that has its own colours for light and dark.
 const DRAWING_SECURITY_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'";
@@ -108,14 +133,27 @@ pub async fn start(headers: HeaderMap) -> Response {
     PAGES[0].served(CONTENT_SECURITY_POLICY, &headers)
 }
 
-/// Serves a page of the guide, or a picture.
+/// Lists the pages of the guide for language models (llmstxt.org), as Markdown.
+#[utoipa::path(get, path = "/llms.txt", tag = "operations",
+    responses(
+        (status = 200, description = "The list.", body = String, content_type = "text/markdown"),
+        (status = 304, description = "The list still matches `If-None-Match`.")))]
+pub async fn llms(headers: HeaderMap) -> Response {
+    LIST.served(CONTENT_SECURITY_POLICY, &headers)
+}
+
+/// Serves a page of the guide, or a picture. With `.md` after its name a page is Markdown.
 #[utoipa::path(get, path = "/guide/{file}", tag = "operations", params(("file" = String, Path, description = "The name of the page or picture.")),
     responses(
         (status = 200, description = "The page or the picture.", body = String, content_type = "text/html"),
         (status = 304, description = "The file still matches `If-None-Match`."),
         (status = 404, description = "There is no such page.", body = ProblemDocument, content_type = "application/problem+json")))]
 pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, ProblemDocument> {
-    let files: &[Asset] = if name.contains('.') { &FILES } else { &PAGES };
+    let files: &[Asset] = match name.rsplit_once('.') {
+        None => &PAGES,
+        Some((_, "md")) => &MARKDOWN_PAGES,
+        Some(_) => &FILES,
+    };
     let policy = if name.ends_with(".svg") { DRAWING_SECURITY_POLICY } else { CONTENT_SECURITY_POLICY };
     Ok(Asset::find(files, &name, "the guide")?.served(policy, &headers))
 }

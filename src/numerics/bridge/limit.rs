@@ -28,7 +28,7 @@ const TERMS: usize = 64;
 const REACH: f64 = 6.5;
 /// The largest distance between points; it is also at most the deviation of the shortest step.
 const WIDEST: f64 = 0.1;
-/// The range of a step in deviations; 2e-11 of its mass beyond it is ignored.
+/// The range of a step, in deviations; the mass beyond it, 2e-11, is ignored.
 const FARTHEST: f64 = 6.7;
 /// End of the series, in deviations of H beyond its mean.
 const TAIL: f64 = 6.0;

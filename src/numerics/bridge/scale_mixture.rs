@@ -83,18 +83,20 @@ impl ScaleMixture {
     }
 
     /// Returns the `share`-quantile of R h from draws of h, none of them negative. `share` must be in [0.001, 0.999],
-    /// where the polynomial approximates F. Cost O(draws), here and below.
+    /// where the polynomial approximates F. Cost O(draws).
     pub fn quantile(&self, share: f64, draws: &[f64]) -> f64 {
         self.quantile_within(TOLERANCE, share, draws, 0.0, &mut LastQuantile::default())
     }
 
-    /// Returns the quantile to 5e-6 of itself, for one of many sets of similar draws. If the draws change along a line,
-    /// `at` is their position on it; otherwise it is always the same number.
+    /// Returns the quantile with a relative error of at most 5e-6, for one of many sets of similar draws. If the draws
+    /// change along a line, `at` is their position on it; otherwise it is always the same number. `share` is as in
+    /// [`Self::quantile`]. Cost O(draws).
     pub fn quantile_next(&self, share: f64, draws: &[f64], at: f64, last: &mut LastQuantile) -> f64 {
         self.quantile_within(NEXT_TOLERANCE, share, draws, at, last)
     }
 
     /// Returns the quantile with its standard error: the standard error of the mean of F(q / h), over the density at q.
+    /// `share` is as in [`Self::quantile`]. Cost O(draws).
     pub fn quantile_with_error(&self, share: f64, draws: &[f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, 0.0, &mut last);

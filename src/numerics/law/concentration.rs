@@ -3,8 +3,8 @@
 //!
 //! In both, W1(F_n, F) is the integral of |F_n - F| over the interval, and returns are independent.
 
-/// Returns the radius for values whose weights fall by the factor `retention` from each to the one before: the smaller
-/// bound of two if weights are equal, else that of McDiarmid alone.
+/// Returns the radius. A value weighs `retention` times as much as the next later one. If weights are equal, the radius
+/// is the smaller of the bounds of Massart and McDiarmid; otherwise it is the bound of McDiarmid.
 ///
 /// Checked by: `no_law_leaves_its_ball_more_often_than_stated`.
 pub fn radius(alpha: f64, effective_size: f64, retention: f64) -> f64 {

@@ -17,6 +17,20 @@ pub fn signed(value: f64, decimals: usize) -> String {
     if is_zero(&text) { text.trim_start_matches(['-', '+']).to_owned() } else { text }
 }
 
+/// Puts a comma between the thousands of a number that is written in decimals: 1234567.5 as 1,234,567.5.
+pub fn grouped(text: &str) -> String {
+    let start = text.find(|character: char| character.is_ascii_digit()).unwrap_or(text.len());
+    let whole = text[start..].find('.').unwrap_or(text.len() - start);
+    let mut out = text[..start].to_owned();
+    for (place, digit) in text[start..].char_indices() {
+        if (1..whole).contains(&place) && (whole - place).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
 /// Returns the number of decimals at which two numbers differ by at least five units of the last: at least `least`, and
 /// at most 6.
 pub fn deciding(one: f64, other: f64, least: usize) -> usize {
@@ -40,6 +54,12 @@ mod tests {
         );
         assert_eq!([-0.004, 0.004, 0.006, -1.5].map(|value| signed(value, 2)), ["0.00", "0.00", "+0.01", "-1.50"]);
         assert_eq!(fixed(f64::NAN, 2), "NaN");
+    }
+
+    #[test]
+    fn thousands_are_set_apart() {
+        let texts = ["0", "999", "1000", "-1234567.5678", "+12345", "0.123456", "NaN"];
+        assert_eq!(texts.map(grouped), ["0", "999", "1,000", "-1,234,567.5678", "+12,345", "0.123456", "NaN"]);
     }
 
     #[test]

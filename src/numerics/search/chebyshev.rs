@@ -50,7 +50,7 @@ pub fn even(low: f64, high: f64, count: usize) -> Vec<f64> {
 /// `nodes` must be ascending and distinct, at least one. Error O(h^4) times the fourth derivative.
 pub fn local_cubic(nodes: &[f64], position: f64) -> (usize, [f64; 4]) {
     let count = nodes.len().min(4);
-    let above = nodes.partition_point(|&node| node < position);
+    let above = below(nodes, position);
     let first = above.saturating_sub(2).min(nodes.len() - count);
     let mut weights = [0.0; 4];
     for i in 0..count {
@@ -65,9 +65,39 @@ pub fn local_cubic(nodes: &[f64], position: f64) -> (usize, [f64; 4]) {
     (first, weights)
 }
 
+/// Returns how many ascending nodes lie below a position. Even nodes cost no search.
+fn below(nodes: &[f64], position: f64) -> usize {
+    let last = nodes.len() - 1;
+    let share = (position - nodes[0]) / (nodes[last] - nodes[0]);
+    let near = ((share * last as f64) as usize).min(last);
+    let is_it = |below: &usize| {
+        nodes[..*below].last().is_none_or(|node| *node < position)
+            && nodes.get(*below).is_none_or(|node| position <= *node)
+    };
+    let guessed = [near + 1, near, (near + 2).min(nodes.len())].into_iter().find(is_it);
+    guessed.unwrap_or_else(|| nodes.partition_point(|&node| node < position))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::RngExt;
+
+    #[test]
+    fn nodes_below_a_position_are_those_of_a_search() {
+        let mut random = crate::numerics::machine::streams::stream(1, "nodes below", 0, 0);
+        for count in 1..200 {
+            let mut uneven: Vec<f64> = (0..count).map(|_| random.random_range(-1.0..1.0_f64).powi(3)).collect();
+            uneven.sort_unstable_by(f64::total_cmp);
+            for nodes in [even(-0.3, 0.7, count.max(2)), uneven] {
+                let ends = [f64::NEG_INFINITY, f64::NAN, f64::INFINITY];
+                let drawn: Vec<f64> = (0..20).map(|_| random.random_range(-1.2..1.2)).collect();
+                for position in nodes.iter().chain(&drawn).chain(&ends) {
+                    assert_eq!(below(&nodes, *position), nodes.partition_point(|node| node < position), "{position}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn both_reproduce_a_cubic() {

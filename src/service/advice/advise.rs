@@ -91,6 +91,7 @@ impl Advise {
             let rule = "must be 1 or left out: this call advises one period. Train a policy for more";
             return Err(FieldError::new("problem.horizon", self.problem.horizon, rule));
         }
+        self.problem.check_without_spending("this call advises one period. Ask for a plan, or train a policy")?;
         if let Some(wealth) = self.wealth {
             rules::wealth("wealth", wealth)?;
             self.problem.initial_wealth = wealth;

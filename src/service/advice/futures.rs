@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
 use crate::control::policy::futures::declared::DeclaredPlayer;
 use crate::control::policy::futures::investor::InvestorPlayer;
 use crate::control::policy::futures::{Futures, GamePlayer, Opening, PlayedPath, World, checked_paths};
@@ -19,6 +20,12 @@ const FIGURE_BYTES: usize = 100;
 /// Periods that are played under one permit: a robust step of each takes about a millisecond.
 const PERIODS_A_TURN: usize = 100;
 
+/// Checks that futures end with what counts.
+fn check_futures(advisor: &Advisor) -> Result<(), FieldError> {
+    let why = "futures end with terminal wealth; a plan shows spending";
+    advisor.specification().problem.check_without_spending(why)
+}
+
 impl Sessions {
     /// Returns the futures of a policy from its start.
     ///
@@ -32,6 +39,7 @@ impl Sessions {
     ) -> Result<Large<Futures>, ServiceError> {
         match self.policies.policy(tenant, policy).await? {
             PreparedPolicy::Investor(advisor) => {
+                check_futures(&advisor)?;
                 let start = advisor.initial_state(None, None)?;
                 self.played(tenant, InvestorPlayer::opening(advisor, 0, start), paths).await
             }
@@ -58,6 +66,7 @@ impl Sessions {
         let mut futures = match &live.standing {
             SessionState::Account(account) => {
                 let advisor = self.advisor(tenant, &live).await?;
+                check_futures(&advisor)?;
                 self.played(tenant, InvestorPlayer::opening(advisor, step, account.state.clone()), paths).await?
             }
             SessionState::Declared(at) => {

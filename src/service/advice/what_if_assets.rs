@@ -13,6 +13,7 @@ use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::control::problem::dynamics::Dynamics;
 use crate::service::entries::report::Report;
 use crate::service::sessions::account_state::AccountState;
+use crate::service::sessions::advised::AdvisedShares;
 use crate::service::sessions::assets::shares;
 use crate::service::sessions::fund_advice::FundAdvice;
 use crate::service::sessions::live::LiveSession;
@@ -108,7 +109,7 @@ impl WhatIfScenario {
         }
         let (mut period, mut log_returns) = (observed + 1, None);
         if let (Some((field, report)), Some(following)) = (report, following) {
-            let advised = advisor.advise(step, &standing.state, AdviceMode::Surrogate).allocation;
+            let advised = AdvisedShares::of(&advisor.advise(step, &standing.state, AdviceMode::Surrogate));
             let passed = standing.after(dynamics, period, &report, (advised, None)).map_err(|error| {
                 match error.field.as_str() {
                     "wealth" => FieldError { field: field.into(), ..error },

@@ -135,10 +135,10 @@ impl Allowance {
     /// Takes one call from the rate of the class.
     ///
     /// # Errors
-    /// The rate limit is reached.
-    pub fn take(&self, class: Class) -> Result<(), TooMany> {
+    /// [`Refused::TooOften`].
+    pub fn take(&self, class: Class) -> Result<(), Refused> {
         let now = u64::try_from(self.epoch.elapsed().as_nanos()).unwrap_or(u64::MAX / 2);
-        self.buckets[class as usize].take(now)
+        self.buckets[class as usize].take(now).map_err(|refused| Refused::TooOften(class, refused))
     }
 
     /// Acquires a permit for an event stream.
@@ -198,7 +198,7 @@ impl HeavyPermit {
     /// [`Refused::TooOften`].
     pub fn count(&self) -> Result<(), Refused> {
         if self.counted.get().is_none() {
-            self.allowance.take(Class::Heavy).map_err(|refused| Refused::TooOften(Class::Heavy, refused))?;
+            self.allowance.take(Class::Heavy)?;
             self.counted.get_or_init(|| ());
         }
         Ok(())

@@ -1,17 +1,17 @@
 //! Work that requests cause, bounded and shared fairly between tenants.
 //!
-//! A piece of work begins in a place of the first stage, of which a tenant has half at most, and keeps it for 100 ms.
-//! Longer work goes on in the second stage, whose places are fewer than the processors, in turns of 100 ms. Every second
-//! turn goes to the piece that has worked least, the others go round the tenants. So a short question waits for moments,
-//! however long the questions of others are, and long questions share what is left. A question about a long record
-//! begins in the second stage, because measuring its radius takes longer than a moment and cannot be interrupted.
-//! Each stage has a queue for every tenant.
+//! A piece of work begins with a permit of the first stage and keeps it for 100 ms. A tenant may hold half of these
+//! permits at most. Longer work continues in the second stage, which has fewer permits than there are processors, in
+//! turns of 100 ms. Every second turn goes to the piece that has worked least, the others go to one tenant after the
+//! other. So a short question waits for moments only, however long the questions of others are, and long questions
+//! share what is left. A question about a long record begins in the second stage, because measuring its radius takes
+//! longer than a moment and cannot be interrupted. Each stage has a queue for every tenant.
 //!
 //! The queue of the second stage is bounded. When it is full, the tenant with the most pieces in it loses one; if every
 //! tenant has one, the piece that has worked longest is refused.
 //!
 //! A piece whose caller is gone, by a time limit, a closed connection or the end of the service, ends at its next
-//! checkpoint (see [`interruption`]). A piece that waits too long for a place of the first stage is refused.
+//! checkpoint (see [`interruption`]). A piece that waits too long for a permit of the first stage is refused.
 //! Checked by: the tests below and `tests/operation/interruption.rs`.
 
 mod stage;
@@ -35,12 +35,13 @@ pub(in crate::service) const LONG_WAITING: usize = 16;
 /// The measurement of the radius of a record with more returns takes longer than the first stage.
 const LONG_RECORD: usize = 1000;
 
-/// Runs blocking work, so much of it at a time.
+/// Runs blocking work, with a limit on how much of it runs at a time.
 #[derive(Clone)]
 pub struct FairQueue {
     /// The name of the work in traces and metrics.
     pub name: &'static str,
-    /// Pieces of one tenant that may begin at a time: half of all, so that others find places.
+    /// The most pieces of one tenant in the first stage at a time: half of all permits, so that some are left for
+    /// others.
     pub of_one: usize,
     queues: Arc<[Mutex<StageQueue<Granted>>; 2]>,
     wait: Duration,
@@ -76,7 +77,7 @@ struct Piece {
     held: Mutex<PieceState>,
 }
 
-/// The place of a piece and the time it has had.
+/// The permit of a piece and the time it has worked.
 struct PieceState {
     /// `None` while it waits.
     place: Option<Permit>,
@@ -96,8 +97,8 @@ impl FairQueue {
     /// Runs `work` on a thread that may block. It ends early if the future is dropped.
     ///
     /// # Errors
-    /// [`ServiceError::Busy`] if no place became free in time, [`Refused::OwnWork`] if the tenant had all it may have; a panic
-    /// of `work`.
+    /// [`ServiceError::Busy`] if no permit became free in time, [`Refused::OwnWork`] if the tenant held all that it
+    /// may; a panic of `work`.
     pub async fn run<T: Send + 'static>(
         &self,
         tenant: &Tenant,
@@ -106,8 +107,8 @@ impl FairQueue {
         self.run_and_prepare(tenant, move || (work(), || ())).await
     }
 
-    /// Runs `work` as [`Self::run`] does. It returns the answer and a preparation for later calls, which runs in the same
-    /// place once the caller has the answer.
+    /// Runs `work` as [`Self::run`] does. The work returns the answer and a preparation for later calls, which runs
+    /// under the same permit once the caller has the answer.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -168,12 +169,12 @@ impl FairQueue {
         answer
     }
 
-    /// Pieces that wait for a place.
+    /// Returns the number of pieces that wait for a permit.
     pub fn waiting(&self) -> usize {
         [Stage::First, Stage::Long].map(|stage| self.stage(stage).waiting()).into_iter().sum()
     }
 
-    /// Waits for a place to begin in.
+    /// Waits for a permit to begin with.
     async fn begin(&self, stage: Stage, tenant: &Tenant) -> Result<Permit, ServiceError> {
         let Some(granted) = self.ask(stage, tenant, 0)? else { return Ok(self.place(stage, tenant.clone())) };
         if stage == Stage::Long {
@@ -186,10 +187,10 @@ impl FairQueue {
         tokio::time::timeout(self.wait, granted).await.map_err(late)?.map_err(ServiceError::internal)?
     }
 
-    /// Takes a place and returns `None` if there is one for the tenant; else queues for it.
+    /// Takes a permit and returns `None` if there is one for the tenant; otherwise queues for one.
     ///
     /// # Errors
-    /// The queue is full, and no other piece should make room.
+    /// The queue is full, and no other piece has to make room.
     fn ask(
         &self,
         stage: Stage,
@@ -257,13 +258,13 @@ impl Watcher for Piece {
     }
 }
 
-/// Refuses a piece for want of a place, if its tenant has `own` others there.
+/// Returns the refusal of a piece for which there is no room, when its tenant has `own` others there.
 fn too_many(own: usize) -> ServiceError {
     if own > 0 { Refused::OwnWork.into() } else { ServiceError::Busy }
 }
 
 impl Piece {
-    /// Waits for a place or a refusal; `None` if the caller goes away first.
+    /// Waits for a permit or a refusal; `None` if the caller goes away first.
     fn wait_for(&self, granted: oneshot::Receiver<Granted>) -> Option<Granted> {
         let mut caller = self.caller.clone();
         Handle::current().block_on(async {
@@ -322,7 +323,7 @@ mod tests {
         (passed, tokio::spawn(async move { bounded.run(&of, work).await }))
     }
 
-    /// Waits until every place is free: so many of the first stage, and of the second.
+    /// Waits until every permit is free: the given numbers of the first stage and of the second.
     async fn all_free(bounded: &FairQueue, [first, long]: [usize; 2]) {
         let is_free = |(stage, places): (Stage, usize)| {
             let queue = bounded.stage(stage);
@@ -398,7 +399,7 @@ mod tests {
         all_free(&bounded, [2, 1]).await;
     }
 
-    /// The first moment over, long pieces share one place, and what begins meanwhile begins at once.
+    /// Once their first turn is over, long pieces share one permit, and a piece that begins meanwhile begins at once.
     #[tokio::test]
     async fn long_work_leaves_its_place_and_takes_turns() {
         let bounded = bounded(1, 1);
@@ -418,7 +419,8 @@ mod tests {
         all_free(&bounded, [1, 1]).await;
     }
 
-    /// A tenant fills the queue; the next piece of its own is refused, and one of another takes a place in it.
+    /// A tenant fills the queue; the next piece of its own is refused, and one of another tenant replaces a piece in
+    /// it.
     #[tokio::test]
     async fn a_full_queue_takes_from_the_tenant_with_most() {
         let bounded = bounded(1, 1);
@@ -452,7 +454,7 @@ mod tests {
         all_free(&bounded, [1, 1]).await;
     }
 
-    /// A question about a long record that cannot be interrupted takes no place of the first stage.
+    /// A question about a long record that cannot be interrupted takes no permit of the first stage.
     #[tokio::test]
     async fn a_long_record_begins_in_the_second_stage() {
         let bounded = bounded(1, 1);

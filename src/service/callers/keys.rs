@@ -19,6 +19,7 @@ use sha2::{Digest, Sha256};
 use crate::control::error::FieldError;
 use crate::service::callers::allowance::{Allowance, Limits};
 use crate::service::callers::identity;
+pub use crate::service::callers::rejected::Rejected;
 pub use crate::service::callers::secret::{PREFIX, Secret};
 use crate::service::error::ServiceError;
 use crate::service::process::clock::Clock;
@@ -173,30 +174,6 @@ pub struct KeyFigures {
     pub used_ms: Option<i64>,
 }
 
-/// Why a caller is rejected. The text of the key is not repeated.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Rejected {
-    /// No key was given.
-    NoKey,
-    /// The key is not in force.
-    WrongKey {
-        /// Tenant of the key until it was revoked; for operators only.
-        of: Option<Tenant>,
-    },
-    /// The key expired at that time. Only callers with its text learn this.
-    Expired { of: Tenant, expires_ms: i64 },
-}
-
-impl Rejected {
-    /// Builds the rejection of an ended key of the tenant.
-    fn of(tenant: &Tenant, expires_ms: Option<i64>, is_revoked: bool) -> Self {
-        match expires_ms.filter(|_| !is_revoked) {
-            Some(expires_ms) => Rejected::Expired { of: tenant.clone(), expires_ms },
-            None => Rejected::WrongKey { of: Some(tenant.clone()) },
-        }
-    }
-}
-
 /// The keys in force, as of the last read of the store.
 pub struct KeysInForce {
     store: Store,
@@ -257,6 +234,12 @@ impl KeysInForce {
                 None => Err(Rejected::WrongKey { of: None }),
             },
         }
+    }
+
+    /// Returns the allowance that the calls of a tenant share.
+    pub(in crate::service) fn allowance(&self, tenant: &Tenant) -> Arc<Allowance> {
+        let known = self.read();
+        known.allowances.get(tenant).cloned().unwrap_or_else(|| Arc::new(Allowance::new(&self.limits)))
     }
 
     /// Returns every key in force that this process knows.

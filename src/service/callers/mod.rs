@@ -6,5 +6,6 @@ pub mod fair_queue;
 pub(super) mod identity;
 pub(super) mod key_refresh;
 pub mod keys;
+pub(super) mod rejected;
 pub(super) mod secret;
 pub(super) mod turns;

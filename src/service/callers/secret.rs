@@ -2,9 +2,7 @@
 
 use std::fmt;
 
-use rand::TryRng;
-use rand::rngs::SysRng;
-
+use crate::service::callers::identity::random_bytes;
 use crate::service::error::ServiceError;
 
 /// Prefix of a key, so that people and repository scanners recognise one.
@@ -19,16 +17,21 @@ impl Secret {
     /// # Errors
     /// The operating system gives no random bits.
     pub fn new() -> Result<Self, ServiceError> {
-        let mut bits = [0u8; 32];
-        SysRng.try_fill_bytes(&mut bits).map_err(|error| ServiceError::Internal(format!("no random bits: {error}")))?;
-        let digits: String = bits.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Secret(format!("{PREFIX}{digits}")))
+        Ok(Secret(format!("{PREFIX}{}", random_digits()?)))
     }
 
     /// Returns the text, to show it to its new owner.
     pub fn reveal(&self) -> &str {
         &self.0
     }
+}
+
+/// Draws 256 random bits, in hexadecimal.
+///
+/// # Errors
+/// The operating system gives no random bits.
+pub fn random_digits() -> Result<String, ServiceError> {
+    Ok(random_bytes::<32>()?.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 impl fmt::Debug for Secret {

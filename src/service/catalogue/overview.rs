@@ -41,6 +41,13 @@ pub struct Overview {
     pub care: Option<CareCounts>,
 }
 
+/// Returns the last day on which the next report of a session is not late, if its policy has a calendar.
+pub(in crate::service) fn next_report(row: &SessionSummary, stands: Option<&StateSummary>) -> Option<Date> {
+    let last_date = stands.and_then(|stands| stands.date);
+    let from = last_date.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
+    next_day(from?, row.periods_per_year?)
+}
+
 impl Sessions {
     /// Lists sessions of the caller's tenant that match the query, one statement after the other under one permit.
     ///
@@ -72,18 +79,15 @@ impl Sessions {
         let damaged = damaged.collect();
         let listed = |row: SessionSummary| {
             let stands: Option<StateSummary> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
-            let last_date = stands.and_then(|stands| stands.date);
-            let from =
-                last_date.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
             let is_active = row.observations < row.horizon || row.is_due;
-            let next = row.periods_per_year.filter(|_| is_active).and_then(|periods| next_day(from?, periods));
+            let next = next_report(&row, stands.as_ref()).filter(|_| is_active);
             let is_last = row.observations + 1 >= row.horizon && !row.is_renewed;
             let needs = |care: &Attention| match care {
                 Attention::Ending => !is_active || is_last,
                 _ if !is_active => false,
                 Attention::Overdue => next.zip(today).is_some_and(|(next, today)| next < today),
                 Attention::Renewal => row.is_due,
-                Attention::Alarm => stands.is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
+                Attention::Alarm => stands.as_ref().is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
             };
             let care = Attention::ALL.into_iter().filter(needs).collect();
             Ok(Listed { row, stands, next, care })

@@ -131,7 +131,7 @@ impl Policies {
         returns: usize,
         periods: usize,
     ) -> Result<(), FieldError> {
-        self.memory.keeps(&[Footprint::of("history", returns, advisor.heaviest_bridges(returns, periods))])
+        self.memory.keeps(&[Footprint::of("history", returns, advisor.laws().radii.heaviest(returns, periods))])
     }
 
     /// Returns the one-period problem of a completed specification.
@@ -143,6 +143,14 @@ impl Policies {
         let returns = specification.problem.history.len();
         self.memory.keeps(&[Footprint::of("problem.history", returns, investor.bridges())])?;
         Ok(investor)
+    }
+
+    /// Returns the cache of recomputable results, if it has room for what the radius of `specification` needs.
+    ///
+    /// # Errors
+    /// As [`Self::one_period`].
+    pub(in crate::service) fn kept_for(&self, specification: &Specification) -> Result<Cache, FieldError> {
+        self.one_period(specification).map(|_| self.kept.clone())
     }
 
     /// Lists at most `limit` policies, newest first, after the policy with sequence `after`.

@@ -19,6 +19,9 @@ pub struct PeriodAccount {
     pub rate: f64,
     /// Money added at the end; negative if withdrawn.
     pub flow: f64,
+    /// Money spent at the start; left out if it is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spent: Option<f64>,
     /// Share of wealth bought and sold at the start, in all assets together.
     pub turnover: f64,
     /// Money that these trades cost.
@@ -27,7 +30,7 @@ pub struct PeriodAccount {
 }
 
 /// Wealth at the end of a period, had a simple rule been followed from the start of the session: with the same wealth,
-/// holdings, rates, flows and trading cost. Null once a rule cannot pay a withdrawal.
+/// holdings, rates, flows, spending and trading cost. Null once a rule cannot pay them.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Benchmarks {
     /// Equal shares of all wealth in every asset, restored at the start of each period.
@@ -78,12 +81,13 @@ impl FixedShares {
         };
     }
 
-    /// Returns the wealth after a period of these log-returns.
-    fn pass(&mut self, dynamics: Dynamics, log_returns: &[f64]) -> Option<f64> {
+    /// Returns the wealth after a period of these log-returns, at the start of which `spent` was spent.
+    fn pass(&mut self, (dynamics, spent): (Dynamics, f64), log_returns: &[f64]) -> Option<f64> {
         let shares = self.fund.shares(self.total);
         let (traded, log_return) = (self.fund.traded(&shares), self.fund.log_return(&shares, log_returns));
         let traded = traded + std::mem::take(&mut self.sold);
-        let (next, holding) = dynamics.next_after(self.wealth.take()?, traded, self.total, log_return);
+        let left = Some(self.wealth.take()? - spent).filter(|left| *left > 0.0)?;
+        let (next, holding) = dynamics.next_after(left, traded, self.total, log_return);
         self.fund.passed(&shares, log_returns, None, holding);
         self.wealth = (next > 0.0).then_some(next);
         self.wealth
@@ -125,17 +129,19 @@ pub(super) fn of(periods: &Periods) -> Result<Accounts, ServiceError> {
         }
         let Some(passed) = passage.next().map_err(ServiceError::of_recorded)? else { break };
         let ReplayedPeriod { before, seen, moved } = passed;
-        let AccountPeriod { turnover, dynamics, .. } = *moved.account()?;
+        let period = moved.account()?;
+        let AccountPeriod { turnover, spent, dynamics, .. } = *period;
         let moves = seen.moves();
         accounts.push(PeriodAccount {
             rate: dynamics.rate_per_step,
             flow: dynamics.contribution,
+            spent: period.reported_spending(),
             turnover,
             cost: before.account()?.state.wealth * dynamics.trading_cost * turnover,
             benchmarks: Benchmarks {
-                equal_weights: equal_weights.pass(dynamics, &moves),
-                initial_composition: initial.pass(dynamics, &moves),
-                bank: bank.pass(dynamics, &moves),
+                equal_weights: equal_weights.pass((dynamics, spent), &moves),
+                initial_composition: initial.pass((dynamics, spent), &moves),
+                bank: bank.pass((dynamics, spent), &moves),
             },
         });
     }

@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use crate::control::policy::advice::SpendingAdvice;
 use crate::service::entries::notes::{self, PeriodNote};
 use crate::service::entries::report::Report;
 use crate::service::error::ServiceError;
+use crate::service::sessions::advised::{AdvisedActions, AdvisedShares};
 use crate::service::sessions::assets::{Composition, ObservedAssets};
 use crate::service::sessions::content::answer;
-use crate::service::sessions::session_state::{AdvisedActions, SessionState};
+use crate::service::sessions::session_state::SessionState;
 use crate::store::EntryRow;
 
 /// The numbers of the answer to an observation.
@@ -19,19 +21,21 @@ pub(super) enum Acknowledged {
     Declared(Box<AcknowledgedProblem>),
 }
 
-/// Those of an investor.
+/// The numbers for a session of an investor.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct AcknowledgedAccount {
     log_return: Option<f64>,
     advised_allocation: f64,
     executed_allocation: f64,
+    advised_spending: Option<SpendingAdvice>,
+    spent: Option<f64>,
     wealth: f64,
     assets: Option<ObservedAssets>,
     #[serde(default)]
     notes: Vec<PeriodNote>,
 }
 
-/// Those of a declared problem.
+/// The numbers for a session of a declared problem.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct AcknowledgedProblem {
     noise: Option<f64>,
@@ -89,7 +93,10 @@ impl Acknowledged {
     /// Returns what was advised.
     pub(super) fn advised(&self) -> AdvisedActions {
         match self {
-            Acknowledged::Account(account) => AdvisedActions::Allocation(account.advised_allocation),
+            Acknowledged::Account(account) => AdvisedActions::Shares(AdvisedShares {
+                held: account.advised_allocation,
+                spent: SpendingAdvice::share_of(account.advised_spending),
+            }),
             Acknowledged::Declared(problem) => {
                 AdvisedActions::Actions(problem.advised.iter().flat_map(BTreeMap::values).copied().collect())
             }
@@ -108,7 +115,8 @@ impl Acknowledged {
 impl AcknowledgedAccount {
     fn report(&self, reported: &Report) -> Report {
         let Report { date, rate, flow, .. } = *reported;
-        let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::recorded() };
+        let spent = Some(self.spent.unwrap_or_default());
+        let common = Report { wealth: Some(self.wealth), date, rate, flow, spent, ..Report::recorded() };
         let of_lost = |asset| notes::is_lost(&self.notes, asset).then_some(f64::NEG_INFINITY);
         match &self.assets {
             Some(assets) => Report {

@@ -6,7 +6,7 @@ use jiff::civil::Date;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::policy::advice::Uncertainty;
+use crate::control::policy::advice::{SpendingAdvice, Uncertainty};
 use crate::control::problem::actions::Band;
 use crate::service::entries::drift::{Drift, DriftLevel};
 use crate::service::entries::notes::PeriodNote;
@@ -64,8 +64,8 @@ pub struct DeclaredObserved {
     pub earned: f64,
     /// The states after the period, by name.
     pub state: BTreeMap<String, f64>,
-    /// The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
-    /// period.
+    /// The last day of the period: the one reported, or else the next one due by the calendar. If that is unknown too,
+    /// it is the last day known of an earlier period.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
     /// True if the horizon is reached.
@@ -118,6 +118,12 @@ pub struct Observed {
     pub band: Band,
     pub advised_allocation: f64,
     pub executed_allocation: f64,
+    /// Spending that was advised for the start of the period, if the policy has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub advised_spending: Option<SpendingAdvice>,
+    /// Money spent at the start of the period; left out if it is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spent: Option<f64>,
     /// Wealth at the end of the period, including what was added to it.
     pub wealth: f64,
     /// Share of wealth in the risky asset after the return.
@@ -127,8 +133,8 @@ pub struct Observed {
     pub assets: Option<ObservedAssets>,
     /// Change of wealth over the period, including flows and wealth reported otherwise.
     pub wealth_change: f64,
-    /// The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
-    /// period.
+    /// The last day of the period: the one reported, or else the next one due by the calendar. If that is unknown too,
+    /// it is the last day known of an earlier period.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
     /// True if the horizon is reached and no policy is to follow.
@@ -169,8 +175,14 @@ pub struct Corrected {
 }
 
 /// The state of a session, as far as every answer that changes it reports it. A declared problem has no wealth.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct StateSummary {
+    /// The period that was reported or corrected.
+    period: usize,
+    /// Periods observed, after a correction.
+    observed: Option<usize>,
+    log_return: Option<f64>,
+    assets: Option<AssetReturns>,
     pub wealth: Option<f64>,
     pub holding: Option<f64>,
     pub wealth_change: Option<f64>,
@@ -179,6 +191,25 @@ pub struct StateSummary {
     /// Standard deviation of the log-returns in the law, if the moments determine it.
     #[serde(default, rename = "moments", deserialize_with = "deviation")]
     pub deviation: Option<f64>,
+}
+
+/// The returns of several assets in an answer to a report.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct AssetReturns {
+    log_returns: Option<BTreeMap<String, Option<f64>>>,
+}
+
+impl StateSummary {
+    /// Returns the log-return of the last period, unless the last answer is to a correction of an earlier one. That of
+    /// several assets is the return of their fund.
+    pub fn last_return(&self) -> Option<f64> {
+        self.log_return.filter(|_| self.observed.is_none_or(|observed| observed == self.period))
+    }
+
+    /// Returns the log-returns of several assets in the last period, unless the last answer is to a correction.
+    pub fn last_returns(&self) -> Option<&BTreeMap<String, Option<f64>>> {
+        self.assets.as_ref()?.log_returns.as_ref()
+    }
 }
 
 fn deviation<'a, D: Deserializer<'a>>(deserializer: D) -> Result<Option<f64>, D::Error> {

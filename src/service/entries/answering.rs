@@ -31,6 +31,8 @@ impl AccountState {
             band: advice.band,
             advised_allocation: advice.allocation,
             executed_allocation: moved.executed_allocation,
+            advised_spending: advice.spending,
+            spent: moved.reported_spending(),
             wealth: self.state.wealth,
             holding: self.state.holding,
             assets: self.assets.as_ref().map(|assets| ObservedAssets {

@@ -11,11 +11,15 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use crate::control::request::support::LawExtent;
 use crate::service::entries::days::{Days, days_between};
 use crate::service::jobs::due::{DAILY, next_day};
 
-/// A return further from the record than so many of its standard deviations is doubted.
+/// A return further from the mean of the record than so many of its standard deviations is doubted.
 const UNUSUAL_DEVIATIONS: f64 = 4.0;
+/// So is one beyond this many deviations that is this many times as far from the mean as any other on its side.
+const BEYOND_DEVIATIONS: f64 = 3.0;
+const BEYOND_ALL: f64 = 1.5;
 /// Log-returns this close count as equal: they may be rounded to two digits of a percent.
 pub(in crate::service) const ROUNDING: f64 = 1e-4;
 /// The most days from one trading day to the next, over a weekend and a holiday.
@@ -52,9 +56,9 @@ pub enum DoubtReason {
     EarlyDay,
     /// Its day lies after tomorrow.
     FutureDay,
-    /// Its return lies more than 4 standard deviations from the record.
+    /// Its return lies more than 4 standard deviations from the record, or more than 3 and far beyond all others.
     UnusualReturn,
-    /// Its noise lies more than 4 standard deviations from those known.
+    /// Its noise lies as far from those known.
     UnusualNoise,
     /// Its return is -100 %.
     TotalLoss,
@@ -74,7 +78,7 @@ impl Doubt {
         Doubt { reason, field: field.into(), value: value.into(), sentence, missing: Vec::new() }
     }
 
-    /// Returns the rule that the field breaks.
+    /// Returns the rule that a doubted field breaks if the report is not confirmed.
     pub fn rule(&self) -> String {
         format!("must come with \"confirm\": true if it is meant: {}", self.sentence)
     }
@@ -166,19 +170,28 @@ pub(in crate::service) fn of_repeat(period: usize, counted: usize) -> Doubt {
     Doubt::new(DoubtReason::Repeated, "period", period, sentence)
 }
 
-/// Returns how many standard deviations `value` lies from the mean of a record, if they are more than 4 and the distance
-/// exceeds `rounding`. They are infinite for a record whose values are all equal.
-fn unusual(value: f64, (mean, deviation): (f64, f64), rounding: f64) -> Option<f64> {
+/// Returns how many standard deviations `value` lies from the mean of a record, if that is unusual and the distance exceeds
+/// `rounding`: with the mean m, the deviation s and the furthest value e on the side of the value,
+///
+///   |value - m| > min(4 s, max(3 s, 1.5 |e - m|))
+///
+/// They are infinite for a record whose values are all equal.
+fn unusual(value: f64, record: &LawExtent, rounding: f64) -> Option<f64> {
+    let (mean, deviation) = (record.mean, record.variance.max(0.0).sqrt());
+    let [lowest, highest] = record.ends;
+    let furthest = ((if value < mean { lowest } else { highest }) - mean).abs();
+    let beyond = (BEYOND_ALL * furthest).max(BEYOND_DEVIATIONS * deviation);
     let distance = (value - mean).abs();
-    if distance <= (UNUSUAL_DEVIATIONS * deviation).max(rounding) {
+    if distance <= beyond.min(UNUSUAL_DEVIATIONS * deviation).max(rounding) {
         return None;
     }
     Some(distance / deviation)
 }
 
 /// Doubts the noise of a declared problem as [`of_return`] doubts a return.
-pub(in crate::service) fn of_noise(noise: f64, (mean, deviation): (f64, f64)) -> Option<Doubt> {
-    let deviations = unusual(noise, (mean, deviation), ROUNDING * mean.abs())?;
+pub(in crate::service) fn of_noise(noise: f64, known: &LawExtent) -> Option<Doubt> {
+    let mean = known.mean;
+    let deviations = unusual(noise, known, ROUNDING * mean.abs())?;
     let sentence = match deviations.is_finite() {
         true => format!("{noise} lies {deviations:.1} standard deviations from the noises known"),
         false => format!("{noise} differs from the noises known, which are all {mean}"),
@@ -186,26 +199,21 @@ pub(in crate::service) fn of_noise(noise: f64, (mean, deviation): (f64, f64)) ->
     Some(Doubt::new(DoubtReason::UnusualNoise, "noise", noise, sentence))
 }
 
-/// Doubts a total loss, and a log-return z that lies far from a record with mean m and standard deviation s: |z - m| > 4 s, at any size.
+/// Doubts a total loss, and a log-return that lies far from the record, at any size.
 /// Checked by: `tests/service/doubts.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
-pub(in crate::service) fn of_return(
-    field: &str,
-    value: f64,
-    (mean, deviation): (f64, f64),
-    log_return: f64,
-) -> Option<Doubt> {
+pub(in crate::service) fn of_return(field: &str, value: f64, record: &LawExtent, log_return: f64) -> Option<Doubt> {
     if log_return == f64::NEG_INFINITY {
         let sentence = "a return of -100 % is a total loss: a total loss is always doubted".to_owned();
         return Some(Doubt::new(DoubtReason::TotalLoss, field, value, sentence));
     }
-    let deviations = unusual(log_return, (mean, deviation), ROUNDING)?;
+    let deviations = unusual(log_return, record, ROUNDING)?;
     let percent = 100.0 * log_return.exp_m1();
     let sentence = match deviations.is_finite() {
         true => format!("a return of {percent:.2} % lies {deviations:.1} standard deviations from the record"),
         false => {
             format!(
                 "a return of {percent:.2} % differs from the record, in which every return is {:.2} %",
-                100.0 * mean.exp_m1()
+                100.0 * record.mean.exp_m1()
             )
         }
     };

@@ -253,7 +253,10 @@ impl Sessions {
 }
 
 /// Returns the corrections and the renewals, each in order.
-fn amendments(facts: &SessionFacts, periods: &Periods) -> Result<(Vec<Correction>, Vec<Renewal>), ServiceError> {
+pub(super) fn amendments(
+    facts: &SessionFacts,
+    periods: &Periods,
+) -> Result<(Vec<Correction>, Vec<Renewal>), ServiceError> {
     let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
     for entry in &facts.entries {
         match entry.kind {

@@ -3,6 +3,7 @@
 
 pub mod account;
 pub(super) mod acknowledged;
+pub(super) mod advice_events;
 pub mod answer;
 pub(super) mod answering;
 pub(super) mod assets_report;
@@ -13,6 +14,7 @@ pub mod declared_history;
 pub mod doubts;
 pub mod drift;
 pub mod history;
+pub mod moving;
 pub mod notes;
 pub mod periods;
 pub(super) mod record;
@@ -20,3 +22,4 @@ pub(super) mod recording;
 pub(super) mod renewal;
 pub mod report;
 pub mod reports;
+pub mod session_document;

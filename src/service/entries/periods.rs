@@ -238,6 +238,19 @@ impl Periods {
     }
 }
 
+impl Periods {
+    /// Returns the final state with every period computed again from its report, whatever was answered.
+    ///
+    /// # Errors
+    /// A recorded report does not keep the rules.
+    pub(super) fn recomputed(&self) -> Result<SessionState, ServiceError> {
+        let mut anew = self.clone();
+        anew.all.iter_mut().for_each(|period| period.stands = false);
+        let standing = anew.replay()?.standing;
+        Ok(standing)
+    }
+}
+
 impl<'a> Replay<'a> {
     /// Replays the next period: as acknowledged if that still holds, otherwise recomputed. `None` after the last.
     ///

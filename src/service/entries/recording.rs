@@ -11,6 +11,7 @@ use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
 use crate::service::callers::allowance::HeavyPermit;
 use crate::service::callers::keys::Caller;
+use crate::service::entries::advice_events::{BeforeReport, alarm, by_name};
 use crate::service::entries::answer::{Corrected, CorrectionAnswer, Observed};
 use crate::service::entries::corrections::AppliedCorrection;
 use crate::service::entries::doubts::{self, Doubts};
@@ -28,7 +29,7 @@ use crate::service::sessions::plan::{Renewed, SessionPlan};
 use crate::service::sessions::session_state::SessionState;
 use crate::service::sessions::slots::SlotGuard;
 use crate::service::sessions::{Name, Sessions};
-use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
+use crate::store::{Append, EntryKind, EntryRow, NewEvent, Store, Tenant};
 
 impl Sessions {
     /// Records the return of a period exactly once, durably before the answer. Returns an [`Observed`] in JSON as it
@@ -61,6 +62,7 @@ impl Sessions {
             let Packed { content_json, answer_json, numbers, sent } =
                 Packed::of(&report, &answer, live.standing.names())?;
             let (radius, drift) = answer.radius_and_drift();
+            let advised = if self.outbox.is_followed(tenant) { by_name(live) } else { None };
             let new = EntryRow {
                 session: session.clone(),
                 entry: live.seen.entries() + 1,
@@ -73,7 +75,7 @@ impl Sessions {
                 key: observe.reported_by.to_string(),
             };
             let levels = (live.standing.bet().level(), drift);
-            let next = LiveSession {
+            let mut next = LiveSession {
                 row: live.row.clone(),
                 names: live.names.clone(),
                 standing,
@@ -86,7 +88,8 @@ impl Sessions {
                 radius: Some(radius),
                 advice: None,
             };
-            if self.append(&self.store, &mut held, new, next, levels).await? {
+            let events = self.events(&means, BeforeReport { advised, levels }, &mut next).await?;
+            if self.append(&self.store, &mut held, (new, events), next, levels).await? {
                 return Ok(sent);
             }
         }
@@ -178,7 +181,8 @@ impl Sessions {
                 radius: Some(radius),
                 advice: None,
             };
-            if self.append(&self.store.by(caller.actor()), &mut held, new, next, levels).await? {
+            let events = alarm(&next, levels, self.clock.now_milliseconds()).into_iter().collect();
+            if self.append(&self.store.by(caller.actor()), &mut held, (new, events), next, levels).await? {
                 return Ok(sent);
             }
         }
@@ -207,23 +211,27 @@ impl Sessions {
         }
     }
 
-    /// Appends the entry that leads to `next`; returns false if another process wrote meanwhile. Counts a rise of the
-    /// drift level between the two `levels`. The slot is empty during the write, so that memory never runs ahead of the
-    /// disk.
+    /// Appends the entry that leads to `next`, with its events; returns false if another process wrote meanwhile. Counts
+    /// a rise of the drift level between the two `levels`. The slot is empty during the write, so that memory never runs
+    /// ahead of the disk.
     async fn append(
         &self,
         store: &Store,
         held: &mut SlotGuard<Name, LiveSession>,
-        new: EntryRow,
+        (new, events): (EntryRow, Vec<NewEvent>),
         next: LiveSession,
         levels: (DriftLevel, DriftLevel),
     ) -> Result<bool, ServiceError> {
         held.clear();
         let due = next.is_due().then(|| (next.row.tenant.clone(), next.row.session.clone()));
-        let appended = store.append(new).instrument(spans::of_write("append an entry")).await?;
+        let is_told = !events.is_empty();
+        let appended = store.append_with(new, events).instrument(spans::of_write("append an entry")).await?;
         let is_appended = self.after_append(held, appended, next)?;
         if is_appended {
             drift::count(levels.0, levels.1);
+            if is_told {
+                self.outbox.ring();
+            }
             // If the renewer's queue is full, its next round finds the session.
             due.map(|name| self.due.try_send(name));
         }

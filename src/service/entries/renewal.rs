@@ -151,7 +151,9 @@ struct Continuation {
 
 /// Returns the state and the terms that the renewal of an investor's session leads to.
 fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -> Result<Continuation, ServiceError> {
-    plan.renew.map_or(Ok(()), |every| every.check(&Terms::of(onto.specification())))?;
+    let terms = Terms::of(onto.specification());
+    // A plan may end before its next renewal is due.
+    plan.renew.filter(|_| !terms.ends).map_or(Ok(()), |every| every.check(&terms))?;
     let (observed, window) = (periods.all.len(), renew.window);
     let Replay { standing, mut record, .. } = periods.replay()?;
     let change = AssetChange::new((standing.names(), assets_of(onto)), renew, observed)?;

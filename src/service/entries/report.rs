@@ -91,6 +91,9 @@ macro_rules! reporting {
             /// Money added at the end of the period; negative if withdrawn. Default: the policy's contribution.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub flow: Option<f64>,
+            /// Money spent from wealth at the start of the period. Default: what was advised; nothing without spending.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub spent: Option<f64>,
             /// Share of wealth held in the risky asset through the period. Default: the advised allocation.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub executed_allocation: Option<f64>,
@@ -165,10 +168,10 @@ macro_rules! report_of {
             /// Returns the report alone, as it is recorded.
             pub(in crate::service) fn report(&self) -> Report {
                 let $name { log_return, simple_return, price, previous_price, missing, date, noise, .. } = *self;
-                let $name { rate, flow, executed_allocation, wealth, .. } = *self;
+                let $name { rate, flow, spent, executed_allocation, wealth, .. } = *self;
                 let $name { log_returns, simple_returns, prices, previous_prices, executed_allocations, .. } = self;
                 let $name { executed, state, .. } = self;
-                let done = Report { rate, flow, executed_allocation, wealth, ..Report::default() };
+                let done = Report { rate, flow, spent, executed_allocation, wealth, ..Report::default() };
                 let one = Report { log_return, simple_return, price, previous_price, missing, date, noise, ..done };
                 Report {
                     log_returns: log_returns.clone(),
@@ -235,6 +238,9 @@ impl Report {
         if let Some(flow) = self.flow {
             rules::within("flow", flow, -rules::WEALTH.1, rules::WEALTH.1)?;
         }
+        if let Some(spent) = self.spent {
+            rules::within("spent", spent, 0.0, rules::WEALTH.1)?;
+        }
         if let Some(wealth) = self.wealth {
             rules::wealth("wealth", wealth)?;
         }
@@ -281,6 +287,7 @@ impl Report {
             ("previous_price", self.previous_price.is_some()),
             ("rate", self.rate.is_some()),
             ("flow", self.flow.is_some()),
+            ("spent", self.spent.is_some()),
             ("executed_allocation", self.executed_allocation.is_some()),
             ("wealth", self.wealth.is_some()),
         ];

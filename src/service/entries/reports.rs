@@ -15,7 +15,7 @@ use futures_util::{StreamExt, stream};
 use tokio::sync::Semaphore;
 
 use crate::control::error::FieldError;
-use crate::service::callers::allowance::{Class, HeavyPermit, Refused};
+use crate::service::callers::allowance::{Class, HeavyPermit};
 use crate::service::callers::keys::Caller;
 use crate::service::entries::report::Observe;
 use crate::service::error::ServiceError;
@@ -68,7 +68,7 @@ impl Sessions {
                 let counted = if index == 0 { Ok(()) } else { caller.allowance.take(Class::Live) };
                 let outcome = match counted {
                     Ok(()) => self.report(caller, report, &turn).await,
-                    Err(refused) => Err(Refused::TooOften(Class::Live, refused).into()),
+                    Err(refused) => Err(refused.into()),
                 };
                 (index, Reported { session, period, outcome })
             }

@@ -238,7 +238,8 @@ impl Renewer {
         let policy = self.sessions.policies.policy(tenant, &live.current.policy).await?;
         let Large { value: facts, room: _room } = self.sessions.facts(tenant, session).await?;
         let standing = live.standing.clone();
-        let specify = move || next_problem(&policy, &standing, &facts, renew);
+        let at = (renew, live.step());
+        let specify = move || next_problem(&policy, &standing, &facts, at);
         let posed = self.sessions.resolving.run(tenant, specify).await??;
         let request = request(live, attempts.number, attempts.count);
         let parent = self.store.labels(tenant, &live.current.policy).await?;

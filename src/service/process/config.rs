@@ -8,6 +8,7 @@ use std::time::Duration;
 use crate::service::callers::allowance::Limits;
 use crate::service::callers::fair_queue::LONG_WAITING;
 use crate::service::process::memory::MemoryLimit;
+use crate::service::subscriptions::mail_server::MailServer;
 use crate::store::{PostgresUrl, Quotas};
 
 /// The location of the store.
@@ -56,6 +57,29 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
+/// How events are sent: as webhooks, and by e-mail.
+#[derive(Debug, Clone)]
+pub struct WebhookSettings {
+    /// Hosts that may have private addresses, and may be reached without encryption.
+    pub allowed: Vec<String>,
+    /// Sends e-mails; without it nobody can subscribe by e-mail.
+    pub mail: Option<MailServer>,
+    /// The time after the first attempt; it grows fourfold with each further one.
+    pub first_delay: Duration,
+    /// Attempts after which a delivery is given up.
+    pub attempts: usize,
+    /// The time between two looks for reports that are missing.
+    pub look: Duration,
+}
+
+impl Default for WebhookSettings {
+    /// Returns ten attempts within 20 hours.
+    fn default() -> Self {
+        let (first_delay, look) = (Duration::from_secs(5), Duration::from_secs(600));
+        WebhookSettings { allowed: Vec::new(), mail: None, first_delay, attempts: 10, look }
+    }
+}
+
 /// The configuration of one process.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -65,11 +89,11 @@ pub struct Config {
     pub operations_listen: Option<SocketAddr>,
     /// The certificate that encrypts connections, if any.
     pub tls: Option<TlsFiles>,
-    /// If true, addresses that others can reach may be served without encryption.
+    /// If true, addresses that other machines can reach may be served without encryption.
     pub allow_plaintext: bool,
     /// Host names that the service accepts besides its own while it needs no key.
     pub hosts: Vec<String>,
-    /// If true, addresses that others can reach may be served while the store holds no key.
+    /// If true, addresses that other machines can reach may be served while the store holds no key.
     pub allow_anonymous: bool,
     /// If true, a store without a key is not served at all.
     pub require_keys: bool,
@@ -80,6 +104,7 @@ pub struct Config {
     pub quotas: Quotas,
     /// Ended jobs are deleted after this time; never if it is `None`.
     pub retain_jobs: Option<Duration>,
+    pub webhooks: WebhookSettings,
     pub store: StoreLocation,
     pub role: Role,
     /// The most memory the process should take; work that cannot fit is rejected.
@@ -117,9 +142,9 @@ pub const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 const OTHER_BLOCKING_THREADS: usize = 8;
 
 impl Config {
-    /// Returns the most threads that work may block: one for each place of each stage and for each piece that waits
-    /// after its first stage, so that no work that has its turn waits for a thread, and a few more. Decoding is never
-    /// long. A thread costs some megabytes of what its work allocated.
+    /// Returns the most threads that work may block: one for each permit of each stage, one for each piece that waits
+    /// after its first stage, and a few more. So work whose turn it is never waits for a thread. Decoding never reaches
+    /// the second stage. A thread keeps some megabytes of what its work allocated.
     pub fn blocking_threads(&self) -> usize {
         let begun = self.advice_limit + self.resolve_limit + self.decode_limit;
         begun + 2 * (self.long_limit + LONG_WAITING) + OTHER_BLOCKING_THREADS
@@ -140,6 +165,7 @@ impl Config {
             retain_audit: 400 * DAY,
             quotas: Quotas::default(),
             retain_jobs: Some(30 * DAY),
+            webhooks: WebhookSettings::default(),
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             memory_limit: MemoryLimit::of_the_system(),

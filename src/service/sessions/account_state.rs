@@ -10,15 +10,16 @@ use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::request::assets::check_rows;
 use crate::control::request::learning::Learning;
 use crate::control::request::rules;
+use crate::control::request::support::LawExtent;
 use crate::control::request::terms::Terms;
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
 use crate::service::entries::doubts::{self, Doubt};
 use crate::service::entries::drift::DriftTest;
 use crate::service::entries::record::{PeriodNoise, SessionRecord};
 use crate::service::entries::report::{OF_DECLARED, Report, none_of};
 use crate::service::error::ServiceError;
+use crate::service::sessions::advised::AdvisedShares;
 use crate::service::sessions::asset_change::AssetChange;
 use crate::service::sessions::assets::{Assets, Composition, PlannedAssets, mean};
 use crate::service::sessions::plan::SessionPlan;
@@ -54,8 +55,17 @@ pub struct AccountPeriod {
     pub executed: Vec<f64>,
     /// Share of wealth bought and sold for them.
     pub turnover: f64,
+    /// Money spent at its start.
+    pub spent: f64,
     /// The dynamics of the period, with the rate and the flow reported.
     pub dynamics: Dynamics,
+}
+
+impl AccountPeriod {
+    /// Returns the money spent, `None` if it is none.
+    pub fn reported_spending(&self) -> Option<f64> {
+        Some(self.spent).filter(|spent| *spent > 0.0)
+    }
 }
 
 impl AccountState {
@@ -158,7 +168,7 @@ impl AccountState {
         }
     }
 
-    /// Returns the effect of `report` on `period`, for which a total of `advised` was advised. A report without a day
+    /// Returns the effect of `report` on `period`, for which `advised` was advised. A report without a day
     /// takes the next one due, if `periods_per_year` is known.
     ///
     /// # Errors
@@ -168,22 +178,24 @@ impl AccountState {
         dynamics: Dynamics,
         period: usize,
         report: &Report,
-        (advised, periods_per_year): (f64, Option<f64>),
+        (advised, periods_per_year): (AdvisedShares, Option<f64>),
     ) -> Result<Transition<AccountState, AccountPeriod>, FieldError> {
         let seen = self.read(report)?;
         let Report { rate, flow, .. } = *report;
+        let spent = self.share_spent(report)?.unwrap_or(advised.spent);
         let moves = (!seen.is_missing()).then(|| seen.moves());
         let (executed, realised) = match &self.assets {
             Some(assets) => {
-                let executed = assets.executed(report, advised)?;
-                let traded = Some(assets.traded(&executed));
+                let executed = assets.executed(report, advised.held)?;
+                let of_wealth: Vec<f64> = executed.iter().map(|share| share * (1.0 - spent)).collect();
+                let traded = Some(assets.traded(&of_wealth));
                 let realised = assets.fund.outcome(&executed, moves.as_deref(), rate, flow);
-                (executed, PeriodOutcome { traded, ..realised })
+                (executed, PeriodOutcome { traded, spent, ..realised })
             }
             None => {
-                let action = report.executed_allocation.unwrap_or(advised);
+                let action = report.executed_allocation.unwrap_or(advised.held);
                 let log_return = moves.map(|moves| moves[0]);
-                (Vec::new(), PeriodOutcome { action, log_return, rate, flow, traded: None })
+                (Vec::new(), PeriodOutcome { action, log_return, rate, flow, traded: None, spent })
             }
         };
         let turnover = realised.turnover(self.state.holding);
@@ -200,8 +212,23 @@ impl AccountState {
         standing.price_as(report);
         let dynamics = realised.dynamics(dynamics);
         let PeriodOutcome { action: executed_allocation, log_return, .. } = realised;
-        let moved = AccountPeriod { log_return, executed_allocation, executed, turnover, dynamics };
+        let spent = spent * self.state.wealth;
+        let moved = AccountPeriod { log_return, executed_allocation, executed, turnover, spent, dynamics };
         Ok(Transition { seen, moved, standing })
+    }
+
+    /// Returns the share of wealth that was spent, if the report says how much.
+    ///
+    /// # Errors
+    /// It is not less than wealth.
+    fn share_spent(&self, report: &Report) -> Result<Option<f64>, FieldError> {
+        match report.spent {
+            Some(spent) if spent >= self.state.wealth => {
+                let rule = format!("must be less than the wealth at the start of the period, {}", self.state.wealth);
+                Err(FieldError::new("spent", spent, rule))
+            }
+            spent => Ok(spent.map(|spent| spent / self.state.wealth)),
+        }
     }
 
     /// Returns the report of a period without trades unless it gives holdings.
@@ -282,18 +309,17 @@ impl AccountState {
     pub(in crate::service) fn return_doubts(&self, report: &Report, seen: &PeriodNoise) -> Vec<Doubt> {
         let of_asset = |(asset, log_return): (usize, &Option<f64>)| {
             let log_return = (*log_return)?;
-            let (field, value, moments) = match &self.assets {
+            let (field, value, record) = match &self.assets {
                 Some(assets) => {
                     let (field, value) = report.given_of(&assets.names[asset]);
-                    (field, value.unwrap_or(log_return), assets.moments(asset))
+                    (field, value.unwrap_or(log_return), assets.extent(asset))
                 }
                 None => {
                     let (field, value) = report.given();
-                    let record = CentralMoments::of(&self.state.law);
-                    (field.to_owned(), value, (record.mean(), record.variance().sqrt()))
+                    (field.to_owned(), value, LawExtent::of_law(&self.state.law))
                 }
             };
-            doubts::of_return(&field, value, moments, log_return)
+            doubts::of_return(&field, value, &record, log_return)
         };
         seen.values.iter().enumerate().filter_map(of_asset).collect()
     }

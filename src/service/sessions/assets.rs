@@ -16,6 +16,7 @@ use crate::control::request::fund::CompositionRule;
 use crate::control::request::means::MeansRule;
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
+use crate::control::request::support::LawExtent;
 use crate::numerics::law::empirical::EmpiricalDistribution;
 use crate::service::entries::record::PeriodNoise;
 use crate::service::entries::report::Report;
@@ -39,7 +40,7 @@ pub struct Assets {
     pub leaving: BTreeMap<String, f64>,
 }
 
-/// Several assets before the coming period, by their names.
+/// Several assets before the coming period, by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Composition {
     /// Share of each asset in the advised holdings; they sum to 1.
@@ -61,7 +62,18 @@ pub struct PlannedAssets {
     pub(in crate::service) composed: Composition,
 }
 
-/// A period of several assets, by their names.
+impl PlannedAssets {
+    /// Returns true if these are the same assets and holdings, whatever the composition is.
+    pub(in crate::service) fn is_like(&self, other: &PlannedAssets) -> bool {
+        let (own, shares) = (&self.composed.composition, &other.composed.composition);
+        self.names == other.names
+            && self.composed.holdings == other.composed.holdings
+            && own.keys().eq(shares.keys())
+            && shares.values().all(|share| (0.0..=WHOLE).contains(share))
+    }
+}
+
+/// A period of several assets, by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ObservedAssets {
     /// Null if they are missing. Null for an asset whose price did not come, or that lost everything, which `notes`
@@ -214,12 +226,9 @@ impl Assets {
         }
     }
 
-    /// Returns the mean and standard deviation of an asset's log-returns.
-    pub(in crate::service) fn moments(&self, asset: usize) -> (f64, f64) {
-        let rows = &self.fund.rows;
-        let average = |of: &dyn Fn(f64) -> f64| rows.iter().map(|row| of(row[asset])).sum::<f64>() / rows.len() as f64;
-        let mean = average(&|log_return| log_return);
-        (mean, average(&|log_return| (log_return - mean).powi(2)).sqrt())
+    /// Returns the extent of an asset's log-returns.
+    pub(in crate::service) fn extent(&self, asset: usize) -> LawExtent {
+        LawExtent::of(self.fund.rows.iter().map(|row| row[asset]))
     }
 
     /// Returns the law of the mean log-return of each date, which does not depend on the composition.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::control::assets::advice::named;
-use crate::control::policy::advice::{Advice, AdviceSource};
+use crate::control::policy::advice::{Advice, AdviceSource, SpendingAdvice};
 use crate::control::problem::actions::Band;
 use crate::service::sessions::assets::{Assets, Composition};
 
@@ -19,16 +19,20 @@ pub struct FundAdvice {
     pub total: f64,
     #[serde(flatten)]
     pub composed: Composition,
-    /// The allocation minus the holdings: shares of wealth to buy, or to sell if negative.
+    /// Shares of wealth to buy, or to sell if negative: the allocation, of the wealth left after spending, less the holdings.
     pub trade: BTreeMap<String, f64>,
     /// The totals that are best kept as they are. If trading costs nothing, both ends are the total.
     #[schema(value_type = [f64; 2])]
     pub band: Band,
+    /// Spending before the period, if the problem has any. Allocations are shares of the wealth that is left.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spending: Option<SpendingAdvice>,
     /// Money added at the end of the period; negative if withdrawn.
     pub contribution: f64,
-    /// Certainty equivalent, in terminal wealth, of keeping this composition. A later composition never promises less.
+    /// Certainty equivalent, in terminal wealth or with spending in its sure level, of keeping this composition. A later
+    /// composition never promises less.
     pub certainty_equivalent: f64,
-    /// Terminal wealth from selling everything now and staying in the bank.
+    /// Terminal wealth, or with spending its sure level, from selling everything now and staying in the bank.
     pub floor: f64,
     /// Radius of the ball around the law of the fund, in log-return.
     pub radius: f64,
@@ -46,13 +50,16 @@ impl FundAdvice {
     /// Converts the advice of the fund to advice for each asset.
     pub fn new(advice: &Advice, assets: &Assets) -> Self {
         let shares = assets.shares(advice.allocation);
-        let trade: Vec<f64> = shares.iter().zip(&assets.fund.holdings).map(|(share, held)| share - held).collect();
+        let left = 1.0 - SpendingAdvice::share_of(advice.spending);
+        let trade: Vec<f64> =
+            shares.iter().zip(&assets.fund.holdings).map(|(share, held)| share * left - held).collect();
         FundAdvice {
             allocation: named(&assets.names, &shares),
             total: advice.allocation,
             composed: assets.composed(),
             trade: named(&assets.names, &trade),
             band: advice.band,
+            spending: advice.spending,
             contribution: advice.contribution,
             certainty_equivalent: advice.certainty_equivalent,
             floor: advice.floor,

@@ -9,10 +9,11 @@ use crate::service::entries::doubts::{self, Doubt, Doubts};
 use crate::service::entries::periods::Periods;
 use crate::service::entries::report::{Observe, Report};
 use crate::service::error::ServiceError;
+use crate::service::sessions::advised::{AdvisedActions, AdvisedShares};
 use crate::service::sessions::asset_change::AssetNames;
 use crate::service::sessions::current_advice::{AdviceContext, CurrentAdvice, with_uncertainty};
 use crate::service::sessions::plan::{PolicyTenure, Renewing, SessionPlan};
-use crate::service::sessions::session_state::{AdvisedActions, Moved, SessionState};
+use crate::service::sessions::session_state::{Moved, SessionState};
 use crate::service::sessions::transition::Transition;
 use crate::store::{RowVersion, SessionFacts, SessionRow};
 
@@ -103,7 +104,7 @@ impl LiveSession {
 
     /// Returns the last period that may be reported. A session that waits for its next policy may report one more
     /// horizon.
-    fn last_period(&self) -> usize {
+    pub(in crate::service) fn last_period(&self) -> usize {
         self.horizon() + if self.is_due() { self.current.terms.horizon } else { 0 }
     }
 
@@ -176,7 +177,7 @@ impl LiveSession {
             Err(error) => return Err(error),
         };
         let advised = match &advice {
-            Some(CurrentAdvice::Account(advice)) => AdvisedActions::Allocation(advice.allocation),
+            Some(CurrentAdvice::Account(advice)) => AdvisedActions::Shares(AdvisedShares::of(advice)),
             Some(CurrentAdvice::Declared(decided)) => {
                 AdvisedActions::Actions(decided.actions.values().copied().collect())
             }

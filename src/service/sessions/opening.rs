@@ -9,6 +9,7 @@ use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
 use crate::control::policy::declared::DeclaredAdvisor;
+use crate::control::policy_document::PreparedPolicy;
 use crate::control::problem::state::State;
 use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
@@ -47,19 +48,20 @@ struct Beginning {
 }
 
 /// The facts of a session's start beside its plan.
-pub(super) struct SessionBeginning {
-    pub(super) account: Option<InitialAccount>,
+#[derive(Debug, PartialEq)]
+pub(in crate::service) struct SessionBeginning {
+    pub(in crate::service) account: Option<InitialAccount>,
     /// Known noises: of an investor the log-returns, date after date.
-    pub(super) history: Vec<f64>,
+    pub(in crate::service) history: Vec<f64>,
     /// The number of assets, or of states and actions, if there are several.
-    pub(super) named: usize,
+    pub(in crate::service) named: usize,
 }
 
 /// Returns the start of a declared problem's session, and its plan.
 ///
 /// # Errors
 /// The state is not one, a field of an investor is given, or the session cannot renew itself as it says.
-pub(super) fn declared_begins(
+fn declared_begins(
     advisor: &DeclaredAdvisor,
     start: SessionStart,
 ) -> Result<(SessionBeginning, SessionPlan), FieldError> {
@@ -130,8 +132,23 @@ impl SessionStart {
 }
 
 impl Sessions {
+    /// Returns the start of a session, and its plan.
+    ///
+    /// # Errors
+    /// There is no such policy, or history, wealth, holdings or states break a rule.
+    pub(in crate::service) async fn begins(
+        &self,
+        (tenant, turn): (&Tenant, &HeavyPermit),
+        start: SessionStart,
+    ) -> Result<(SessionBeginning, SessionPlan), ServiceError> {
+        match self.policies.policy(tenant, &start.policy).await? {
+            PreparedPolicy::Investor(advisor) => self.account_begins((tenant, turn), &advisor, start).await,
+            PreparedPolicy::Declared(advisor) => Ok(declared_begins(&advisor, start)?),
+        }
+    }
+
     /// Returns the start of an investor's session, and its plan.
-    pub(super) async fn account_begins(
+    async fn account_begins(
         &self,
         (tenant, turn): (&Tenant, &HeavyPermit),
         advisor: &Arc<Advisor>,

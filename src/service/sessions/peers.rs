@@ -85,7 +85,8 @@ impl Sessions {
 /// Returns the parts of a report that concern its return and day.
 fn said_of(observe: &Observe) -> Report {
     let all = observe.report();
-    Report { rate: None, flow: None, executed_allocation: None, executed_allocations: None, wealth: None, ..all }
+    let of_wealth = Report { rate: None, flow: None, spent: None, wealth: None, ..all };
+    Report { executed_allocation: None, executed_allocations: None, ..of_wealth }
 }
 
 /// Returns the reports of a group that differ from most, each with the doubt about it.

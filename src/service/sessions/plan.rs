@@ -45,7 +45,7 @@ pub struct SessionPlan {
     pub(in crate::service) terms: Terms,
     pub(in crate::service) renew: Option<Renewing>,
     /// True if every period is advised by the first step of the policy.
-    pub(super) rolling: bool,
+    pub(in crate::service) rolling: bool,
     /// The declared problem, if the session lives one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(in crate::service) problem: Option<Box<PlannedProblem>>,
@@ -153,7 +153,8 @@ impl Renewing {
     /// longer.
     pub(in crate::service) fn due(self, renewals: usize, current: &PolicyTenure) -> Option<usize> {
         let due = current.after + self.every;
-        (renewals < MOST_RENEWALS && due + current.terms.horizon <= MOST_PERIODS).then_some(due)
+        let ends = current.terms.ends && due >= current.horizon();
+        (!ends && renewals < MOST_RENEWALS && due + current.terms.horizon <= MOST_PERIODS).then_some(due)
     }
 
     /// Checks the setting against the terms of the policy.
@@ -183,6 +184,7 @@ pub(in crate::service) fn terms_of(problem: &DeclaredProblem) -> Terms {
         rate_per_step: 0.0,
         trading_cost: 0.0,
         contributions: Contributions::default(),
+        ends: false,
         periods_per_year: None,
         means: MeansRule::default(),
     }

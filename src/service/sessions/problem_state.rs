@@ -9,8 +9,8 @@ use std::sync::Arc;
 use crate::control::error::FieldError;
 use crate::control::problem::declared::{Declared, EarnedState};
 use crate::control::request::declared::DeclaredProblem;
+use crate::control::request::support::LawExtent;
 use crate::numerics::law::empirical::EmpiricalDistribution;
-use crate::numerics::law::moments::CentralMoments;
 use crate::service::entries::days::Days;
 use crate::service::entries::doubts::{self, Doubt};
 use crate::service::entries::drift::DriftTest;
@@ -131,9 +131,13 @@ impl ProblemState {
 
     /// Returns the doubt about a noise that lies far from all those known.
     pub(in crate::service) fn noise_doubts(&self, noise: Option<f64>) -> Vec<Doubt> {
-        let known = CentralMoments::of(&self.known);
-        let (mean, deviation) = (known.mean(), known.variance().sqrt() * self.problem.noise_width());
-        let doubt = |noise| doubts::of_noise(noise, (self.problem.noise(mean), deviation));
+        let LawExtent { ends, mean, variance } = LawExtent::of_law(&self.known);
+        let known = LawExtent {
+            ends: ends.map(|end| self.problem.noise(end)),
+            mean: self.problem.noise(mean),
+            variance: variance * self.problem.noise_width().powi(2),
+        };
+        let doubt = |noise| doubts::of_noise(noise, &known);
         noise.and_then(doubt).into_iter().collect()
     }
 

@@ -13,6 +13,7 @@ use crate::service::entries::record::{PeriodNoise, SessionRecord};
 use crate::service::entries::report::Report;
 use crate::service::error::ServiceError;
 use crate::service::sessions::account_state::{AccountPeriod, AccountState};
+use crate::service::sessions::advised::{AdvisedActions, AdvisedShares};
 use crate::service::sessions::asset_change::AssetChange;
 use crate::service::sessions::assets::Composition;
 use crate::service::sessions::plan::{PolicyTenure, SessionPlan};
@@ -48,39 +49,12 @@ pub enum NextPolicy {
     Declared(Box<DeclaredProblem>),
 }
 
-/// The advice for a period, as a replay needs it.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AdvisedActions {
-    /// The share of wealth in all assets.
-    Allocation(f64),
-    /// The actions of a declared problem, in the order of their names.
-    Actions(Vec<f64>),
-}
-
 impl NextPolicy {
     /// Returns the change of the assets, if there is one.
     pub(in crate::service) fn asset_change(&self) -> Option<&AssetChange> {
         match self {
             NextPolicy::Account(change) => change.as_ref(),
             NextPolicy::Declared(_) => None,
-        }
-    }
-}
-
-impl AdvisedActions {
-    /// Returns the share of wealth in all assets; none of a declared problem.
-    fn allocation(&self) -> f64 {
-        match self {
-            AdvisedActions::Allocation(allocation) => *allocation,
-            AdvisedActions::Actions(_) => 0.0,
-        }
-    }
-
-    /// Returns the actions of a declared problem; none of an investor.
-    fn actions(&self) -> &[f64] {
-        match self {
-            AdvisedActions::Allocation(_) => &[],
-            AdvisedActions::Actions(actions) => actions,
         }
     }
 }
@@ -208,7 +182,7 @@ impl SessionState {
     ) -> Result<Transition<SessionState, Moved>, FieldError> {
         match self {
             SessionState::Account(state) => {
-                let calendar = (advised.allocation(), tenure.terms.periods_per_year);
+                let calendar = (advised.shares(), tenure.terms.periods_per_year);
                 let passed = state.after(tenure.dynamics(observed), observed + 1, report, calendar)?;
                 Ok(passed.map(|state| SessionState::Account(state.into()), Moved::Account))
             }
@@ -223,7 +197,10 @@ impl SessionState {
     /// to hold on.
     pub(in crate::service) fn held_on(&self, reported: &Report) -> (Report, AdvisedActions) {
         match self {
-            SessionState::Account(state) => (state.held_on(reported), AdvisedActions::Allocation(state.state.holding)),
+            SessionState::Account(state) => {
+                let held_on = AdvisedShares { held: state.state.holding, spent: 0.0 };
+                (state.held_on(reported), AdvisedActions::Shares(held_on))
+            }
             SessionState::Declared(_) => (reported.clone(), AdvisedActions::Actions(Vec::new())),
         }
     }

@@ -44,7 +44,7 @@ pub(super) struct Generation {
     pub weight: usize,
 }
 
-/// The slots of states `S` by their names `N`.
+/// The slots of states `S`, each with a name `N`.
 pub(super) struct Slots<N: Eq + Hash + Clone, S> {
     largest: Generation,
     map: Mutex<Map<N, S>>,

@@ -10,8 +10,18 @@ use crate::store::engine::error::{Failure, StoreError};
 /// Version, description, statements.
 type SchemaStep = (i64, &'static str, &'static str);
 
-const SQLITE: [SchemaStep; 1] = [(1, "facts", include_str!("migrations/sqlite/0001_facts.sql"))];
-const POSTGRES: [SchemaStep; 1] = [(1, "facts", include_str!("migrations/postgres/0001_facts.sql"))];
+const SQLITE: [SchemaStep; 4] = [
+    (1, "facts", include_str!("migrations/sqlite/0001_facts.sql")),
+    (2, "subscriptions", include_str!("migrations/sqlite/0002_subscriptions.sql")),
+    (3, "reminders", include_str!("migrations/sqlite/0003_reminders.sql")),
+    (4, "links", include_str!("migrations/sqlite/0004_links.sql")),
+];
+const POSTGRES: [SchemaStep; 4] = [
+    (1, "facts", include_str!("migrations/postgres/0001_facts.sql")),
+    (2, "subscriptions", include_str!("migrations/postgres/0002_subscriptions.sql")),
+    (3, "reminders", include_str!("migrations/postgres/0003_reminders.sql")),
+    (4, "links", include_str!("migrations/postgres/0004_links.sql")),
+];
 
 pub(in crate::store) fn sqlite() -> Migrator {
     migrator(&SQLITE)

@@ -114,13 +114,13 @@ async fn claim(
         if deaths >= MOST_DEATHS
             && let Ok(next) = row.state.next(JobEvent::Fail)
         {
-            end(connection, &row, next, now_ms).await?;
             let reason = format!(
                 "its worker process ended {deaths} times while the job ran, and no step was finished in between; \
                  the job may need more memory than the machine has"
             );
             let fail = query("UPDATE jobs SET error = $1, deaths = $2 WHERE job = $3");
-            connection.execute(fail.bind(reason).bind(deaths).bind(row.job)).await?;
+            connection.execute(fail.bind(reason).bind(deaths).bind(row.job.as_str())).await?;
+            end(connection, &row, next, now_ms).await?;
             continue;
         }
         let next = row.state.next(JobEvent::Claim).map_err(|error| Failure::Corrupt(error.to_string()))?;

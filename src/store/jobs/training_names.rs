@@ -12,7 +12,7 @@ use crate::store::sessions::idempotency::FOR_SESSIONS;
 use crate::store::tenants::tenant::Tenant;
 
 /// Prefix of the key of a session's request.
-pub(super) const OF_SESSION: &str = "renewal\n";
+pub(in crate::store) const OF_SESSION: &str = "renewal\n";
 /// Prefix of the key of a training that a caller queued.
 const OF_CALLER: &str = "trained\n";
 

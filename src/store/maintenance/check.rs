@@ -19,6 +19,7 @@ use crate::store::jobs::job::JobRow;
 use crate::store::jobs::leases;
 use crate::store::sessions::SessionRow;
 use crate::store::sessions::entries::{self, EntryRow};
+use crate::store::sessions::links::LinkRow;
 use crate::store::tenants::audit_chain::{self, AuditChain};
 use crate::store::tenants::keys::KeyRow;
 use crate::store::tenants::quotas::{ASSET_BYTES, ENTRY_BYTES, ROW_BYTES};
@@ -209,10 +210,10 @@ impl Inspection {
             }
             CheckPart::Keys => {
                 let rows = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
-                for row in &rows {
-                    self.note(KeyRow::from_row(row))?;
-                }
-                format!("keys: {}, and every seal is valid", rows.len())
+                rows.iter().try_for_each(|row| self.note(KeyRow::from_row(row)).map(drop))?;
+                let links = self.read(query("SELECT * FROM links ORDER BY link")).await?;
+                links.iter().try_for_each(|row| self.note(LinkRow::from_row(row)).map(drop))?;
+                format!("keys: {}, with {} links to letters, and every seal is valid", rows.len(), links.len())
             }
             CheckPart::Audit => {
                 let (chains, entries) = self.audit().await?;

@@ -21,7 +21,7 @@ use crate::store::maintenance::check::Inspection;
 const DOING: &str = "moving the store";
 
 /// Every table, after those it refers to, and how many of its rows are copied at a time: few if a row may be large.
-const TABLES: [(&str, usize); 19] = [
+const TABLES: [(&str, usize); 23] = [
     ("jobs", 100),
     ("job_requests", 1),
     ("job_reports", 1),
@@ -31,6 +31,8 @@ const TABLES: [(&str, usize); 19] = [
     ("policies", 1),
     ("policy_owners", 100),
     ("sessions", 100),
+    ("reminders", 100),
+    ("links", 100),
     ("idempotency_keys", 100),
     ("labels", 100),
     ("words", 1_000),
@@ -41,6 +43,8 @@ const TABLES: [(&str, usize); 19] = [
     ("audit_chains", 100),
     ("audit_total", 1),
     ("heartbeat", 1),
+    ("subscriptions", 100),
+    ("deliveries", 100),
 ];
 
 /// The type of a column.

@@ -89,13 +89,13 @@ impl Store {
     /// [`StoreError::OverQuota`] if an entry other than an observation exceeds the quota.
     pub async fn append(&self, new: EntryRow) -> Result<Append, StoreError> {
         if new.kind != EntryKind::Observation {
-            let (quotas, actor, session) = (self.quotas, self.actor.clone(), new.session.clone());
-            return self
-                .write_to(&session, APPENDING, move |connection| {
-                    append_with_room(connection, new, (quotas, actor)).boxed()
-                })
-                .await;
+            return self.append_with(new, Vec::new()).await;
         }
+        self.append_observation(new).await
+    }
+
+    /// Appends an observation without events.
+    pub(super) async fn append_observation(&self, new: EntryRow) -> Result<Append, StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.append(new).await,
             Engine::Postgres(database) => append_shared(database, new).boxed().await,
@@ -179,21 +179,6 @@ pub(super) async fn append_next(
     let is_next = connection.execute(bind_row(query(INSERT_ONE.as_str()), new)).await? > 0;
     let append = if is_next { Append::Appended } else { Append::NotNext };
     Ok((append, Tenant::stored(&found.get::<String>("tenant")?)))
-}
-
-/// Appends an entry that had no quota reserved when its session was opened, and records it in the audit.
-async fn append_with_room(
-    mut connection: StoreConnection<'_>,
-    new: EntryRow,
-    by: (Quotas, Actor),
-) -> Result<Append, Failure> {
-    let connection = &mut connection;
-    let (append, tenant) = append_next(connection, &new).await?;
-    if append == Append::Appended {
-        let outcome = format!("{} {} recorded", new.kind.counted(), new.number);
-        take_room(connection, &tenant, &new.session, new.room(), by, (AuditAction::Correct, &outcome)).await?;
-    }
-    Ok(append)
 }
 
 pub(super) async fn take_room(
@@ -285,7 +270,7 @@ impl EntryRow {
     }
 
     /// Returns how many entries it counts as, because a correction may have a long reason.
-    fn room(&self) -> i64 {
+    pub(super) fn room(&self) -> i64 {
         let lengths = [self.content_json.len(), self.answer_json.len(), self.session.len(), self.key.len()];
         1 + (quotas::SEALED_BYTES + to_sql(lengths.into_iter().sum())) / quotas::ENTRY_BYTES
     }

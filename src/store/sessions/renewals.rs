@@ -81,7 +81,11 @@ async fn may_go_on(connection: &mut StoreConnection<'_>, session: &str, policy: 
 }
 
 /// Stores the row that finds the policy of a renewal without its entry.
-async fn refer(connection: &mut StoreConnection<'_>, new: &EntryRow, onto: &RenewalTarget) -> Result<(), Failure> {
+pub(super) async fn refer(
+    connection: &mut StoreConnection<'_>,
+    new: &EntryRow,
+    onto: &RenewalTarget,
+) -> Result<(), Failure> {
     let refer = query("INSERT INTO renewals (session, number, policy, horizon) VALUES ($1, $2, $3, $4)");
     let refer = refer.bind(new.session.as_str()).bind(to_sql(new.number)).bind(onto.policy.as_str());
     connection.execute(refer.bind(to_sql(onto.horizon))).await?;

@@ -1,10 +1,13 @@
 //! The words by which sessions and policies are found, each in a row of an index.
 //!
 //! A word is a run of letters and digits, in lower case. The words of a session or a policy are those of its name and
-//! its tags, and its identifier without the prefix, marked by a character that no word has. A row is written and deleted
-//! with the thing it finds. A missing row would hide a session from a search, and do nothing else.
+//! its tags, each also as it is typed on a keyboard without accents, and its identifier without the prefix, marked by a
+//! character that no word has. A row is written and deleted with the thing it finds. A missing row would hide a session
+//! from a search, and do nothing else.
 
 use std::collections::BTreeSet;
+
+use any_ascii::any_ascii;
 
 use crate::store::engine::error::Failure;
 use crate::store::engine::query::StoreConnection;
@@ -28,6 +31,11 @@ pub(in crate::store) struct Worded<'a> {
 pub(in crate::store) fn words(text: &str) -> BTreeSet<String> {
     let lower = text.to_lowercase();
     lower.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+}
+
+/// Returns the words by which a text is found: its own, and those in Latin letters without accents.
+pub(in crate::store) fn findable(text: &str) -> BTreeSet<String> {
+    words(text).into_iter().chain(words(&any_ascii(text))).collect()
 }
 
 /// Returns the row's word for an identifier, or for its beginning: its digits behind a mark. A search of few letters,
@@ -109,6 +117,11 @@ mod tests {
         let found = |text: &str| words(text).into_iter().collect::<Vec<_>>();
         assert_eq!(found("US-Equity, \u{c9}t\u{c9} 2024/us"), ["2024", "equity", "us", "\u{e9}t\u{e9}"]);
         assert_eq!(found(" -'\u{2605}"), [""; 0]);
+        let findable = |text: &str| findable(text).into_iter().collect::<Vec<_>>();
+        assert_eq!(findable("M\u{fc}ller & Co"), ["co", "muller", "m\u{fc}ller"]);
+        assert_eq!(findable("\u{141}\u{f3}d\u{17a} Jo\u{e3}o"), ["joao", "jo\u{e3}o", "lodz", "\u{142}\u{f3}d\u{17a}"]);
+        // An accent that stands behind its letter as a character of its own.
+        assert!(findable("mu\u{308}ller").contains(&"muller".to_owned()));
         assert_eq!(column(&words("b a")), " a b");
         assert_eq!(bytes(&words("b ab")), 2 * " ab b".len() as i64 + 2 * ROW_BYTES);
         assert_eq!([identifying("session_0a"), identifying("1b")], ["#0a", "#1b"]);

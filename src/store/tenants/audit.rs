@@ -55,10 +55,13 @@ impl Actor {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AuditAction {
     OpenSession,
+    ImportSession,
     Observe,
     Correct,
     Renew,
     LabelSession,
+    CreateLink,
+    DeleteLink,
     DeleteSession,
     QueueJob,
     CancelJob,
@@ -69,6 +72,10 @@ pub enum AuditAction {
     CreateKey,
     RotateKey,
     RevokeKey,
+    Subscribe,
+    RotateSecret,
+    Resend,
+    Unsubscribe,
     CutAudit,
     Repair,
 }
@@ -78,10 +85,13 @@ impl AuditAction {
     pub fn as_str(self) -> &'static str {
         match self {
             AuditAction::OpenSession => "session.open",
+            AuditAction::ImportSession => "session.import",
             AuditAction::Observe => "session.observe",
             AuditAction::Correct => "session.correct",
             AuditAction::Renew => "session.renew",
             AuditAction::LabelSession => "session.label",
+            AuditAction::CreateLink => "session.link",
+            AuditAction::DeleteLink => "session.unlink",
             AuditAction::DeleteSession => "session.delete",
             AuditAction::QueueJob => "job.queue",
             AuditAction::CancelJob => "job.cancel",
@@ -92,6 +102,10 @@ impl AuditAction {
             AuditAction::CreateKey => "key.create",
             AuditAction::RotateKey => "key.rotate",
             AuditAction::RevokeKey => "key.revoke",
+            AuditAction::Subscribe => "subscription.create",
+            AuditAction::RotateSecret => "subscription.rotate",
+            AuditAction::Resend => "subscription.resend",
+            AuditAction::Unsubscribe => "subscription.delete",
             AuditAction::CutAudit => "audit.cut",
             AuditAction::Repair => "store.repair",
         }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use ballast::http::{self, RunningServer};
 use ballast::service::callers::keys;
 use ballast::service::process::clock::Clock;
-use ballast::service::process::config::{Config, StoreLocation};
+use ballast::service::process::config::{Config, StoreLocation, WebhookSettings};
 use ballast::service::process::shutdown::Shutdown;
 use ballast::store::{Append, EntryRow, KeyRing, Store, Tenant};
 use reqwest::header::{AUTHORIZATION, HeaderMap};
@@ -34,6 +34,7 @@ pub struct App {
     folder: TempDir,
     /// The store of the service that runs in this process.
     store: Option<StoreLocation>,
+    webhooks: WebhookSettings,
     running: Option<RunningServer>,
 }
 
@@ -185,15 +186,15 @@ impl App {
         App::configured(|_| {}).await
     }
 
-    /// Starts with a configuration changed by `change`; a restart keeps only its store.
+    /// Starts with a configuration changed by `change`; a restart keeps its store and how it sends webhooks.
     pub async fn configured(change: impl FnOnce(&mut Config)) -> App {
         let folder = tempfile::tempdir().expect("a folder");
         let mut config = config(folder.path());
         change(&mut config);
-        let store = Some(config.store.clone());
+        let (store, webhooks) = (Some(config.store.clone()), config.webhooks.clone());
         let running = start(config).await;
         let url = format!("http://{}", running.address);
-        App { running: Some(running), store, ..App::at(url, folder) }
+        App { running: Some(running), store, webhooks, ..App::at(url, folder) }
     }
 
     /// Starts over a new database; returns `None` if there is no PostgreSQL.
@@ -205,7 +206,8 @@ impl App {
     /// Returns a client of a service that another process runs over `folder`.
     pub fn at(url: String, folder: TempDir) -> App {
         let (session, policy) = (String::new(), String::new());
-        App { client: Client::new(), url, session, policy, folder, store: None, running: None }
+        let webhooks = WebhookSettings::default();
+        App { client: Client::new(), url, session, policy, folder, store: None, webhooks, running: None }
     }
 
     /// Sends `key` with every request from now on, or no key if it is empty.
@@ -302,6 +304,7 @@ impl App {
     async fn start_again(&mut self) {
         let mut config = config(self.folder.path());
         config.store = self.store.clone().expect("a store");
+        config.webhooks = self.webhooks.clone();
         let running = start(config).await;
         self.url = format!("http://{}", running.address);
         self.running = Some(running);

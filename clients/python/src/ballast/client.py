@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Literal, TypeAlias, TypeVar, cast
 from urllib.parse import quote
@@ -52,6 +52,18 @@ class Advised(wire.Advised):
     read: str
 
 
+class Sleeve(wire.SleeveReport):
+    """The share of the capital that a record supports, with a sentence that says how the returns were read."""
+
+    read: str
+
+
+class Plan(wire.PlanReport):
+    """A plan, with a sentence that says how the returns were read."""
+
+    read: str
+
+
 class AssetsAdvised(wire.AssetsAdvised):
     """An advice on several assets, with a sentence that says how the returns were read."""
 
@@ -77,6 +89,7 @@ class _Ballast:
         action_interval: Sequence[float] | None = None,
         trading_cost: float | None = None,
         contributions: float | Sequence[float] | None = None,
+        spending: wire.Spending | None = None,
         risk_aversion: float | None = None,
         utility: wire.UtilitySpecification | None = None,
         learning: wire.Learning | None = None,
@@ -119,6 +132,7 @@ class _Ballast:
             "action_interval": None if action_interval is None else list(action_interval),
             "trading_cost": trading_cost,
             "contributions": _amounts(contributions),
+            "spending": spending,
             "risk_aversion": risk_aversion,
             "utility": utility,
             "learning": learning,
@@ -162,6 +176,89 @@ class _Ballast:
             "sensitivity": sensitivity,
         }
         return _having_read(cast(Advised, await self._transport.json("POST", "/advise", body=_given(question))), found)
+
+    async def _plan(
+        self,
+        /,
+        returns: Returns,
+        *,
+        horizon: int,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
+        wealth: float | None = None,
+        wanted: float | None = None,
+        goal: float | None = None,
+        saved: float | None = None,
+        aim: wire.PlanAim | None = None,
+        drawdown_limit: float | None = None,
+        drawdown: float | None = None,
+        certainty: float | None = None,
+        paths: int | None = None,
+        seed: int | None = None,
+        **problem: Any,
+    ) -> Plan:
+        """Returns what to spend and what to hold in each of ``horizon`` periods, and how likely the money lasts.
+
+        ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``. ``wealth`` is what there is now,
+        ``wanted`` an amount for every period and ``goal`` the wealth wanted at the horizon, all in money of now.
+        ``aim="goal"`` makes what is missing of them on average least, and ``saved`` is then put in every period.
+        ``drawdown_limit`` is how far money that stays invested may fall below its highest value, and ``drawdown`` how
+        far it is below it now.
+        ``certainty`` is the probability with which an amount is to last. Every other field of the problem can be given
+        by name, such as ``risk_aversion``, ``caution`` or ``spending={"inflation": 0.002}``. Nothing is trained or
+        stored: ``train`` with the same fields and ``framework="static"`` makes a policy that sessions follow.
+        """
+        found = await self._one(returns, kind, choices)
+        terms = {
+            "rate_per_step": _last_rate(found, rate_per_step),
+            "periods_per_year": found.periods_per_year,
+            "initial_wealth": wealth,
+            "horizon": horizon,
+        }
+        question = {
+            "problem": {"history": found.series[0], **_given(terms), **_given(problem)},
+            "wanted": wanted,
+            "goal": goal,
+            "saved": saved,
+            "aim": aim,
+            "drawdown_limit": drawdown_limit,
+            "drawdown": drawdown,
+            "certainty": certainty,
+            "paths": paths,
+            "seed": seed,
+        }
+        return _having_read(cast(Plan, await self._transport.json("POST", "/plan", body=_given(question))), found)
+
+    async def _sleeve(
+        self,
+        /,
+        returns: Returns | Table,
+        *,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
+        assets: Sequence[str] | None = None,
+        record_of: wire.RecordUnit | None = None,
+        seed: int | None = None,
+        **problem: Any,
+    ) -> Sleeve:
+        """Returns the share of the capital that the record of a strategy supports, beside the Kelly share.
+
+        ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``; with ``assets``, as in
+        ``advise_assets``, and each asset is a strategy. ``record_of="trades"`` says that each value is the outcome of a
+        trade as a share of its stake; ``rate_per_step=0`` then says that the bank pays nothing meanwhile. Every other
+        field of the problem can be given by name, such as ``caution``, ``radius`` or ``periods_per_year``. Nothing is
+        trained or stored.
+        """
+        if assets is None:
+            found = await self._one(returns, kind, choices)
+            terms = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
+            whole = {"history": found.series[0], **_given(terms), **_given(problem)}
+        else:
+            whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
+        question = _given({"problem": whole, "record_of": record_of, "seed": seed})
+        return _having_read(cast(Sleeve, await self._transport.json("POST", "/sleeve", body=question)), found)
 
     async def _advise_assets(
         self,
@@ -350,7 +447,7 @@ class _Ballast:
         risk_aversion: float | None = None,
         trading_cost: float | None = None,
         cost_blind: bool | None = None,
-        weights: Mapping[str, Iterable[float]] | None = None,
+        weights: Mapping[str, str | Iterable[float]] | None = None,
         count: int | None = None,
         seed: int | None = None,
         idempotency_key: str | None = None,
@@ -361,7 +458,8 @@ class _Ballast:
         periods or one for each. By default it is the column of rates in ``returns``. ``dates`` are texts or dates, one
         for each number, by default those of the index of a pandas object. They show how many periods make a year;
         without dates, give ``periods_per_year``. ``weights`` has strategies of your own by name, each with its share of
-        wealth in every period of the record; those of the first window are not used. The service chooses what you leave
+        wealth in every period of the record, or a formula for it over the returns before, such as
+        ``"if(mean12 > bank, 1, 0)"``; shares of the first window are not used. The service chooses what you leave
         out, and the report shows what it chose. Raises ``ValueError`` before anything is queued if ``returns``,
         ``rate`` or ``dates`` cannot be correct.
         """
@@ -381,7 +479,7 @@ class _Ballast:
             "risk_aversion": risk_aversion,
             "trading_cost": trading_cost,
             "cost_blind": cost_blind,
-            "weights": None if weights is None else {name: list(own) for name, own in weights.items()},
+            "weights": None if weights is None else {name: _own(own, float) for name, own in weights.items()},
             "count": count,
             "seed": seed,
         }
@@ -406,7 +504,7 @@ class _Ballast:
         support: wire.Support | None = None,
         risk_aversion: float | None = None,
         trading_cost: float | None = None,
-        weights: Mapping[str, Iterable[Iterable[float]]] | None = None,
+        weights: Mapping[str, str | Iterable[Iterable[float]]] | None = None,
         seed: int | None = None,
         idempotency_key: str | None = None,
     ) -> wire.Job:
@@ -439,7 +537,7 @@ class _Ballast:
             "support": support,
             "risk_aversion": risk_aversion,
             "trading_cost": trading_cost,
-            "weights": None if weights is None else {name: [list(row) for row in own] for name, own in weights.items()},
+            "weights": None if weights is None else {name: _own(own, list) for name, own in weights.items()},
             "seed": seed,
         }
         return _having_read(await self._queued("/backtest", _given(request), idempotency_key), found)
@@ -492,6 +590,10 @@ class _Ballast:
         """Stores an exported policy. A policy that the service already has does not change."""
         imported: wire.Imported = await self._transport.json("POST", "/policies/import", body=document)
         return imported["policy"]
+
+    async def _import_session(self, document: bytes) -> wire.Session:
+        """Stores an exported session, whose policies must be imported before. The service must not have it."""
+        return cast(wire.Session, await self._transport.json("POST", "/sessions/import", body=document))
 
     async def _session(self, session: str) -> wire.Session:
         """Returns a session that was opened before, at its current period."""
@@ -547,6 +649,50 @@ class _Ballast:
     def _audit(self, *, tenant: str | None = None, object: str | None = None) -> AsyncIterator[wire.AuditEntry]:
         """Lists who did what, newest first, by default for all tenants and objects. Needs the role ``admin``."""
         return self._listed("/audit", "entries", tenant=tenant, object=object)
+
+    async def _subscribe(
+        self,
+        url: str,
+        events: Sequence[wire.EventKind],
+        *,
+        sessions: Sequence[str] | None = None,
+        least_change: float | None = None,
+        idempotency_key: str | None = None,
+    ) -> wire.Subscribed:
+        """Has the events of these kinds sent to ``url`` by signed webhooks, or to ``mailto:`` and an address by e-mail.
+
+        Returns the name and the secret.
+
+        ``sessions`` limits the events about sessions to these; ``least_change`` is the change of the advice that is an
+        event. The headers and the signature are those of Standard Webhooks.
+        """
+        request = _given({"url": url, "events": list(events), "sessions": sessions, "least_change": least_change})
+        headers = idempotent(idempotency_key)
+        made = await self._transport.json("POST", "/subscriptions", body=request, headers=headers)
+        return cast(wire.Subscribed, made)
+
+    async def _subscriptions(self) -> list[wire.SubscriptionState]:
+        """Lists the subscriptions, with what waits, what failed and the newest dead letters."""
+        listed: wire.SubscriptionList = await self._transport.json("GET", "/subscriptions")
+        return listed["subscriptions"]
+
+    async def _rotate_secret(self, subscription: str, *, idempotency_key: str | None = None) -> wire.RotatedSecret:
+        """Replaces the secret of a subscription. For a day both secrets sign."""
+        path, headers = f"/subscriptions/{quote(subscription, safe='')}/secret", idempotent(idempotency_key)
+        return cast(wire.RotatedSecret, await self._transport.json("POST", path, headers=headers))
+
+    async def _resend(self, subscription: str) -> int:
+        """Sends the dead letters of a subscription again. Returns how many."""
+        resent = await self._transport.json("POST", f"/subscriptions/{quote(subscription, safe='')}/resend")
+        return cast(wire.Resent, resent)["queued"]
+
+    async def _unsubscribe(self, subscription: str) -> None:
+        """Deletes a subscription and what is still to be sent to it."""
+        await self._transport.call("DELETE", f"/subscriptions/{quote(subscription, safe='')}")
+
+    async def _calendar(self) -> str:
+        """Returns the days on which the reports of active sessions are due, as an iCalendar file (RFC 5545)."""
+        return (await self._transport.call("GET", "/reports.ics")).text
 
     async def _health(self) -> wire.Health:
         """Returns the state of the service. Raises :class:`Overloaded` while it is shutting down."""
@@ -616,11 +762,20 @@ class Ballast(_Ballast):
     frontier = blocking_into(_Ballast._frontier, Frontier)
     frontier_of = blocking_into(_Ballast._job, Frontier)
     import_policy = blocking_into(_Ballast._import_policy, Policy)
+    import_session = blocking_into(_Ballast._import_session, Session)
     session = blocking_into(_Ballast._session, Session)
     advise = Answering(Advised).blocking(_Ballast._advise)
+    plan = Answering(Plan).blocking(_Ballast._plan)
+    sleeve = Answering(Sleeve).blocking(_Ballast._sleeve)
     advise_assets = Answering(AssetsAdvised).blocking(_Ballast._advise_assets)
     read_returns = blocking(_Ballast._read_returns)
     observe = blocking(_Ballast._observe)
+    subscribe = blocking(_Ballast._subscribe)
+    subscriptions = blocking(_Ballast._subscriptions)
+    rotate_secret = blocking(_Ballast._rotate_secret)
+    resend = blocking(_Ballast._resend)
+    unsubscribe = blocking(_Ballast._unsubscribe)
+    calendar = blocking(_Ballast._calendar)
     health = Answering(wire.Health).blocking(_Ballast._health)
     close = blocking(_Ballast._close)
     jobs = Answering(wire.Job).iterating(_Ballast._jobs)
@@ -680,11 +835,20 @@ class AsyncBallast(_Ballast):
     frontier = awaiting_into(_Ballast._frontier, AsyncFrontier)
     frontier_of = awaiting_into(_Ballast._job, AsyncFrontier)
     import_policy = awaiting_into(_Ballast._import_policy, AsyncPolicy)
+    import_session = awaiting_into(_Ballast._import_session, AsyncSession)
     session = awaiting_into(_Ballast._session, AsyncSession)
     advise = _Ballast._advise
+    plan = _Ballast._plan
+    sleeve = _Ballast._sleeve
     advise_assets = _Ballast._advise_assets
     read_returns = _Ballast._read_returns
     observe = _Ballast._observe
+    subscribe = _Ballast._subscribe
+    subscriptions = _Ballast._subscriptions
+    rotate_secret = _Ballast._rotate_secret
+    resend = _Ballast._resend
+    unsubscribe = _Ballast._unsubscribe
+    calendar = _Ballast._calendar
     health = _Ballast._health
     close = _Ballast._close
     jobs = _Ballast._jobs
@@ -752,6 +916,11 @@ def _amounts(contributions: float | Sequence[float] | None) -> float | list[floa
 
 def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in fields.items() if value is not None}
+
+
+def _own(shares: str | Iterable[Any], each: Callable[[Any], Any]) -> str | list[Any]:
+    """Returns a formula as it is, and the shares of a strategy as a list."""
+    return shares if isinstance(shares, str) else [each(share) for share in shares]
 
 
 def _ruled(rules: Mapping[str, Mapping[str, str]] | None) -> dict[str, dict[str, str]] | None:

@@ -35,10 +35,11 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
     after the period. With ``as_of="now"`` all columns include every correction; with ``"then"`` they are what the
     service answered at the time. ``corrected`` marks the rows where the two may differ.
 
-    ``rate`` is what the bank paid and ``flow`` the money added. ``turnover`` is the share of wealth that was traded,
-    and ``cost`` the money that it cost. ``equal_weights``, ``initial_composition`` and ``bank`` are the wealth of
-    somebody who began with the same wealth and holdings and held equal shares of all assets, the first composition of
-    the fund, or nothing. These columns always include every correction. Raises ``ImportError`` without pandas.
+    ``rate`` is what the bank paid, ``flow`` the money added and ``spent`` the money spent at the start. ``turnover`` is
+    the share of wealth that was traded, and ``cost`` the money that it cost. ``equal_weights``,
+    ``initial_composition`` and ``bank`` are the wealth of somebody who began with the same wealth and holdings and held
+    equal shares of all assets, the first composition of the fund, or nothing. These columns always include every
+    correction. Raises ``ImportError`` without pandas.
     """
     pd = require_pandas()
     rows = []
@@ -56,7 +57,7 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
                 "log_return": log_return,
                 "simple_return": math.expm1(log_return),
                 **{name: row[name] for name in _STANDING},
-                **{name: account[name] for name in _ACCOUNT},
+                **{name: account.get(name, 0.0) for name in _ACCOUNT},
                 **benchmarks,
                 "corrected": changed is not None,
             }
@@ -133,7 +134,7 @@ _ASSETS_FIGURES = {
     "holding": "holdings",
 }
 _STANDING = ("advised_allocation", "executed_allocation", "wealth", "holding", "radius")
-_ACCOUNT = ("rate", "flow", "turnover", "cost")
+_ACCOUNT = ("rate", "flow", "spent", "turnover", "cost")
 _BENCHMARKS = ("equal_weights", "initial_composition", "bank")
 #: Stands for all assets that are held.
 _ALL = "*"

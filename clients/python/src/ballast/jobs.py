@@ -143,12 +143,15 @@ class _Evaluation(_Job):
         """
         return frames.evaluation(await self._report(watch))
 
-    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
-        """Draws the certainty equivalent of each strategy (:func:`ballast.plots.evaluation`).
+    async def _plot(
+        self, ax: Axes | None = None, strategies: Sequence[str] | None = None, watch: Watch | None = None
+    ) -> Axes:
+        """Draws the certainty equivalent of ``strategies``, by default of all (:func:`ballast.plots.evaluation`).
 
-        Waits and raises as ``report`` does, and raises ``ImportError`` without pandas and matplotlib.
+        Waits and raises as ``report`` does, and raises ``ValueError`` for an unknown strategy and ``ImportError``
+        without pandas and matplotlib.
         """
-        return plots.evaluation(await self._report(watch), ax)
+        return plots.evaluation(await self._report(watch), ax, strategies)
 
 
 class _Comparison(_Job):

@@ -7,7 +7,7 @@ to install.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from . import frames, wire
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 #: The number of lines that have different colours.
 _LINES = 10
 _STYLES = ("-", "--", ":", "-.")
+#: The height of a strategy with its interval, and of the axis below all, in inches.
+_ROW, _HEAD = 0.28, 0.9
 
 
 def walk_forward(
@@ -36,8 +38,8 @@ def walk_forward(
     if strategies is None:
         strategies = list(worth.index[:_LINES])
         title = f"the {_LINES} of {len(worth)} worth most" if len(worth) > _LINES else None
-    elif unknown := next((name for name in strategies if name not in wealth), None):
-        raise ValueError(f"strategies has {unknown!r}: must be one of {'; '.join(wealth)}")
+    else:
+        _check_known(strategies, wealth)
     axes = _axes(ax, (10.0, 5.0))
     for place, name in enumerate(strategies):
         style = _STYLES[place // _LINES % len(_STYLES)]
@@ -86,14 +88,26 @@ def declared_history(history: wire.DeclaredHistory, ax: Axes | None = None) -> A
     return axes
 
 
-def evaluation(report: wire.EvaluationReport, ax: Axes | None = None) -> Axes:
-    """Draws the certainty equivalent of each strategy of an evaluation, with its interval, the best at the top."""
-    axes = _axes(ax)
-    table = frames.evaluation(report).sort_values("certainty_equivalent")
-    worth = table["certainty_equivalent"]
+def evaluation(report: wire.EvaluationReport, ax: Axes | None = None, strategies: Sequence[str] | None = None) -> Axes:
+    """Draws the certainty equivalent of each strategy of an evaluation, with its interval, the best at the top.
+
+    By default it draws all strategies; a new figure is as high as they need. The point of the reference is red.
+    Raises ``ValueError`` for an unknown strategy.
+    """
+    table = frames.evaluation(report)
+    if strategies is not None:
+        _check_known(strategies, table.index)
+        table = table.loc[list(strategies)]
+    table = table.sort_values("certainty_equivalent", kind="stable")
+    axes = _axes(ax, (8.0, _HEAD + _ROW * len(table)))
+    worth, places = table["certainty_equivalent"], range(len(table))
     reach = [worth - table["certainty_equivalent_low"], table["certainty_equivalent_high"] - worth]
-    axes.errorbar(worth, range(len(table)), xerr=reach, fmt="o", capsize=3)
-    axes.set_yticks(range(len(table)), list(table.index))
+    axes.errorbar(worth, places, xerr=reach, fmt="o", markersize=5, capsize=3)
+    if (reference := report["reference"]) in table.index:
+        axes.plot(worth[reference], table.index.get_loc(reference), "o", markersize=7, color="C3")
+    axes.set_yticks(places, list(table.index))
+    axes.set_ylim(-0.7, len(table) - 0.3)
+    axes.grid(axis="x", linewidth=0.5, alpha=0.5)
     axes.set_xlabel("certainty equivalent of terminal wealth")
     return axes
 
@@ -153,6 +167,12 @@ def worst_case(advice: frames.Explained, ax: Axes | None = None) -> Axes:
     axes.set_ylabel("probability, of the worst case downwards")
     axes.legend()
     return axes
+
+
+def _check_known(strategies: Sequence[str], names: Iterable[str]) -> None:
+    names = list(names)
+    if unknown := next((name for name in strategies if name not in names), None):
+        raise ValueError(f"strategies has {unknown!r}: must be one of {'; '.join(names)}")
 
 
 def _axes(ax: Axes | None, size: tuple[float, float] | None = None) -> Axes:

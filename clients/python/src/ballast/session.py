@@ -98,7 +98,7 @@ class _Session(Labelled):
     async def _assets_action(
         self, *, mode: Literal["surrogate", "resolve"] | None = None, explain: Literal["worst_case"] | None = None
     ) -> wire.AssetsAction:
-        """Returns the robust allocation of a session of several assets, by their names.
+        """Returns the robust allocation of a session of several assets, by name.
         :func:`ballast.frames.allocation` makes a Series of it."""
         params = {"session": self.id, "mode": mode, "explain": explain}
         return cast(wire.AssetsAction, await self._transport.json("GET", "/action", params=params))
@@ -324,6 +324,35 @@ class _Session(Labelled):
             scenario["state"] = dict(state)
         return cast(wire.WhatIfAnswer, await self._transport.json("POST", "/what-if", body=scenario))
 
+    async def _orders(
+        self,
+        prices: Mapping[str, float],
+        units: Mapping[str, float],
+        cash: float,
+        *,
+        lots: Mapping[str, float] | None = None,
+        smallest: float = 0.0,
+        buys_only: bool = False,
+        trading_cost: float = 0.0,
+    ) -> wire.OrdersAnswer:
+        """Returns the orders, in whole lots, that bring ``units`` and ``cash`` to the advice for the coming period.
+
+        ``prices``, ``units`` and ``lots`` are by name; the name of a single asset is ``"asset"``. A lot is 1 unit
+        unless given. The session does not change.
+        """
+        question: wire.OrdersQuestion = {
+            "session": self.id,
+            "prices": dict(prices),
+            "units": dict(units),
+            "cash": cash,
+            "smallest": smallest,
+            "buys_only": buys_only,
+            "trading_cost": trading_cost,
+        }
+        if lots is not None:
+            question["lots"] = dict(lots)
+        return cast(wire.OrdersAnswer, await self._transport.json("POST", "/orders", body=question))
+
     async def _assets_what_if(
         self,
         *,
@@ -362,6 +391,40 @@ class _Session(Labelled):
         """Plays the session on, from its coming period to the last that its policy decides, as
         :meth:`Policy.futures <ballast.Policy.futures>` plays a policy."""
         return cast(wire.Futures, await self._transport.json("GET", f"{self._path}/futures", params={"paths": paths}))
+
+    async def _letter(self, firm: wire.Firm | None = None, currency: str | None = None) -> str:
+        """Returns the letter to the client as one HTML document of one page: what to hold and to trade, how it went,
+        and why.
+
+        ``firm`` is the one that writes: ``name``, ``closing``, ``disclaimer`` and ``logo``, a picture as a data URL.
+        The service does not keep it. ``currency`` is a code such as ``"EUR"``.
+        """
+        request: wire.LetterRequest = {"firm": firm, "currency": currency}
+        sensitivity = {"sensitivity": "true"}
+        return (await self._transport.call("POST", f"{self._path}/letter", body=request, params=sensitivity)).text
+
+    async def _make_link(self, days: int = 31, letter: wire.LetterRequest | None = None) -> wire.MadeLink:
+        """Makes a link under which the client reads the present letter without a key for so many ``days``.
+
+        ``letter`` may have a ``firm`` without a logo, a ``currency`` and a ``smallest_trade``. The ``path`` of the
+        answer follows the address of the service, and is shown once.
+        """
+        request: wire.MakeLink = {"days": days, "letter": letter or {}}
+        made: wire.MadeLink = await self._transport.json("POST", f"{self._path}/links", body=request)
+        return made
+
+    async def _links(self) -> list[wire.LetterLink]:
+        """Returns the links to the letter, the oldest first, also those that have expired."""
+        listed: wire.LetterLinks = await self._transport.json("GET", f"{self._path}/links")
+        return listed["links"]
+
+    async def _delete_link(self, link: str) -> None:
+        """Deletes a link, which leads nowhere from then on."""
+        await self._transport.call("DELETE", f"/links/{quote(link, safe='')}")
+
+    async def _export(self) -> bytes:
+        """Returns the session and all its records as one document, which ``Ballast.import_session`` accepts."""
+        return (await self._transport.call("GET", f"{self._path}/export")).content
 
     async def _history(self) -> wire.History:
         """Returns the start of the session, all reports and answers, and what the answers would be now.
@@ -459,9 +522,15 @@ class Session(_Session):
     correct = Answering(wire.Corrected).blocking(_Session._correct)
     renew = Answering(wire.Renewed).blocking(_Session._renew)
     what_if = blocking(_Session._what_if)
+    orders = Answering(wire.OrdersAnswer).blocking(_Session._orders)
     futures = Answering(wire.Futures).blocking(_Session._futures)
     assets_what_if = Answering(wire.AssetsWhatIfPoint).blocking(_Session._assets_what_if)
     label = Answering(wire.Labels).blocking(_Session._label)
+    letter = blocking(_Session._letter)
+    make_link = blocking(_Session._make_link)
+    links = blocking(_Session._links)
+    delete_link = blocking(_Session._delete_link)
+    export = blocking(_Session._export)
     history = Answering(wire.History).blocking(_Session._history)
     frame = blocking(_Session._frame)
     assets_frame = blocking(_Session._assets_frame)
@@ -482,9 +551,15 @@ class AsyncSession(_Session):
     correct = _Session._correct
     renew = _Session._renew
     what_if = _Session._what_if
+    orders = _Session._orders
     futures = _Session._futures
     assets_what_if = _Session._assets_what_if
     label = _Session._label
+    letter = _Session._letter
+    make_link = _Session._make_link
+    links = _Session._links
+    delete_link = _Session._delete_link
+    export = _Session._export
     history = _Session._history
     frame = _Session._frame
     assets_frame = _Session._assets_frame

@@ -33,6 +33,7 @@ class RobustAllocation(Advised, BaseOptimization):
         utility: wire.UtilitySpecification | None = None,
         radius: wire.RadiusRule | None = None,
         ground_norm: wire.GroundNorm | None = None,
+        limits: wire.WeightLimits | None = None,
         means: wire.MeansRule | None = None,
         action_interval: Sequence[float] | None = None,
         caution: wire.CautionLevel | None = None,
@@ -57,6 +58,7 @@ class RobustAllocation(Advised, BaseOptimization):
         self.utility = utility
         self.radius = radius
         self.ground_norm = ground_norm
+        self.limits = limits
         self.means = means
         self.action_interval = action_interval
         self.caution = caution

@@ -35,6 +35,7 @@ class Advised:
         "utility",
         "radius",
         "ground_norm",
+        "limits",
         "means",
         "action_interval",
         "caution",
@@ -76,9 +77,9 @@ class RobustAllocation(Advised, BaseEstimator):
     column is named in a DataFrame and numbered in an array. It is not an asset, and its last number is used.
 
     ``url`` is the address of the service, and the key comes from ``BALLAST_KEY``. ``initial_wealth``,
-    ``risk_aversion``, ``utility``, ``radius``, ``ground_norm``, ``means``, ``action_interval``, ``caution``,
-    ``support`` and ``periods_per_year`` are fields of the problem of ``POST /advise``. The service chooses those you
-    leave out.
+    ``risk_aversion``, ``utility``, ``radius``, ``ground_norm``, ``limits``, ``means``, ``action_interval``,
+    ``caution``, ``support`` and ``periods_per_year`` are fields of the problem of ``POST /advise``. The service chooses
+    those you leave out.
 
     After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: the advised share in each asset, and the
     rest in the column ``bank``. Without that column the rest is also in the bank, but the weights sum to less than 1.
@@ -96,6 +97,7 @@ class RobustAllocation(Advised, BaseEstimator):
         utility: wire.UtilitySpecification | None = None,
         radius: wire.RadiusRule | None = None,
         ground_norm: wire.GroundNorm | None = None,
+        limits: wire.WeightLimits | None = None,
         means: wire.MeansRule | None = None,
         action_interval: Sequence[float] | None = None,
         caution: wire.CautionLevel | None = None,
@@ -110,6 +112,7 @@ class RobustAllocation(Advised, BaseEstimator):
         self.utility = utility
         self.radius = radius
         self.ground_norm = ground_norm
+        self.limits = limits
         self.means = means
         self.action_interval = action_interval
         self.caution = caution

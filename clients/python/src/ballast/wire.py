@@ -178,7 +178,7 @@ class BankRate(TypedDict):
 class Benchmarks(TypedDict):
     """
     Wealth at the end of a period, had a simple rule been followed from the start of the session: with the same wealth,
-    holdings, rates, flows and trading cost. Null once a rule cannot pay a withdrawal.
+    holdings, rates, flows, spending and trading cost. Null once a rule cannot pay them.
     """
 
     equal_weights: NotRequired[float | None]
@@ -227,6 +227,17 @@ class BootstrapEstimate(TypedDict):
     """Value on the actual record."""
     interval: list[float]
     """Lower and upper end."""
+
+
+class BreakingReturn(TypedDict):
+    """The mean return that decides whether an amount lasts, or whether the goal aimed at is reached."""
+
+    mean_return: float
+    """Mean simple return of the risky asset a period, as a fraction."""
+    mean_seen: float
+    """That of the record."""
+    standard_errors: float
+    """Their distance in standard errors of the record's mean: negative if the breaking return is lower."""
 
 
 class CareCount(TypedDict):
@@ -391,6 +402,8 @@ class Correct(TypedDict):
     """Rate that the bank paid in the period. Default: the policy's rate."""
     flow: NotRequired[float | None]
     """Money added at the end of the period; negative if withdrawn. Default: the policy's contribution."""
+    spent: NotRequired[float | None]
+    """Money spent from wealth at the start of the period. Default: what was advised; nothing without spending."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the advised allocation."""
     executed_allocations: NotRequired[dict[str, float]]
@@ -550,6 +563,13 @@ class Estimate(TypedDict):
 ConstantMix: TypeAlias = float
 
 
+EventKind: TypeAlias = Literal["job_ended", "advice_changed", "left_band", "drift_alarm", "renewal_failed", "report_due", "report_late"]
+"""
+The kind of an event: `job_ended`, `advice_changed`, `left_band`, `drift_alarm`, `renewal_failed`, `report_due` or
+`report_late`.
+"""
+
+
 class ExpectedError(TypedDict):
     """
     Root mean square errors of the value of a step, in basis points of the certainty equivalent, at any holding; for a
@@ -571,6 +591,17 @@ Explain: TypeAlias = Literal["worst_case"]
 """The explanation shown beside an allocation."""
 
 
+class FanPeriod(TypedDict):
+    """Quantiles after some periods."""
+
+    after: int
+    """Number of periods since the start."""
+    wealth: list[float]
+    """Wealth before spending."""
+    spending: NotRequired[list[float] | None]
+    """Spending of the period that begins, negative if money is put in; null at the horizon."""
+
+
 class FanPoint(TypedDict):
     """Quantiles over paths at one time."""
 
@@ -584,6 +615,19 @@ class FanPoint(TypedDict):
 
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
 """The map from a state to the inputs of a surrogate."""
+
+
+class Firm(TypedDict):
+    """The firm that writes letters. Only a link keeps it, without the logo."""
+
+    name: NotRequired[str]
+    """At most 80 letters, without control characters. Default: none."""
+    closing: NotRequired[str]
+    """The last line of the letter, at most 200 letters. Default: none."""
+    disclaimer: NotRequired[str]
+    """Text in small print below it, at most 600 letters. Default: none."""
+    logo: NotRequired[str | None]
+    """A PNG, JPEG or WebP picture of at most 200 KB, as a data URL in base64. Default: none."""
 
 
 Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in", "parametric_static", "parametric_adaptive"]
@@ -618,8 +662,48 @@ HistoryItem2Item: TypeAlias = float
 HistoryItem2: TypeAlias = list[HistoryItem2Item]
 
 
+class GivenUpDelivery(TypedDict):
+    """A delivery that was given up."""
+
+    delivery: str
+    """The identifier under which every attempt was sent, in the header `webhook-id`, or of an e-mail in `Message-ID`."""
+    event: EventKind
+    created_ms: int
+    """Time of the event, in milliseconds since 1970."""
+    attempts: int
+    error: str
+    """Why the last attempt failed."""
+    body: str
+    """The body that was sent."""
+
+
 GroundNorm: TypeAlias = Literal["scaled_one", "sup"]
 """The distance between the log-returns of two dates. Default: `scaled_one`."""
+
+
+class GroupLimit(TypedDict):
+    """A group of assets, and the least and the greatest sum of their shares in the risky holdings."""
+
+    name: str
+    """Name of the group; all differ."""
+    assets: list[Asset]
+    """Names of its assets, all different."""
+    min: NotRequired[float]
+    """The least sum, 0 to 1. Default 0."""
+    max: NotRequired[float]
+    """The greatest sum, 0 to 1. Default 1."""
+
+
+class GrowthInBothLaws(TypedDict):
+    """Growth if the record is the truth, and under the law that is worst for the share."""
+
+    record: float
+    """Growth under the law of the record."""
+    worst: NotRequired[float | None]
+    """
+    Growth under the worst law; -1 if it takes everything. Null for the Kelly share of several strategies, or if the share
+    is 0.
+    """
 
 
 class Health(TypedDict):
@@ -673,6 +757,15 @@ class Imported(TypedDict):
     """An imported policy."""
 
     policy: str
+
+
+class InBothWorlds(TypedDict):
+    """A figure on paths of either law."""
+
+    record: Estimate
+    """Returns are drawn from the centre of the ball: from the record, unless `problem.centre` says otherwise."""
+    worst: Estimate
+    """Each of these returns is moved as the law that is worst for the plan moves it in its period."""
 
 
 class InitialHistories1(TypedDict):
@@ -792,6 +885,22 @@ class LeftOut(TypedDict):
     """The share of wealth that would be advised."""
 
 
+class LetterLink(TypedDict):
+    """A link, without its secret."""
+
+    link: str
+    created_ms: int
+    """In milliseconds since 1970."""
+    expires_ms: int
+    """In milliseconds since 1970."""
+
+
+class LetterLinks(TypedDict):
+    """The links of a session, oldest first."""
+
+    links: list[LetterLink]
+
+
 class LevelAdvised(TypedDict):
     """A level, its share of the radius, its price, and its allocation."""
 
@@ -828,6 +937,16 @@ class LevelsAdvised(TypedDict):
     """
     levels: list[LevelAdvised]
     """The levels, from the boldest to the paper's."""
+
+
+class MadeLink(TypedDict):
+    """A new link."""
+
+    link: str
+    path: str
+    """The address of the letter on this service. It is shown once."""
+    expires_ms: int
+    """When it expires, in milliseconds since 1970."""
 
 
 class MapPoint(TypedDict):
@@ -962,6 +1081,8 @@ class Observe(TypedDict):
     """Rate that the bank paid in the period. Default: the policy's rate."""
     flow: NotRequired[float | None]
     """Money added at the end of the period; negative if withdrawn. Default: the policy's contribution."""
+    spent: NotRequired[float | None]
+    """Money spent from wealth at the start of the period. Default: what was advised; nothing without spending."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the advised allocation."""
     executed_allocations: NotRequired[dict[str, float]]
@@ -971,6 +1092,30 @@ class Observe(TypedDict):
 
 
 Tag: TypeAlias = str
+
+
+OrderSide: TypeAlias = Literal["buy", "sell"]
+"""Side of an order."""
+
+
+class OrdersQuestion(TypedDict):
+    """A question for the orders that follow a session's advice."""
+
+    session: str
+    prices: dict[str, float]
+    """Price of a unit of each asset, by name, 1e-12 to 1e15; of a session of one asset its name is `asset`."""
+    units: dict[str, float]
+    """Units held of each asset, by name, 0 to 1e15."""
+    cash: float
+    """Money in the bank, 0 to 1e15."""
+    lots: NotRequired[dict[str, float]]
+    """Units that can be traded at once, by name, 1e-9 to 1e9. Default: 1 of each asset."""
+    smallest: NotRequired[float]
+    """Smallest amount of money that is traded, 0 to 1e15. Default 0."""
+    buys_only: NotRequired[bool]
+    """If true, nothing is sold. Default false."""
+    trading_cost: NotRequired[float]
+    """Cost of trading, as a share of the amount traded, 0 to 0.1. Default 0."""
 
 
 class OwnMix(TypedDict):
@@ -986,6 +1131,14 @@ class OwnMix(TypedDict):
     Certainty equivalent of the strategy less that of the mix, in terminal wealth: the gain from changing the
     allocation.
     """
+
+
+OwnSharesVecF64: TypeAlias = list[list[float]] | str
+"""Shares of a strategy: given for every period, or found by a formula."""
+
+
+OwnSharesF64: TypeAlias = list[float] | str
+"""Shares of a strategy: given for every period, or found by a formula."""
 
 
 class Performance(TypedDict):
@@ -1021,11 +1174,26 @@ class PeriodAccount(TypedDict):
     """Rate that the bank paid."""
     flow: float
     """Money added at the end; negative if withdrawn."""
+    spent: NotRequired[float | None]
+    """Money spent at the start; left out if it is none."""
     turnover: float
     """Share of wealth bought and sold at the start, in all assets together."""
     cost: float
     """Money that these trades cost."""
     benchmarks: Benchmarks
+
+
+class PeriodByState(TypedDict):
+    """Spending and holding of a period in some states; linear between them."""
+
+    period: int
+    """Number of the period, from 1."""
+    states: list[float]
+    """The numbers of the states, ascending."""
+    spent: NotRequired[list[float] | None]
+    """Share of wealth to spend in each; left out if the plan aims at a goal and spends the amount wanted."""
+    held: list[float]
+    """Share of what is left to hold in the risky asset in each."""
 
 
 class PeriodNote(TypedDict):
@@ -1040,6 +1208,73 @@ class PeriodNote(TypedDict):
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 """The phase of a job."""
+
+
+PlanAim: TypeAlias = Literal["spending", "goal"]
+"""The aim of a plan."""
+
+
+class PlanFan(TypedDict):
+    """Quantiles of the plan's paths."""
+
+    shares: list[float]
+    """The shares of paths below the quantiles."""
+    record: list[FanPeriod]
+    """If returns are drawn from the centre."""
+    worst: list[FanPeriod]
+    """If each is moved as the worst law moves it."""
+
+
+PlanRule: TypeAlias = Literal["plan", "trusting", "sixty_forty", "four_percent", "share_of_wealth"]
+"""Rules for spending and holding."""
+
+
+PlanStateNumber: TypeAlias = Literal["funded", "of_peak"]
+"""The number by which the state of a plan is described."""
+
+
+class PlanStrategy(TypedDict):
+    """Figures of a rule."""
+
+    rule: PlanRule
+    """The rule."""
+    ruin: InBothWorlds
+    """Probability that the money runs out before the horizon."""
+    mean_spending: InBothWorlds
+    """Spending of a period, the mean over a path, in the middle case."""
+    lowest_spending: InBothWorlds
+    """Lowest spending of a period on a path, in the middle case."""
+    poor_spending: InBothWorlds
+    """Lowest spending of a period on a path, in the worst twentieth of cases."""
+    bequest: InBothWorlds
+    """Wealth at the horizon, in the middle case."""
+    reaches_goal: NotRequired[InBothWorlds | None]
+    shortfall: NotRequired[InBothWorlds | None]
+    max_drawdown: InBothWorlds
+    """Largest drawdown of money that stays invested, in the worst twentieth of cases."""
+    certainty_equivalent: NotRequired[InBothWorlds | None]
+
+
+class PlannedPeriod(TypedDict):
+    """Spending and holding of a period."""
+
+    period: int
+    """Number of the period, from 1."""
+    spent: float
+    """Share of wealth to spend at its start; of the surplus, beside what is secured, if anything is."""
+    held: float
+    """Share of what is left to hold in the risky asset; of the surplus that is left, if anything is secured."""
+    reserve: NotRequired[float | None]
+    """Wealth that must be in the bank at its start for all that is secured, in money of now; left out if nothing is."""
+
+
+class PlannedStates(TypedDict):
+    """Spending and holding of a plan by its state."""
+
+    described_by: PlanStateNumber
+    """The meaning of the numbers of the states."""
+    periods: list[PeriodByState]
+    """The plan in some periods, ascending."""
 
 
 class PolicyEntry(Labels):
@@ -1215,6 +1450,44 @@ Rates: TypeAlias = float | list[float]
 """Return of the bank in each period."""
 
 
+RecordUnit: TypeAlias = Literal["periods", "trades"]
+"""The values of a record."""
+
+
+class Refutation(TypedDict):
+    """Findings that would change the answer. The radius of the ball shrinks with the root of the number of returns."""
+
+    break_even_mean: NotRequired[float | None]
+    """
+    Mean simple return at which the share becomes 0, or rises above it if it is 0, when all log-returns are shifted alike;
+    null for several strategies, or if no shift does so.
+    """
+    break_even_shift: NotRequired[float | None]
+    """
+    Shift of all returns at which the share becomes 0, or rises above it if it is 0, as a fraction of the price: -0.001 lowers
+    each by 0.1 %. Null if no shift does so.
+    """
+    until_any: NotRequired[int | None]
+    """
+    Number of further returns, of the law of the record, at which the share rises above 0: 0 if it has. Null if 10,000 are
+    not enough, or the radius rule is `fixed`.
+    """
+    until_half_kelly: NotRequired[int | None]
+    """
+    Number of further returns, of the law of the record, at which the share reaches half of the Kelly share: 0 if it has.
+    Null if 10,000 are not enough, the Kelly share is null or 0, or the radius rule is `fixed`.
+    """
+    until_three_quarters_kelly: NotRequired[int | None]
+    """Number of further returns at which the share reaches three quarters of the Kelly share, as for half."""
+    losses_in_a_row: NotRequired[int | None]
+    """
+    Losses in a row, each as large as the mean loss of the record, after which the share is 0; null if it is 0 now, 60 are not
+    enough, the record has no loss, or there are several strategies.
+    """
+    mean_loss: NotRequired[float | None]
+    """That mean loss, a simple return below 0; null if `losses_in_a_row` is."""
+
+
 class Relabel(TypedDict):
     """A change of labels: an absent field stays, a null or empty one is cleared."""
 
@@ -1301,6 +1574,8 @@ class Report(TypedDict):
     """Rate that the bank paid in the period. Default: the policy's rate."""
     flow: NotRequired[float | None]
     """Money added at the end of the period; negative if withdrawn. Default: the policy's contribution."""
+    spent: NotRequired[float | None]
+    """Money spent from wealth at the start of the period. Default: what was advised; nothing without spending."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the advised allocation."""
     executed_allocations: NotRequired[dict[str, float]]
@@ -1324,6 +1599,12 @@ class ResampledFrontier(TypedDict):
     """Results scale by scale."""
 
 
+class Resent(TypedDict):
+    """The number of dead letters that were queued again."""
+
+    queued: int
+
+
 class ReturnAndLog(TypedDict):
     """A return in both units."""
 
@@ -1331,6 +1612,42 @@ class ReturnAndLog(TypedDict):
     """`ln(price / previous price)`."""
     simple_return: float
     """`price / previous price - 1`."""
+
+
+class ReturnMoments(TypedDict):
+    """Moments of a simple return, a period or trade."""
+
+    mean: float
+    """Mean."""
+    standard_deviation: float
+    """Standard deviation, with the divisor n."""
+
+
+class RotatedSecret(TypedDict):
+    """The new secret of a subscription."""
+
+    secret: str
+    """Signs every delivery from now on. It is shown again only to a repeat of the request."""
+    previous_until_ms: int
+    """Until this time, in milliseconds since 1970, the secret before signs too."""
+
+
+class RpcError(TypedDict):
+    """The reason why a request has no result."""
+
+    code: int
+    """Code of JSON-RPC or of the protocol."""
+    message: str
+    data: NotRequired[dict[str, Any] | None]
+    """Revisions of the protocol that are supported, if the requested one is not."""
+
+
+RpcId: TypeAlias = str | int
+"""An identifier of a request: text or a whole number."""
+
+
+RpcVersion: TypeAlias = Literal["2.0"]
+"""The version of JSON-RPC."""
 
 
 class SamplingLaw1(TypedDict):
@@ -1366,6 +1683,92 @@ SamplingLaw: TypeAlias = SamplingLaw1 | SamplingLaw2 | SamplingLaw3
 SessionStatus: TypeAlias = Literal["active", "waiting", "completed"]
 
 
+class ShareRange(TypedDict):
+    """The least and the greatest share of an asset in the risky holdings."""
+
+    min: NotRequired[float]
+    """The least share, 0 to 1. Default 0."""
+    max: NotRequired[float]
+    """The greatest share, 0 to 1. Default 1."""
+
+
+class SleeveGrowth(TypedDict):
+    """Growth of the capital as a fraction of it, compounded."""
+
+    bank: float
+    """Growth with everything in the bank."""
+    share: GrowthInBothLaws
+    """Growth with the share."""
+    kelly: NotRequired[GrowthInBothLaws | None]
+
+
+class SmallestTrade(TypedDict):
+    """The smallest trade that is named, as an amount of money, as a share of wealth, or as both."""
+
+    amount: NotRequired[float]
+    """Amount of money, 0 to 1e15. Default 0."""
+    share: NotRequired[float]
+    """Share of wealth, 0 to 1. Default 0."""
+
+
+SurvivalItem: TypeAlias = float
+
+
+class Spending(TypedDict):
+    """
+    Spending at the start of every period, which the policy chooses together with the allocation. Then utility is of what
+    is spent in each period and of the wealth left at the horizon, all in money of the same prices:
+
+      sum over t of  d_t u(c_t / p_t)  +  d_T bequest u(x_T / p_T),   d_t = discount^t times the chance to live so long,
+
+    where u is the utility and p_t the level of prices. Utility must be log or power, nothing may be added or withdrawn
+    besides, and trading must cost nothing: then the best shares of wealth depend on the law alone.
+
+    Amounts may be secured: a level s that is spent in every period, and wealth k that is left at the horizon, whatever
+    returns do. Then utility is of what exceeds them, u(c_t / p_t - s) and u(x_T / p_T - k). The money that pays for them
+    from the bank is the reserve, and all shares are of the surplus, wealth above the reserve:
+
+      R_T = k p_T,   R_t = s p_t + R_(t+1) / (1 + r),   c_t = s p_t + share (x_t - R_t).
+
+    The surplus moves as wealth does where nothing is secured, so the best shares are the same; no return of a total loss
+    of what is held reaches the reserve. Source: Merton (1971), section 6, and Black and Perold (1992), whose constant
+    proportion portfolio insurance this is for a known law.
+    """
+
+    lowest: NotRequired[float]
+    """Least share of wealth, or of the surplus, that is spent in a period, 0 to 1. Default 0."""
+    highest: NotRequired[float]
+    """Greatest share of wealth, or of the surplus, that is spent in a period, 0.000001 to 1, and at least `lowest`. Default 1."""
+    discount: NotRequired[float]
+    """Weight of a period's spending beside that of the period before, 0.5 to 1.5. Default 1."""
+    inflation: NotRequired[float]
+    """Rise of prices per period, as a fraction, -0.2 to 0.2. Default 0."""
+    survival: NotRequired[list[SurvivalItem] | None]
+    """For each period the chance to live to the next if alive in it, 0.001 to 1: `horizon` numbers. Default: certain."""
+    bequest: NotRequired[float]
+    """
+    Weight of the wealth left at the horizon, as a number of periods of spending, 0.000001 to 1,000,000. Default 1:
+    it counts as much as the spending of one more period.
+    """
+    secured: NotRequired[float]
+    """Amount spent in every period whatever returns do, in money of the start, 0 to 1e15. Default 0."""
+    secured_left: NotRequired[float]
+    """Wealth left at the horizon whatever returns do, in money of the start, 0 to 1e15. Default 0."""
+
+
+class SpendingAdvice(TypedDict):
+    """Spending that is advised for a period."""
+
+    share: float
+    """Share of wealth."""
+    amount: float
+    """Amount, in the currency of wealth."""
+    secured: NotRequired[float]
+    """Part of it that is secured; left out if nothing is."""
+    reserve: NotRequired[float]
+    """Wealth that pays from the bank for this and for what is secured later; left out if nothing is."""
+
+
 class Spread(TypedDict):
     """Mean and quantiles over paths."""
 
@@ -1383,6 +1786,69 @@ StrategyFamily: TypeAlias = Literal["policy", "one_step"]
 
 StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "policy", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal", "own"]
 """A kind of strategy in a walk-forward, which decides its colour and its sentences."""
+
+
+Session1: TypeAlias = str
+
+
+class Subscribe(TypedDict):
+    """A request to be told of events."""
+
+    url: str
+    """
+    The address that each event is sent to, by POST. It begins with https:// and leads to public addresses, unless
+    the operator allows the host by `--webhook-allow`. If the operator configured a mail server, it may be `mailto:`
+    and one address instead, such as `mailto:someone@example.com`: each event is then an e-mail in plain words.
+    """
+    events: list[EventKind]
+    """The kinds of events."""
+    sessions: NotRequired[list[Session1]]
+    """The sessions whose events are sent; every session of the tenant if left out. `job_ended` is about no session."""
+    least_change: NotRequired[float]
+    """
+    `advice_changed` is sent if a report changes the advised share of some asset by more than this share of wealth,
+    or an action of a declared problem by more than this number.
+    """
+
+
+class Subscribed(TypedDict):
+    """A new subscription."""
+
+    subscription: str
+    secret: str
+    """
+    Signs every delivery as Standard Webhooks defines it. It is shown again only to a repeat of the request. E-mails
+    are not signed.
+    """
+
+
+class SubscriptionState(TypedDict):
+    """A subscription and the state of its deliveries."""
+
+    subscription: str
+    url: str
+    events: list[EventKind]
+    sessions: list[str]
+    """Empty for every session of the tenant."""
+    least_change: float
+    created_ms: int
+    """In milliseconds since 1970."""
+    last_delivered_ms: NotRequired[int | None]
+    """Time of the last event that the receiver accepted, in milliseconds since 1970."""
+    last_error: NotRequired[str | None]
+    """Why the last attempt failed; null if it succeeded."""
+    failures: int
+    """Attempts that failed since the last delivery."""
+    delivered: int
+    """Events that the receiver accepted."""
+    waiting: int
+    """Events that are still to be delivered; at most 1,000."""
+    dead: int
+    """Deliveries given up after ten attempts; at most 1,000."""
+    dropped: int
+    """Events and dead letters that were lost because as many were kept already."""
+    dead_letters: list[GivenUpDelivery]
+    """The newest ten dead letters."""
 
 
 class Support1(TypedDict):
@@ -1447,7 +1913,7 @@ class SurrogateDiagnostics(TypedDict):
     noise_variance: float
     """In units of the target's variance over the design."""
     log_likelihood_per_point: float
-    """Log likelihood of the scaled targets, at the hyperparameters found."""
+    """Log likelihood of the scaled targets at the hyperparameters found, divided by their number."""
     leave_one_out_error: float
     """Root mean square of the leave-one-out errors of up to 500 design points, in the target's own unit."""
     jitter: float
@@ -1458,6 +1924,15 @@ class SurrogateDiagnostics(TypedDict):
 
 SurrogateTarget: TypeAlias = Literal["floor_gain", "value"]
 """The quantity that the value surrogate regresses."""
+
+
+class SustainableSpending(TypedDict):
+    """Largest amount for every period."""
+
+    holding: PlanRule
+    """The rule that is held by: `plan` or `sixty_forty`."""
+    amount: InBothWorlds
+    """The amount that lasts with the certainty asked for."""
 
 
 SweepRange = TypedDict(
@@ -1483,6 +1958,8 @@ class Terms(TypedDict):
     """C, the money added at the end of each period; negative if it is withdrawn."""
     learning: Learning
     """Weights of older returns in the learned law."""
+    ends: NotRequired[bool]
+    """True if the policy plans spending to its horizon, which no renewal moves."""
     periods_per_year: NotRequired[float | None]
     """Number of periods in a year. A period reported without a date gets the next due date, found from this number."""
     means: NotRequired[MeansRule]
@@ -1498,6 +1975,10 @@ class TextPosition(TypedDict):
     """Field of the line, from 1."""
     value: str
     """The value at this place, shortened if it is long."""
+
+
+TradeLimit: TypeAlias = Literal["lot", "smallest", "buys_only", "cash"]
+"""Why less is traded than was advised."""
 
 
 class TransportedMass(TypedDict):
@@ -1532,6 +2013,19 @@ class Uncertainty(TypedDict):
 
 Unit: TypeAlias = Literal["fraction", "percent"]
 """The unit of returns."""
+
+
+class UnitOrder(TypedDict):
+    """An order."""
+
+    asset: str
+    side: OrderSide
+    units: float
+    """Units to trade, a whole number of lots."""
+    price: float
+    """Price of a unit, as it was sent."""
+    amount: float
+    """Units times price."""
 
 
 class UtilityReport(TypedDict):
@@ -1612,10 +2106,22 @@ class WalkedStrategy(TypedDict):
     """
     difference: NotRequired[Estimate | None]
     periods: list[WalkedPeriod]
-    """Period by period."""
+    """The periods that the strategy went through, in order."""
 
 
-WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "tail_heavy", "few_alike", "jumps"]
+class WantedSpending(TypedDict):
+    """An amount that is wanted in every period."""
+
+    amount: float
+    """The amount, in money of now."""
+    lasts: InBothWorlds
+    """
+    Probability that it can be spent in every period to the horizon, holding the shares of the plan: of all that is
+    left, also where the plan itself keeps a reserve.
+    """
+
+
+WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "inflation_high", "tail_heavy", "lone_return", "few_alike", "jumps"]
 """Kind of a warning."""
 
 
@@ -1644,6 +2150,26 @@ class WealthReport(TypedDict):
     """
     Mean over paths of the largest fall below the highest value so far, as a share of it. Contributions and
     withdrawals are neither gain nor fall.
+    """
+
+
+class WeightLimits(TypedDict):
+    """
+    Limits on the composition: shares of the risky holdings, which sum to 1. A greatest share then holds for shares of
+    wealth too. The share in all assets together is limited by `action_interval`.
+    """
+
+    each: NotRequired[ShareRange]
+    """The least and the greatest share of every asset that `assets` does not name. Default: 0 and 1."""
+    assets: NotRequired[dict[str, ShareRange]]
+    """The least and the greatest share of an asset, by its name."""
+    groups: NotRequired[list[GroupLimit]]
+    """Groups of assets with limits on the sums of their shares, at most 30. Groups may overlap."""
+    max_turnover: NotRequired[float | None]
+    """
+    Limit on the turnover of a period, 0 to 2: the sum over the assets of the changes of shares of the risky holdings,
+    from those held before trading. If the other limits need a larger turnover, the smallest one that they allow is
+    made. Nothing is limited if nothing is held.
     """
 
 
@@ -1733,14 +2259,21 @@ class Advice(TypedDict):
     allocation.
     """
     trade: float
-    """The allocation less the holding: the share of wealth to buy, or to sell if negative."""
+    """
+    The share of wealth to buy, or to sell if negative: the allocation less the holding, of the wealth left after
+    spending.
+    """
+    spending: NotRequired[SpendingAdvice | None]
     contribution: float
     """Money added at the end of the period, or withdrawn if negative."""
     certainty_equivalent: float
-    """Certainty equivalent of the robust value, in terminal wealth."""
+    """
+    Certainty equivalent of the robust value, in terminal wealth; with spending, the sure level of spending a period,
+    in money of now, that is worth as much, with what is secured.
+    """
     floor: float
     """
-    Terminal wealth if everything is sold now and stays in the bank, with all later contributions and withdrawals.
+    Terminal wealth, or with spending its sure level, if everything is sold now and stays in the bank, with all later contributions and withdrawals.
     No law can take it away.
     """
     radius: float
@@ -1753,7 +2286,7 @@ class Advice(TypedDict):
     effective_size: float
     """Effective sample size; equal to `sample_size` if `learning` is `equal` and the centre is not `conditional`."""
     surrogate_sd: float
-    """Predicted standard deviation of the log certainty equivalent."""
+    """Predicted standard deviation of the log certainty equivalent; if spending is secured, of what exceeds it."""
     in_design: bool
     """True if the state lies within the region where the surrogates were trained."""
     source: AdviceSource
@@ -1819,11 +2352,13 @@ class AssetsBacktestRequest(TypedDict):
     Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it; no other strategy takes it
     into account. Default 0.
     """
-    weights: NotRequired[dict[str, list[list[float]]]]
+    limits: NotRequired[WeightLimits | None]
+    weights: NotRequired[dict[str, OwnSharesVecF64]]
     """
     Strategies of your own by name, at most 10: for every period of the record the shares of wealth in the assets, in
-    their order, which add up to at most 1. Those of the longest window are not used. Shares may use only what was
-    known before their period: nothing here can check that.
+    their order, which add up to at most 1, or a formula for the share of each asset over its returns before, such as
+    `1/deviation60`; formulas that add up to more than 1 are divided by their sum. Shares of the longest window are not
+    used. Given shares may use only what was known before their period: nothing here can check that.
     """
     seed: NotRequired[int]
     """Seed of all random draws. The same request and seed give the same report, bit for bit. Default 1."""
@@ -1855,6 +2390,7 @@ class AssetsChoices(TypedDict):
     """Relative risk aversion."""
     trading_cost: float
     """Share of each trade that is lost."""
+    limits: NotRequired[WeightLimits | None]
     seed: int
     """Seed of the bridges and of the resamples."""
 
@@ -1884,6 +2420,7 @@ class AssetsProblem(TypedDict):
     """Distance that sets the adversary's cost of moving a law. Default: `scaled_one`."""
     composition: NotRequired[CompositionRule]
     """How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`."""
+    limits: NotRequired[WeightLimits | None]
     means: NotRequired[MeansRule]
     """The means of the assets under the law at the centre. Default: `sample`."""
     horizon: NotRequired[int | None]
@@ -1909,15 +2446,16 @@ class AssetsProblem(TypedDict):
     """
     contributions: NotRequired[Contributions]
     """Money added at the end of each period, or withdrawn if negative. Default 0. Advice accepts no other value."""
+    spending: NotRequired[Spending | None]
     risk_aversion: NotRequired[float | None]
     """Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above."""
     utility: NotRequired[UtilitySpecification]
-    """Utility of wealth at the horizon. Default: power utility with risk aversion 3."""
+    """Utility of wealth at the horizon, or of spending. Default: power utility with risk aversion 3."""
     radius: NotRequired[RadiusRule | None]
     caution: NotRequired[CautionLevel | None]
     support: NotRequired[Support | None]
     history: list[HistoryItem]
-    """Log-returns by date, oldest first, 2 to 2000 dates; each date has one value for each asset."""
+    """Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset."""
 
 
 class BacktestFigures(Performance):
@@ -2269,6 +2807,7 @@ class FundSpecification(TypedDict):
     """Distance that sets the adversary's cost of moving a law."""
     composition: CompositionRule
     """How the shares of the assets within the risky holdings are chosen."""
+    limits: NotRequired[WeightLimits | None]
     means: NotRequired[MeansRule]
     """The means of the assets under the law at the centre. Default: `sample`."""
     radius_factor: NotRequired[float | None]
@@ -2312,6 +2851,29 @@ class JobProgress(TypedDict):
     """Design points solved, or paths simulated, in this step."""
     points_total: NotRequired[int | None]
     seconds_left: NotRequired[float | None]
+
+
+class LetterRequest(TypedDict):
+    """A request for a client's letter."""
+
+    firm: NotRequired[Firm | None]
+    currency: NotRequired[str | None]
+    """Currency of the amounts: a code of three capital letters (ISO 4217). Default: none is named."""
+    smallest_trade: NotRequired[SmallestTrade | None]
+    date: NotRequired[str | None]
+    """The day of the letter. Default: today, in UTC."""
+
+
+class MakeLink(TypedDict):
+    """A request for a link to a session's letter."""
+
+    days: NotRequired[int]
+    """Days until the link expires."""
+    letter: NotRequired[LetterRequest]
+    """
+    Firm, currency and smallest trade of the letter, which the link keeps. It has the day on which it is read, and no
+    logo.
+    """
 
 
 class NextReturn(TypedDict):
@@ -2358,7 +2920,7 @@ class Now(TypedDict):
 
 
 class OneStep(TypedDict):
-    """The one-step problem of several assets, by their names."""
+    """The one-step problem of several assets, by name."""
 
     allocation: dict[str, float]
     """Shares of wealth that are best when looking one period ahead."""
@@ -2383,7 +2945,7 @@ class OpenSession(TypedDict):
     holding: NotRequired[float | None]
     """Share of wealth in the risky asset at the start. Default: 0."""
     holdings: NotRequired[dict[str, float]]
-    """Share of wealth in each of several assets at the start, by their names. Default: 0."""
+    """Share of wealth in each of several assets at the start, by name. Default: 0."""
     state: NotRequired[dict[str, float]]
     """States of a declared problem at the start, by name. Default: the problem's own start."""
     renew: NotRequired[Renewing | None]
@@ -2412,6 +2974,87 @@ class PeriodReport(TypedDict):
     all_bank_share: float
     """Share of paths that held nothing in the risky asset."""
     radius: NotRequired[RadiusSpread | None]
+
+
+class Problem(TypedDict):
+    """The investor, several assets, and what is known of their returns."""
+
+    assets: list[str]
+    """Names of the assets, 2 to 30, all different, in the order of the columns of `history`."""
+    ground_norm: NotRequired[GroundNorm]
+    """Distance that sets the adversary's cost of moving a law. Default: `scaled_one`."""
+    composition: NotRequired[CompositionRule]
+    """How the shares of the assets within the risky holdings are chosen, period after period. Default: `one_step`."""
+    limits: NotRequired[WeightLimits | None]
+    means: NotRequired[MeansRule]
+    """The means of the assets under the law at the centre. Default: `sample`."""
+    horizon: NotRequired[int | None]
+    """
+    Number of allocation decisions that a policy is trained for, 1 to 520. Default: 10 for a policy; always 1 for
+    advice.
+    """
+    rate_per_step: float
+    """Return of the bank per step, as a fraction, -0.5 to 0.5."""
+    periods_per_year: NotRequired[float | None]
+    """
+    Number of periods of the history in a year, 1 to 366. It is used for annual figures and does not change the
+    advice.
+    """
+    initial_wealth: NotRequired[float]
+    """Initial wealth, in any currency, 1e-6 to 1e15. Default 100."""
+    action_interval: NotRequired[list[float]]
+    """Share of wealth that may be held in all assets together: `[0, highest]`. Default: `[0, 1]`."""
+    trading_cost: NotRequired[float]
+    """
+    Cost of moving money between the bank and any asset, as a share of the amount moved, 0 to 0.1. Default 0. Advice
+    accepts a cost under power and log utility only.
+    """
+    contributions: NotRequired[Contributions]
+    """Money added at the end of each period, or withdrawn if negative. Default 0. Advice accepts no other value."""
+    spending: NotRequired[Spending | None]
+    risk_aversion: NotRequired[float | None]
+    """Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above."""
+    utility: NotRequired[UtilitySpecification]
+    """Utility of wealth at the horizon, or of spending. Default: power utility with risk aversion 3."""
+    radius: NotRequired[RadiusRule | None]
+    caution: NotRequired[CautionLevel | None]
+    support: NotRequired[Support | None]
+    history: list[list[float]]
+    """Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset."""
+
+
+class PlanQuestionAssetsProblem(TypedDict):
+    """A question about the years to come: how much to spend and what to hold in each period, and how likely it lasts."""
+
+    problem: Problem
+    """The investor, several assets, and what is known of their returns."""
+    wanted: NotRequired[float | None]
+    """An amount wanted in every period, in money of now, 1e-6 to 1e15. Default: the first amount of the plan."""
+    goal: NotRequired[float | None]
+    """Wealth wanted at the horizon, in money of now, 1e-6 to 1e15. Default: none."""
+    saved: NotRequired[float | None]
+    """
+    An amount put in at the start of every period, in money of now, 1e-6 to 1e15, if the plan aims at a goal. `wanted` is
+    then left out. Default: none.
+    """
+    aim: NotRequired[PlanAim]
+    """
+    The aim of the plan. Default `spending`. With `goal`, `problem.spending` says nothing but `inflation`, and
+    `problem.utility` does not count.
+    """
+    drawdown_limit: NotRequired[float | None]
+    """
+    Limit on the drawdown, 0.01 to 0.99: no return of the support takes money that stays invested further below its
+    highest value so far than this share. Spending is no loss. Default: none.
+    """
+    drawdown: NotRequired[float]
+    """The drawdown at the start, 0 to 0.99 and below the limit. Default 0."""
+    certainty: NotRequired[float]
+    """Probability with which a sustainable amount lasts, 0.5 to 0.999. Default 0.9."""
+    paths: NotRequired[int]
+    """Number of simulated paths, 200 to 20,000; times the horizon at most 4,000,000. Default 4000."""
+    seed: NotRequired[int]
+    """Seed of the simulated bridges and paths. Default 1."""
 
 
 class ProblemDocument(TypedDict):
@@ -2458,10 +3101,11 @@ class ProblemSpecification(TypedDict):
     """Cost of moving money either way between bank and asset, as a share of it: 0, or 1e-9 to 0.1. Default 0."""
     contributions: NotRequired[Contributions]
     """Money added at the end of each period, or withdrawn if negative: one number, or `horizon` numbers. Default 0."""
+    spending: NotRequired[Spending | None]
     risk_aversion: NotRequired[float | None]
     """Relative risk aversion, 1 to 100, instead of `utility`: log utility at 1, power utility above."""
     utility: NotRequired[UtilitySpecification]
-    """Utility of terminal wealth. Default: power utility with risk aversion 3."""
+    """Utility of terminal wealth, or of spending. Default: power utility with risk aversion 3."""
     learning: NotRequired[Learning]
     """Weights of older returns in the learned law. Default: `equal`."""
     centre: NotRequired[CentreSpecification]
@@ -2519,9 +3163,29 @@ class RenewalDue(TypedDict):
     job: NotRequired[str | None]
     """The job that trains the policy, or last did; null before there is one."""
     error: NotRequired[str | None]
-    """Why the last attempt failed."""
+    """The reason why the last job failed; null if it did not fail."""
     attempts: int
     """Jobs so far."""
+
+
+class RpcFailure(TypedDict):
+    """The answer to a request that has no result."""
+
+    jsonrpc: str
+    id: NotRequired[RpcId | None]
+    error: RpcError
+
+
+class RpcMessage(TypedDict):
+    """A request, or a notification if it has no `id`."""
+
+    jsonrpc: RpcVersion
+    id: NotRequired[RpcId]
+    """Identifier that the answer repeats. A notification has none."""
+    method: str
+    """Name of the method, such as `tools/call`."""
+    params: NotRequired[dict[str, Any]]
+    """Parameters of the method."""
 
 
 class Sensitivity(TypedDict):
@@ -2578,6 +3242,13 @@ class SessionEntry(Labels):
     """Share of wealth in the risky asset, before trading."""
     wealth_change: NotRequired[float | None]
     """Change of wealth in the last period; null before the first."""
+    log_return: NotRequired[float | None]
+    """
+    Log-return of the last period, by which sessions that see one return can be compared. That of several assets is
+    the return of their fund. Null if it is missing, or if an earlier period was corrected since.
+    """
+    log_returns: NotRequired[dict[str, float | None]]
+    """Log-returns of several assets in the last period, by name. Null as `log_return` is, and after any correction."""
     date: NotRequired[str | None]
     """Last day that was reported."""
     last_report_ms: NotRequired[int | None]
@@ -2616,6 +3287,36 @@ class SessionPage(TypedDict):
     """Cursor to pass as `after` for the next page; null on the last page."""
 
 
+class SleeveQuestion(TypedDict):
+    """A question about the share of the capital that the record of one strategy or several supports."""
+
+    problem: ProblemSpecification
+    """
+    The problem as in `POST /advise`, with a strategy for each asset. Utility is logarithmic, so `utility` and
+    `risk_aversion` are left out, and so is `trading_cost`: a record is net of costs. The default of `caution` is `paper`,
+    the whole radius.
+    """
+    record_of: NotRequired[RecordUnit]
+    """The values of `problem.history`: returns of `periods` or outcomes of `trades`. Default `periods`."""
+    seed: NotRequired[int]
+    """Seed of the simulated bridges. Default 1."""
+
+
+class SleeveQuestionAssetsProblem(TypedDict):
+    """A question about the share of the capital that the record of one strategy or several supports."""
+
+    problem: Problem
+    """The investor, several assets, and what is known of their returns."""
+    record_of: NotRequired[RecordUnit]
+    """The values of `problem.history`: returns of `periods` or outcomes of `trades`. Default `periods`."""
+    seed: NotRequired[int]
+    """Seed of the simulated bridges. Default 1."""
+
+
+SleeveRequest: TypeAlias = SleeveQuestion | SleeveQuestionAssetsProblem
+"""A question about one strategy, or about several, which `problem.assets` names."""
+
+
 class StepDiagnostics(TypedDict):
     """Diagnostics of how well a step was solved."""
 
@@ -2635,6 +3336,23 @@ class StepDiagnostics(TypedDict):
     expected_error: NotRequired[ExpectedError | None]
     value: NotRequired[SurrogateDiagnostics | None]
     policy: NotRequired[SurrogateDiagnostics | None]
+
+
+class StrategyShare(TypedDict):
+    """The share of one of several strategies."""
+
+    share: float
+    """Share of the capital."""
+    kelly: NotRequired[float | None]
+    """Its part of the Kelly share; null if that is."""
+    mean: WorstMean
+    """Its mean log-return in the record and under the worst law."""
+
+
+class SubscriptionList(TypedDict):
+    """The subscriptions of the tenant, oldest first."""
+
+    subscriptions: list[SubscriptionState]
 
 
 class SurfaceGrid(TypedDict):
@@ -2688,6 +3406,16 @@ class Sweep(TypedDict):
     radius_scale: NotRequired[SweepRange | None]
     simple_return: NotRequired[SweepRange | None]
     wealth: NotRequired[SweepRange | None]
+
+
+class TradeLeftOut(TypedDict):
+    """A trade that was advised and is not, or not wholly, ordered."""
+
+    asset: str
+    amount: float
+    """Money that is not traded: to buy, or to sell if negative."""
+    limit: TradeLimit
+    """The limit that took most of it."""
 
 
 class Train(TypedDict):
@@ -2827,8 +3555,8 @@ class WorstCase(TypedDict):
     radius_cost: float
     """
     Loss of log certainty equivalent per unit of extra radius: the slope at this radius, for this period's ball
-    alone. A wider ball costs at most this times the extra radius, and at most the whole worth of the advice above
-    the floor.
+    alone. A wider ball costs at most this slope times the extra radius. It never costs more than the whole worth of
+    the advice above the floor.
     """
     transport: list[TransportedMass]
     """The transport of mass; empty in the parametric frameworks."""
@@ -2936,8 +3664,9 @@ class AssetsAdvice(TypedDict):
     """Radius of the ball, in log-return."""
     radius_factor: float
     """
-    Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs
-    low: by little if assets move together, by more than a tenth for a dozen that are independent.
+    Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. The
+    search for it may end too low: by little if assets move together, by more than a tenth for a dozen that are
+    independent.
     """
     levels: NotRequired[LevelsAdvised | None]
     sample_size: int
@@ -3097,11 +3826,11 @@ class BacktestRequest(TypedDict):
     """Trading cost, as a share of the amount traded, 0 to 0.1. Policies are trained with it. Default 0."""
     cost_blind: NotRequired[bool]
     """If true, every policy is trained as if trading were free. Default false."""
-    weights: NotRequired[dict[str, list[float]]]
+    weights: NotRequired[dict[str, OwnSharesF64]]
     """
     Strategies of your own by name, at most 10: the share of wealth that each holds in every period of the record,
-    0 to 1. Those of the first window are not used. A share may use only what was known before its period: nothing
-    here can check that.
+    0 to 1, or a formula for it over the returns before, such as `if(mean12 > bank, 1, 0)`. Shares of the first window
+    are not used. Given shares may use only what was known before their period: nothing here can check that.
     """
     count: NotRequired[int]
     """Number of design points per step, 10 to 10,000. Default 100."""
@@ -3110,7 +3839,7 @@ class BacktestRequest(TypedDict):
 
 
 class Composition(TypedDict):
-    """Several assets before the coming period, by their names."""
+    """Several assets before the coming period, by name."""
 
     composition: dict[str, float]
     """Share of each asset in the advised holdings; they sum to 1."""
@@ -3289,8 +4018,8 @@ class DeclaredObserved(Uncertainty):
     """The states after the period, by name."""
     date: NotRequired[str | None]
     """
-    The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
-    period.
+    The last day of the period: the one reported, or else the next one due by the calendar. If that is unknown too,
+    it is the last day known of an earlier period.
     """
     completed: bool
     """True if the horizon is reached."""
@@ -3349,6 +4078,11 @@ class EvaluationRequest(TypedDict):
     Constant allocations to compare, as shares of wealth, at most 101; 0 is All in the bank. Default: 0 to 1 in
     steps of 0.1, up to the highest action.
     """
+    weights: NotRequired[dict[str, str]]
+    """
+    Strategies of your own by name, at most 10: a formula for the share of wealth over the returns before each period,
+    the history's and the path's, such as `if(mean12 > bank, 1, 0)`. Default: none.
+    """
     policies: NotRequired[dict[str, str]]
     """Trained policies to use, by framework. Policies for the other frameworks are trained inside the job."""
     paths: NotRequired[int]
@@ -3395,15 +4129,19 @@ class FundAdvice(Composition):
     total: float
     """Share of wealth in all assets together."""
     trade: dict[str, float]
-    """The allocation minus the holdings: shares of wealth to buy, or to sell if negative."""
+    """Shares of wealth to buy, or to sell if negative: the allocation, of the wealth left after spending, less the holdings."""
     band: list[float]
     """The totals that are best kept as they are. If trading costs nothing, both ends are the total."""
+    spending: NotRequired[SpendingAdvice | None]
     contribution: float
     """Money added at the end of the period; negative if withdrawn."""
     certainty_equivalent: float
-    """Certainty equivalent, in terminal wealth, of keeping this composition. A later composition never promises less."""
+    """
+    Certainty equivalent, in terminal wealth or with spending in its sure level, of keeping this composition. A later
+    composition never promises less.
+    """
     floor: float
-    """Terminal wealth from selling everything now and staying in the bank."""
+    """Terminal wealth, or with spending its sure level, from selling everything now and staying in the bank."""
     radius: float
     """Radius of the ball around the law of the fund, in log-return."""
     sample_size: int
@@ -3445,7 +4183,7 @@ class JobPage(TypedDict):
 
 
 class ObservedAssets(Composition):
-    """A period of several assets, by their names."""
+    """A period of several assets, by name."""
 
     log_returns: NotRequired[dict[str, float | None]]
     """
@@ -3456,6 +4194,98 @@ class ObservedAssets(Composition):
     """Advised share of wealth in each asset."""
     executed_allocations: dict[str, float]
     """Executed share of wealth in each asset."""
+
+
+class OrdersAnswer(TypedDict):
+    """The orders, and how things stand after them."""
+
+    session: str
+    period: int
+    """The period that the advice is for."""
+    wealth: float
+    """Worth of units and cash together, before spending."""
+    spending: float
+    """Spending that is advised; it is taken from the cash."""
+    orders: list[UnitOrder]
+    """Sales first, each in the order of the assets."""
+    left_out: list[TradeLeftOut]
+    """Trades left out, in the order of the assets."""
+    cash: float
+    """Cash after spending, all orders and their cost; negative only if spending exceeds it and nothing could be sold."""
+    cost: float
+    """Cost of all orders."""
+    shares: dict[str, float]
+    """Share of each asset in what is left after them, by name."""
+    advised: dict[str, float]
+    """Share of each asset that is advised, by name."""
+
+
+class PlanQuestion(TypedDict):
+    """A question about the years to come: how much to spend and what to hold in each period, and how likely it lasts."""
+
+    problem: ProblemSpecification
+    """
+    The problem as in a training, of one asset or several. Its horizon is that of the plan, and `spending` may be left
+    out. The plan keeps to the ball of the record: `framework` is `static` or left out. Several assets are held in the
+    composition that is best for one period, which is restored in each.
+    """
+    wanted: NotRequired[float | None]
+    """An amount wanted in every period, in money of now, 1e-6 to 1e15. Default: the first amount of the plan."""
+    goal: NotRequired[float | None]
+    """Wealth wanted at the horizon, in money of now, 1e-6 to 1e15. Default: none."""
+    saved: NotRequired[float | None]
+    """
+    An amount put in at the start of every period, in money of now, 1e-6 to 1e15, if the plan aims at a goal. `wanted` is
+    then left out. Default: none.
+    """
+    aim: NotRequired[PlanAim]
+    """
+    The aim of the plan. Default `spending`. With `goal`, `problem.spending` says nothing but `inflation`, and
+    `problem.utility` does not count.
+    """
+    drawdown_limit: NotRequired[float | None]
+    """
+    Limit on the drawdown, 0.01 to 0.99: no return of the support takes money that stays invested further below its
+    highest value so far than this share. Spending is no loss. Default: none.
+    """
+    drawdown: NotRequired[float]
+    """The drawdown at the start, 0 to 0.99 and below the limit. Default 0."""
+    certainty: NotRequired[float]
+    """Probability with which a sustainable amount lasts, 0.5 to 0.999. Default 0.9."""
+    paths: NotRequired[int]
+    """Number of simulated paths, 200 to 20,000; times the horizon at most 4,000,000. Default 4000."""
+    seed: NotRequired[int]
+    """Seed of the simulated bridges and paths. Default 1."""
+
+
+class PlanReport(TypedDict):
+    """A plan and how it fares. Amounts are in money of now. Figures of simulated paths have intervals at 95 %."""
+
+    sentences: list[str]
+    """The answer in sentences, the most important first."""
+    advice: Advice
+    """Spending now, and the holding until the next period."""
+    composition: NotRequired[dict[str, float]]
+    """Shares of several assets in what is held, by name, restored in each period; left out for one asset."""
+    worst_case: NotRequired[WorstCase | None]
+    periods: list[PlannedPeriod]
+    """Spending and holding of each period; empty if they depend on more than the period."""
+    states: NotRequired[PlannedStates | None]
+    wanted: WantedSpending
+    """The chance that the amount wanted lasts."""
+    sustainable: list[SustainableSpending]
+    """
+    The largest amounts that can be spent in every period to the horizon, and leave nothing; none if the plan aims at a
+    goal.
+    """
+    strategies: list[PlanStrategy]
+    """The plan beside simple rules, on the same paths. Rules of a year need `problem.periods_per_year`."""
+    fan: PlanFan
+    """Wealth and spending of the plan on these paths."""
+    breaking: NotRequired[BreakingReturn | None]
+    annualised: NotRequired[Annualised | None]
+    warnings: list[Warning]
+    """Parts of the request that may be a mistake."""
 
 
 class Question(TypedDict):
@@ -3570,6 +4400,39 @@ class Session(Labels):
     created_ms: int
 
 
+class SleeveReport(TypedDict):
+    """The share of the capital that a record supports, beside the Kelly share, which takes the record as the truth."""
+
+    sentences: list[str]
+    """The answer in sentences, the most important first; the last ones say what would refute it."""
+    share: float
+    """Share of the capital, in all strategies together: the allocation of `POST /advise` under log utility."""
+    kelly: NotRequired[float | None]
+    """
+    The Kelly share of the record, in all strategies together: the share of the fastest growth if the record is the truth
+    and money is borrowed at the bank's rate. It may exceed 1. Null if growth has no maximum, or none is found.
+    """
+    fraction: NotRequired[float | None]
+    """The share over the Kelly share; null if the latter is null or 0."""
+    strategies: NotRequired[dict[str, StrategyShare]]
+    """The shares of several strategies, by name; left out for one."""
+    growth: SleeveGrowth
+    """Growth of the capital a period or trade."""
+    growth_a_year: NotRequired[SleeveGrowth | None]
+    record: NotRequired[ReturnMoments | None]
+    worst: NotRequired[ReturnMoments | None]
+    refutation: NotRequired[Refutation | None]
+    worst_case: NotRequired[WorstCase | None]
+    radius: float
+    """Radius of the ball, in log-return."""
+    sample_size: int
+    """Number of periods or trades in the record."""
+    caution: list[Caution]
+    """Warnings to read before following the answer."""
+    warnings: list[Warning]
+    """Parts of the request that may be a mistake."""
+
+
 class Specification(TypedDict):
     """A complete training job."""
 
@@ -3591,9 +4454,9 @@ class StrategyReport(TypedDict):
     """Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like."""
     framework: NotRequired[Framework | None]
     constant_mix: NotRequired[float | None]
-    """The allocation of a constant mix."""
+    """The allocation of a constant mix; null for others."""
     policy: NotRequired[str | None]
-    """The policy followed; null for constant mixes, and if each history had its own."""
+    """The policy followed; null for strategies without one, and if each history had its own."""
     utility: UtilityReport
     """
     Utility of terminal wealth, measured from `floor`: `(U(x) - U(floor)) / (floor U'(floor))`. This form loses no
@@ -3803,6 +4666,9 @@ class Observed(Uncertainty):
     """
     advised_allocation: float
     executed_allocation: float
+    advised_spending: NotRequired[SpendingAdvice | None]
+    spent: NotRequired[float | None]
+    """Money spent at the start of the period; left out if it is none."""
     wealth: float
     """Wealth at the end of the period, including what was added to it."""
     holding: float
@@ -3812,13 +4678,17 @@ class Observed(Uncertainty):
     """Change of wealth over the period, including flows and wealth reported otherwise."""
     date: NotRequired[str | None]
     """
-    The last day of the period: as reported, else the next one due. If that is unknown, the day of an earlier
-    period.
+    The last day of the period: the one reported, or else the next one due by the calendar. If that is unknown too,
+    it is the last day known of an earlier period.
     """
     completed: bool
     """True if the horizon is reached and no policy is to follow."""
     drift: Drift
     """The test of whether returns still come from the same law."""
+
+
+PlanAsked: TypeAlias = PlanQuestion | PlanQuestionAssetsProblem
+"""A question about one asset, or about several, which `problem.assets` names."""
 
 
 Posed: TypeAlias = Specification | DeclaredSpecification

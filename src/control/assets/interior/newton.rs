@@ -115,7 +115,7 @@ impl Interior<'_> {
     }
 
     /// Extends the system of shares and price by the trade in each asset, of which every unit costs the price of
-    /// trading.
+    /// trading, and by the moves of a limited turnover, which cost nothing.
     fn with_trades(&self, system: System) -> System {
         let (size, whole) = (system.size, self.point.len());
         if whole == size {
@@ -126,7 +126,8 @@ impl Interior<'_> {
             row[..size].copy_from_slice(of);
         }
         let mut right = system.right;
-        right.resize(whole, -self.step.trading.price);
+        right.resize(size + self.step.trading.holdings.len(), -self.step.trading.price);
+        right.resize(whole, 0.0);
         System { size: whole, matrix, right, waiting: system.waiting }
     }
 

@@ -36,6 +36,7 @@ impl AssetsChoices {
             support: Support::default(),
             means: MeansRule::default(),
             trading_cost: 0.0,
+            limits: None,
             seed: default_seed(),
         }
     }
@@ -59,6 +60,10 @@ impl AssetsChoices {
         self.means.check("means", Some(self.support))?;
         within("risk_aversion", self.risk_aversion, RELATIVE_RISK_AVERSION.0, RELATIVE_RISK_AVERSION.1)?;
         within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)
+    }
+
+    pub(super) fn check_limits(&self, assets: &[String]) -> Result<(), FieldError> {
+        self.limits.as_ref().map_or(Ok(()), |limits| limits.check("limits", assets))
     }
 
     /// Returns the choices with the defaults of a policy, if one is trained.

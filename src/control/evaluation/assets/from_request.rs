@@ -39,6 +39,7 @@ impl AssetsBacktest {
             means: request.means,
             risk_aversion: request.risk_aversion,
             trading_cost: request.trading_cost,
+            limits: request.limits.clone(),
             seed: request.seed,
         };
         let backtest = AssetsBacktest::new(record, choices).map_err(|error| renamed(error, field))?;

@@ -19,6 +19,7 @@ use crate::control::cache::Cache;
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
 use crate::control::evaluation::names::check_own_names;
+use crate::control::evaluation::own::{NamedShares, shares_of_assets};
 use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
@@ -68,7 +69,7 @@ pub struct AssetsBacktest {
     /// The first period that is decided: after the longest window, or after 20 years if all returns are known.
     pub first: usize,
     /// Strategies of the user's own by name, with their shares date by date.
-    pub own: Vec<(String, Vec<Vec<f64>>)>,
+    pub own: Vec<NamedShares>,
 }
 
 /// The decisions of one strategy, period by period.
@@ -120,6 +121,7 @@ impl AssetsBacktest {
         let choices = choices.with_policy();
         choices.check()?;
         check_names("assets", &record.assets)?;
+        choices.check_limits(&record.assets)?;
         let (found, year) = (record.rows.len(), record.periods_per_year);
         let longest = choices.windows.iter().flatten().max();
         let first = longest.copied().unwrap_or(usual_window(WINDOW_YEARS[1] * year, found, year));
@@ -146,9 +148,8 @@ impl AssetsBacktest {
     /// A name or a share that breaks a rule.
     pub fn with_own(mut self, own: OwnAssetsWeights) -> Result<Self, FieldError> {
         check_assets_weights(&own, self.record.assets.len(), self.record.rows.len())?;
-        let name = |strategy: AssetsStrategy| self.name_of(strategy);
-        check_own_names(own.keys(), self.strategies().into_iter().map(name))?;
-        self.own = own.into_iter().collect();
+        check_own_names(own.keys(), self.strategies().into_iter().map(|strategy| self.name_of(strategy)))?;
+        self.own = shares_of_assets(&own, &self.record.rows, &self.record.bank, self.first)?;
         Ok(self)
     }
 
@@ -295,7 +296,8 @@ impl AssetsBacktest {
             ..ProblemSpecification::of(Vec::new(), self.record.bank[period - 1])
         };
         let rows = self.record.known(period, window).to_vec();
-        AssetsProblem { means: self.choices.means, ..asked_of(self.record.assets.clone(), rows, &specification) }
+        let (means, limits) = (self.choices.means, self.choices.limits.clone());
+        AssetsProblem { means, limits, ..asked_of(self.record.assets.clone(), rows, &specification) }
     }
 
     /// Returns the decisions of a strategy in every period, given the balls.
@@ -340,10 +342,9 @@ impl AssetsBacktest {
             }
         };
         let is_equal = matches!(strategy.rule, Rule::Equal { .. });
-        let mix = |total| keep(&vec![equal(self.record.assets.len(), total); held.len()]);
+        let mix = |total| keep(&vec![self.allowed(equal(self.record.assets.len(), total)); held.len()]);
         let own_mix = (!is_equal).then(|| MixBooks::new(account.mean_allocation(), mix));
-        let name = self.name_of(strategy);
-        AssetsLine { name, strategy, radii, held, account, own_mix }
+        AssetsLine { name: self.name_of(strategy), strategy, radii, held, account, own_mix }
     }
 }
 
@@ -388,6 +389,7 @@ mod tests {
             windows: vec![Some(12), None],
             alpha,
             trading_cost: COST,
+            limits: None,
             ..AssetsChoices::usual(record.periods_per_year, record.rows.len())
         };
         AssetsBacktest::new(record, choices).unwrap().run(&Watch::unwatched(), &|| ()).unwrap()
@@ -537,7 +539,7 @@ mod tests {
         let message = |record, choices| AssetsBacktest::new(record, choices).err().unwrap().to_string();
         let windows = |windows: &[Option<usize>]| AssetsChoices { windows: windows.to_vec(), ..usual.clone() };
         assert_eq!(message(record(30), windows(&[None, None])), "window is all: must not be named twice");
-        assert_eq!(message(record(30), windows(&[Some(1)])), "window is 1: must lie in [2, 2000]");
+        assert_eq!(message(record(30), windows(&[Some(1)])), "window is 1: must lie in [2, 10000]");
         let usual_windows = |found| AssetsChoices::usual(4, found).windows;
         assert_eq!(usual_windows(84), [Some(40), Some(80), None]);
         assert_eq!(usual_windows(48), [Some(40), None]);
@@ -546,7 +548,7 @@ mod tests {
         assert_eq!(message(record(11), usual.clone()), short);
         assert_eq!(
             message(record(30), AssetsChoices { every: 0, ..usual.clone() }),
-            "every is 0: must lie in [1, 2000]"
+            "every is 0: must lie in [1, 10000]"
         );
         let still = AssetsRecord { rows: vec![vec![0.01, 0.02]; 30], ..record(30) };
         let still = message(still, usual.clone());

@@ -118,11 +118,11 @@ impl FundWalk<'_> {
         Specification { design, ..Specification::of(problem, self.seed) }.completed().ok()
     }
 
-    /// Walks through all periods on the current pool. `lived` gets the number of each policy, from 0, and the function
-    /// that trains and follows it, whose result it may store or know already.
+    /// Walks through all periods on the current pool. `lived` gets the number of each policy, from 0, and a function that
+    /// trains and follows that policy. It may store the result, or return a stored one without calling the function.
     ///
     /// # Errors
-    /// Those of `lived`.
+    /// The errors of `lived`.
     pub fn run<E>(
         &self,
         watch: &Watch,
@@ -188,7 +188,7 @@ impl FundWalk<'_> {
     ) -> Result<Specification, FieldError> {
         match before {
             Some(WalkState { specification, wealth, .. }) => {
-                specification.next(&rows.concat(), Some(self.record.bank[start - 1]), *wealth)
+                specification.next(&rows.concat(), Some(self.record.bank[start - 1]), *wealth, 0)
             }
             None => self.problem.training(self.design.clone(), SurrogateSpecification::default(), self.seed),
         }

@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 use crate::control::evaluation::names::StrategyKind;
 use crate::control::request::backtest_assets::StrategyFamily;
+use crate::control::request::limits::WeightLimits;
 use crate::control::request::means::MeansRule;
 use crate::control::request::support::Support;
 
@@ -67,6 +68,9 @@ pub struct AssetsChoices {
     pub risk_aversion: f64,
     /// Share of each trade that is lost.
     pub trading_cost: f64,
+    /// Limits on the composition of every strategy but the user's own; left out if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<WeightLimits>,
     /// Seed of the bridges and of the resamples.
     pub seed: u64,
 }

@@ -1,12 +1,13 @@
 //! Rules that choose the shares of several assets.
 
-use super::{AssetsBacktest, AssetsDecisions};
+use super::{AssetsBacktest, AssetsDecisions, AssetsRecord};
 use crate::control::assets::advising::{FundsBall, floors};
 use crate::control::assets::{AssetsSolution, PortfolioStep, ReturnScenarios};
 use crate::control::cache::Cache;
 use crate::control::error::TrainError;
 use crate::control::evaluation::names::{StrategyKind, caution_in_words};
 use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::compositions::CompositionSet;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
 use crate::control::request::backtest_assets::StrategyFamily;
@@ -162,24 +163,62 @@ impl AssetsStrategy {
                 done();
             }
             let rows = backtest.record.known(period, self.window);
+            let compositions = backtest.compositions(held.last().map(|shares: &Vec<f64>| (period, shares)));
             let mut solved = |norm: GroundNorm, caution: CautionLevel| {
                 let step = step(backtest, period, rows, norm, balls[stretch].radius_at(caution));
+                let step = step.within(compositions.clone());
                 last.insert(step.solve(last.as_ref())).allocation.clone()
             };
             let kept = held.last().filter(|_| matches!(self.rule, Rule::Static { .. }) && !is_start);
             let shares = match (kept, self.rule) {
                 (Some(kept), _) => kept.clone(),
-                (None, Rule::MinimumVariance) => least_variance(&covariance(rows)),
+                (None, Rule::MinimumVariance) => match &compositions {
+                    Some(compositions) => compositions.least_variance(&covariance(rows)),
+                    None => least_variance(&covariance(rows)),
+                },
                 (None, Rule::InverseVolatility) => inverse_volatility(rows),
                 (None, Rule::Equal { share }) => equal(rows[0].len(), share),
                 (None, Rule::Own { place }) => backtest.own[place].1[period].clone(),
                 (None, Rule::Robust { norm, caution }) => solved(norm, caution),
                 (None, Rule::Static { caution } | Rule::Policy { caution }) => solved(GroundNorm::ScaledOne, caution),
             };
-            held.push(shares);
+            held.push(match self.rule {
+                Rule::Own { .. } => shares,
+                _ => nearest(compositions.as_ref(), shares),
+            });
         }
         done();
         Ok(AssetsDecisions::Shares(held))
+    }
+}
+
+impl AssetsBacktest {
+    /// Returns the compositions that the limits allow; `None` without limits. `held` is a period and the shares of wealth
+    /// held through the one before, from which a turnover counts.
+    fn compositions(&self, held: Option<(usize, &Vec<f64>)>) -> Option<CompositionSet> {
+        let AssetsRecord { assets, rows, .. } = &self.record;
+        let grown = match held {
+            Some((period, shares)) => shares.iter().zip(&rows[period - 1]).map(|(share, z)| share * z.exp()).collect(),
+            None => vec![0.0; assets.len()],
+        };
+        self.choices.limits.as_ref().map(|limits| limits.compositions(assets, &grown))
+    }
+
+    /// Returns shares of wealth of the nearest composition within the limits, without holdings before.
+    pub(super) fn allowed(&self, shares: Vec<f64>) -> Vec<f64> {
+        nearest(self.compositions(None).as_ref(), shares)
+    }
+}
+
+/// Returns shares of the same sum, of the nearest composition allowed.
+fn nearest(compositions: Option<&CompositionSet>, shares: Vec<f64>) -> Vec<f64> {
+    let total: f64 = shares.iter().sum();
+    match compositions {
+        Some(compositions) if total > 0.0 => {
+            let composition = compositions.nearest(shares.iter().map(|share| share / total).collect());
+            composition.iter().map(|share| total * share).collect()
+        }
+        _ => shares,
     }
 }
 

@@ -17,7 +17,7 @@ pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
     }
 }
 
-/// Returns one statement each, the most important first.
+/// Returns what the figures say in sentences, the most important first.
 pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures]) -> Vec<String> {
     let (lived, record) = (walked.backtest.lived().len(), &walked.backtest.record);
     let mut sentences = vec![ranking(figures)];

@@ -209,7 +209,9 @@ impl Frontier {
     }
 
     fn step(&self, rows: &[Vec<f64>], radius: f64) -> PortfolioStep {
-        advising::step(&self.question.assets, &self.question.fund.problem, rows, radius)
+        let assets = &self.question.assets;
+        let step = advising::step(assets, &self.question.fund.problem, rows, radius);
+        step.within(assets.compositions(&vec![0.0; assets.assets.len()]))
     }
 
     /// Returns the log certainty equivalent of an allocation under a law, relative to the bank.

@@ -4,13 +4,15 @@
 //! Each alternative record is advised for the same period, wealth and holding: the result is the advice now, if that
 //! were the record. So a next return is tried in the last period also.
 
+mod bisection;
 mod search;
 mod sentences;
 
 use serde::Serialize;
 use utoipa::ToSchema;
 
-pub(super) use self::search::check_learning;
+pub use self::bisection::{least_count, parted};
+pub(super) use self::search::{AdviceVariants, check_learning};
 use super::advice::Advice;
 use super::caution::Caution;
 
@@ -18,7 +20,10 @@ use super::caution::Caution;
 /// search.
 const AT_AN_END: f64 = 1e-6;
 /// Most periods considered: eight centuries of months.
-const MOST_PERIODS: usize = 10_000;
+pub const MOST_PERIODS: usize = 10_000;
+
+/// The allocation as a function of the record.
+type AdviceByRecord<'a> = &'a (dyn Fn(&[f64]) -> f64 + Sync);
 
 /// How close an advice is to changing.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -34,6 +39,17 @@ pub struct Sensitivity {
     /// Warning against following the advice, if there is one.
     #[serde(skip)]
     pub caution: Option<Caution>,
+}
+
+impl Sensitivity {
+    /// Returns the sentence on what the next return would have to be for another advice, and otherwise the one on what an
+    /// unusual return would do.
+    pub fn change(&self) -> Option<&str> {
+        let after = self.sentences.iter().position(|sentence| sentence.starts_with(sentences::AFTER))?;
+        // The sentences on crossings follow it.
+        let crosses = self.next_return.to_bank.is_some() || self.next_return.to_highest.is_some();
+        self.sentences.get(after + usize::from(crosses)).map(String::as_str)
+    }
 }
 
 /// The range of the advice over the records that lack one return.

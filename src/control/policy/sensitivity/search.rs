@@ -1,9 +1,10 @@
 //! Computes the advice for other records, and finds the changes of advice between them.
 
+use super::bisection::{least_count, parted};
 use super::sentences::SensitivityText;
 use super::{
-    AT_AN_END, LeftOut, MOST_PERIODS, NextAdvice, NextReturn, Premium, ReturnAndLog, Sensitivity, WithoutOne,
-    is_invested,
+    AT_AN_END, AdviceByRecord, LeftOut, MOST_PERIODS, NextAdvice, NextReturn, Premium, ReturnAndLog, Sensitivity,
+    WithoutOne, is_invested,
 };
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
@@ -36,13 +37,11 @@ const QUANTILES: [f64; 2] = [0.05, 0.95];
 const WIDENED: f64 = 0.5;
 /// Number of equal parts of the range of next returns.
 const PARTS: usize = 48;
-/// Resolution of reported returns and shifts, in log-return.
-const RESOLUTION: f64 = 1e-6;
 /// Share of the action interval beyond which a change of the advice counts as large.
 const FAR: f64 = 0.5;
 
 /// An advice, and functions that compute the advice in other cases.
-struct AdviceVariants<'a> {
+pub(in crate::control::policy) struct AdviceVariants<'a> {
     /// The record, in the order in which the returns came.
     record: &'a [f64],
     advice: &'a Advice,
@@ -52,7 +51,7 @@ struct AdviceVariants<'a> {
     /// Number of design points of the next step's value.
     design: usize,
     /// Returns the allocation for another record.
-    of: &'a (dyn Fn(&[f64]) -> f64 + Sync),
+    of: AdviceByRecord<'a>,
     /// Returns the allocation for another radius.
     within: &'a (dyn Fn(f64) -> f64 + Sync),
 }
@@ -72,23 +71,22 @@ impl Advisor {
             let state = State { law: self.specification().problem.learning.law(record), ..*state };
             self.advise(step, &state, mode).allocation
         };
-        self.sensitivity_by(step, state, record, advice, &of)
+        self.with_variants(step, state, record, (advice, &of), |variants| variants.sensitivity())
     }
 
-    /// Returns the sensitivity, with `of` computing the advice for another record.
-    pub(in crate::control::policy) fn sensitivity_by(
+    /// Answers from the variants of `advice`, with `of` computing the allocation for another record.
+    pub(in crate::control::policy) fn with_variants<T>(
         &self,
         step: usize,
         state: &State,
         record: &[f64],
-        advice: &Advice,
-        of: &(dyn Fn(&[f64]) -> f64 + Sync),
-    ) -> Sensitivity {
+        (advice, of): (&Advice, AdviceByRecord<'_>),
+        answer: impl FnOnce(&AdviceVariants<'_>) -> T,
+    ) -> T {
         let within = |radius: f64| self.explain_within(step, state, radius).0.allocation;
         let problem = &self.specification().problem;
-        let highest = self.highest_action(step, state);
-        let design = self.designed();
-        AdviceVariants { record, advice, problem, highest, design, of, within: &within }.sensitivity()
+        let (highest, design) = (self.highest_action(step, state), self.designed());
+        answer(&AdviceVariants { record, advice, problem, highest, design, of, within: &within })
     }
 
     /// Returns the number of design points of the value after a step; 0 if the step is the last.
@@ -97,10 +95,11 @@ impl Advisor {
         if problem.horizon == 1 { 0 } else { design.count.unwrap_or_default() }
     }
 
-    /// Checks that the sensitivity of advice from `returns` returns has a bounded cost.
+    /// Checks that the sensitivity of advice from so many `returns` may be computed: its cost must be bounded.
     ///
     /// # Errors
-    /// Under the name `sensitivity`: the framework does not learn from returns; too many of them times design points.
+    /// The framework does not learn from returns, or the number of returns times that of design points is too large.
+    /// The error names the field `sensitivity`.
     pub fn check_sensitivity(&self, returns: usize) -> Result<(), FieldError> {
         let problem = &self.specification().problem;
         check_learning(problem, problem.framework.learns())?;
@@ -131,11 +130,10 @@ pub(in crate::control::policy) fn check_learning(
 }
 
 impl AdviceVariants<'_> {
-    fn sensitivity(&self) -> Sensitivity {
+    pub(in crate::control::policy) fn sensitivity(&self) -> Sensitivity {
         let without_one = self.without_one();
         let next_return = self.next_return();
-        let (needed, periods_more) = pool::join(|| self.needed(), || self.periods_more());
-        let premium = Premium { present: self.present(), needed, periods_more };
+        let premium = self.premium_now();
         let caution = without_one.and_then(|range| self.hangs_on_one(range));
         let text = SensitivityText {
             allocation: self.advice.allocation,
@@ -146,6 +144,12 @@ impl AdviceVariants<'_> {
         };
         let sentences = text.sentences(without_one.as_ref(), &next_return, &premium);
         Sensitivity { without_one, next_return, premium, sentences, caution }
+    }
+
+    /// Returns the premium at which the advice leaves the bank.
+    pub(in crate::control::policy) fn premium_now(&self) -> Premium {
+        let (needed, periods_more) = pool::join(|| self.needed(), || self.periods_until(AT_AN_END));
+        Premium { present: self.present(), needed, periods_more }
     }
 
     /// Leaves out each return in turn. With equal weights, equal returns leave equal records and are left out once.
@@ -281,24 +285,16 @@ impl AdviceVariants<'_> {
         Some(self.premium(shift))
     }
 
-    fn periods_more(&self) -> Option<usize> {
-        if is_invested(self.advice.allocation) {
+    /// Returns the number of further returns after which more than `share` is advised.
+    pub(in crate::control::policy) fn periods_until(&self, share: f64) -> Option<usize> {
+        if self.advice.allocation > share {
             return Some(0);
         }
         if let RadiusRule::Fixed { .. } = self.problem.radius_rule() {
             return None;
         }
         let size = |more: usize| self.problem.learning.effective_size(self.record.len() + more);
-        let leaves = |more: usize| is_invested((self.within)(self.advice.radius * (size(0) / size(more)).sqrt()));
-        let (mut too_few, mut enough) = (0, MOST_PERIODS);
-        if !leaves(enough) {
-            return None;
-        }
-        while enough - too_few > 1 {
-            let between = usize::midpoint(too_few, enough);
-            if leaves(between) { enough = between } else { too_few = between }
-        }
-        Some(enough)
+        least_count(MOST_PERIODS, |more| (self.within)(self.advice.radius * (size(0) / size(more)).sqrt()) > share)
     }
 
     fn extremes(&self) -> [f64; 2] {
@@ -312,15 +308,6 @@ impl AdviceVariants<'_> {
             self.problem.support_rule().given().unwrap_or(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
         [min.max(-rules::LOG_RETURN), max.min(rules::LOG_RETURN)]
     }
-}
-
-/// Bisects an interval, of which only the upper end is above, down to the resolution; the result has the same property.
-fn parted([mut below, mut above]: [f64; 2], is_above: impl Fn(f64) -> bool) -> [f64; 2] {
-    while above - below > RESOLUTION {
-        let between = f64::midpoint(below, above);
-        if is_above(between) { above = between } else { below = between }
-    }
-    [below, above]
 }
 
 impl ReturnAndLog {

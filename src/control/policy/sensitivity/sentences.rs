@@ -8,6 +8,9 @@ const STEADY: f64 = 0.02;
 /// An advice that an unusual return moves by more than this is close to changing.
 const CLOSE: f64 = 0.1;
 
+/// The beginning of the sentence on two next returns. The sentences on crossings follow it.
+pub(super) const AFTER: &str = "After a return of ";
+
 /// The advice whose sensitivity is described.
 pub(super) struct SensitivityText {
     /// The share of wealth advised.
@@ -87,10 +90,10 @@ impl SensitivityText {
         let [now, after_low, after_high] = [self.allocation, next.low.allocation, next.high.allocation].map(allocation);
         let [low, high] = [next.low, next.high].map(|next| percent(next.simple_return, 1));
         let mut sentences = vec![match now == after_low && now == after_high {
-            true => format!("After a return of {low} or of {high} the advice would stay at {now}."),
-            false => format!(
-                "After a return of {low} the advice would be {after_low}; after one of {high} it would be {after_high}."
-            ),
+            true => format!("{AFTER}{low} or of {high} the advice would stay at {now}."),
+            false => {
+                format!("{AFTER}{low} the advice would be {after_low}; after one of {high} it would be {after_high}.")
+            }
         }];
         sentences.extend(next.to_bank.map(|to| match (is_invested(self.allocation), percent(to.simple_return, 1)) {
             (false, to) => format!("The advice leaves the bank only if the next {noun} returns more than {to}."),
@@ -134,7 +137,7 @@ fn allocation(share: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{NextAdvice, ReturnAndLog};
+    use super::super::{NextAdvice, ReturnAndLog, Sensitivity};
     use super::*;
 
     fn left_out(index: usize, simple_return: f64, allocation: f64) -> LeftOut {
@@ -185,6 +188,22 @@ mod tests {
             described(0.43, "day").premium(&close)[0]
                 .ends_with("paid 0.0210 % a day more than the bank pays now; the advice leaves the bank at 0.0198 %.")
         );
+    }
+
+    #[test]
+    fn the_change_is_a_crossing_if_there_is_one() {
+        let bank = NextReturn { to_bank: crossing(-0.062), ..after(0.0, 0.612) };
+        for (next_return, expected) in [
+            (bank, "A return of -6.2 % next period would move the advice fully into the bank."),
+            (
+                after(0.1, 0.612),
+                "After a return of -7.0 % the advice would be 10.0 %; after one of 6.0 % it would be 61.2 %.",
+            ),
+        ] {
+            let sentences = described(0.43, "period").sentences(None, &next_return, &PAID);
+            let found = Sensitivity { without_one: None, next_return, premium: PAID, sentences, caution: None };
+            assert_eq!(found.change(), Some(expected));
+        }
     }
 
     #[test]

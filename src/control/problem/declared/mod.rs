@@ -8,7 +8,7 @@
 //! depends.
 
 mod baseline;
-mod formula;
+pub(in crate::control) mod formula;
 mod jumps;
 mod lived;
 mod reading;

@@ -2,7 +2,8 @@
 
 import { h, section } from "./dom.js";
 import { endWords } from "./flows.js";
-import { allocation, figures, minus, percent, points, significant, wealth } from "./format.js";
+import { allocation, figures, minus, percent, points, significant } from "./format.js";
+import { cleared, inCurrency } from "./money.js";
 import { priceFields, shareCount } from "./share_prices.js";
 
 /** Advice is shown to a tenth of a percent: within this distance the policy and the step solved again agree. */
@@ -22,7 +23,7 @@ export const SOURCES = {
 const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 
 /**
- * Shows the advice of `action`, followed by the elements `rest`. `place` is `{heading, end, cautious, price, cost, wealth}`: the name of the
+ * Shows the advice of `action`, followed by the elements `rest`. `place` is `{heading, end, cautious, price, cost, wealth}`: the title of the
  * period, when the horizon ends, whether the policy guards against markets worse than the record, the last price reported or null, and the
  * session's terms. Returns `{element, quant, checked(anew), unchecked(words)}`: `checked` takes the answer of `/action` for the same state
  * with the step solved again, `unchecked` the reason why that failed.
@@ -37,7 +38,8 @@ export function adviceView(action, place, rest) {
     h(
       "div",
       { class: "advice", id: "advice", tabindex: -1 },
-      h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.allocation)), h("span", {}, " in stocks")),
+      spendWords(action),
+      h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.allocation)), h("span", {}, action.spending ? " of the rest in stocks" : " in stocks")),
       sentence,
       action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, minus(sentence))),
       h("p", { class: "sentence" }, why(action, place)),
@@ -59,25 +61,32 @@ export function adviceView(action, place, rest) {
 
 const exactly = ({ allocation, source }) => `Allocation ${percent(allocation, 2)}, ${SOURCES[source]}`;
 
-/** Returns the advice in money, after trading costs, and in shares if a price is known. */
-export function inMoney({ allocation: advised, holding, trade }, { wealth: whole, cost, price }) {
-  const all = whole * (1 - cost * Math.abs(trade));
+/** Says what to spend before the period, if the policy plans it. */
+export function spendWords({ spending }) {
+  if (!spending) return "";
+  return h("p", { class: "sentence lead" }, h("b", {}, `Spend ${inCurrency(spending.amount)}`), ` (${percent(spending.share, 2)} of wealth) before this period.`);
+}
+
+/** Returns the advice in money, after spending and trading costs, and in shares if a price is known. */
+export function inMoney({ allocation: advised, holding, trade, spending }, { wealth: whole, cost, price }) {
+  const left = whole - (spending?.amount ?? 0);
+  const all = left * (1 - cost * Math.abs(trade));
   const [held, now] = [advised * all, holding * whole];
-  const parts = { all, held, now, bank: all - held, trade: held - now, cost: whole - all };
+  const parts = { all, held, now, bank: cleared(all - held, whole), trade: held - now, cost: left - all };
   return price === null ? parts : { ...parts, shares: held / price, traded: (held - now) / price };
 }
 
 /** Says what to trade. A trade smaller than the precision of the advice counts as none. */
-function order(action, place) {
+export function order(action, place) {
   const { all, held, now, trade, bank, cost, shares, traded } = inMoney(action, place);
   const [low, high] = action.band;
   const still = Math.abs(action.trade) < TOLERANCE / 2;
-  const stocks = `${wealth(held)} of ${wealth(all)} in stocks, ${wealth(bank)} in the bank`;
-  const sized = traded === undefined ? "" : ` (about ${shareCount(Math.abs(traded))} shares at ${wealth(place.price)})`;
-  const paid = cost > 0 && !still ? `, which costs ${wealth(cost)}` : "";
+  const stocks = `${inCurrency(held)} of ${inCurrency(all)} in stocks, ${inCurrency(bank)} in the bank`;
+  const sized = traded === undefined ? "" : ` (about ${shareCount(Math.abs(traded))} shares at ${inCurrency(place.price)})`;
+  const paid = cost > 0 && !still ? `, which costs ${inCurrency(cost)}` : "";
   const act = still
-    ? [h("b", {}, "Nothing to trade"), `: you hold ${wealth(now)} now.`]
-    : [h("b", {}, `${trade > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(trade))}`), `${sized}${paid}: you hold ${wealth(now)} now, ${allocation(action.holding)}.`];
+    ? [h("b", {}, "Nothing to trade"), `: you hold ${inCurrency(now)} now.`]
+    : [h("b", {}, `${trade > 0 ? "Buy" : "Sell"} ${inCurrency(Math.abs(trade))}`), `${sized}${paid}: you hold ${inCurrency(now)} now, ${allocation(action.holding)}.`];
   const kept = low < high ? ` The no-trade range is ${allocation(low)} to ${allocation(high)}: do not trade inside it.` : "";
   return [`${stocks}${shares === undefined || shares === 0 ? "" : `, ${shareCount(shares)} shares`}. `, ...act, kept];
 }
@@ -86,13 +95,13 @@ function order(action, place) {
 export function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
   const worst = "n the worst market it guards against";
   const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy assumes");
-  if (allocation === 0) return [`${market}, nothing beats the bank, which reaches `, h("b", {}, wealth(floor)), ` ${end}.`];
+  if (allocation === 0) return [`${market}, nothing beats the bank, which reaches `, h("b", {}, inCurrency(floor)), ` ${end}.`];
   return [
     `${even}, this is worth as much as a sure `,
-    h("b", {}, wealth(certainty_equivalent)),
+    h("b", {}, inCurrency(certainty_equivalent)),
     ` ${end}; all in the bank comes to `,
-    h("b", {}, wealth(floor)),
-    ".",
+    h("b", {}, inCurrency(floor)),
+    cautious ? ". That is a comparison, and no guarantee." : ".",
   ];
 }
 
@@ -101,6 +110,6 @@ function quantWords({ radius, sample_size, effective_size, certainty_equivalent,
   const weighed = effective_size < sample_size - 0.5 ? `, worth ${significant(effective_size, 3)} of equal weight` : "";
   return [
     `Radius of the uncertainty set ${figures(radius, 3)}, around ${sample_size} returns${weighed}.`,
-    `Certainty equivalent ${wealth(certainty_equivalent)}, floor ${wealth(floor)}; predicted standard deviation of its log ${significant(1e4 * surrogate_sd, 2)} bp.`,
+    `Certainty equivalent ${inCurrency(certainty_equivalent)}, floor ${inCurrency(floor)}; predicted standard deviation of its log ${significant(1e4 * surrogate_sd, 2)} bp.`,
   ].join(" ");
 }

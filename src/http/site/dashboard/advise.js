@@ -3,22 +3,21 @@
 
 import { adviceView } from "./advice.js";
 import { post } from "./api.js";
-import { bankRate } from "./bank_rate.js";
 import { h, section, table } from "./dom.js";
-import { draft, FOLLOWING, OPENING } from "./draft.js";
+import { ADVISING, draft, FOLLOWING, OPENING, PLANNING } from "./draft.js";
 import { clear, fieldset, input, refusal, select, showProblem } from "./form.js";
 import { allocation, percent } from "./format.js";
+import { marketTerms, yearlyWords } from "./market_terms.js";
 import { fraction, typed } from "./number_text.js";
 import { unitOf } from "./periods.js";
 import { returnsField } from "./returns_field.js";
 import { severalAdvice } from "./several.js";
+import { limitFields, limitWords } from "./share_limits.js";
 import { investorChoices, investorNote, INVESTORS, warningList } from "./specification.js";
 import { compact, initial, withRecord } from "./train.js";
-import { CALENDARS, CAUTIONS } from "./train_fields.js";
+import { CAUTIONS } from "./train_fields.js";
 import { assumed } from "./worst_market.js";
 
-/** What the bank pays in a year until somebody says otherwise, in percent. */
-const BANK = "2";
 /** Pause in typing before the advice is requested, in milliseconds. */
 const PAUSE = 200;
 
@@ -27,9 +26,12 @@ export async function view(_, leaving) {
   return { title: "Advice now", trail, body: advising(leaving) };
 }
 
-/** Returns the form and the advice, which follows every change. */
+/** Returns the form and the advice, which follows every change, after a note if it was filled in before. */
 export function advising(leaving) {
-  let [series, waiting, asking, isRateTyped, shares] = [[], 0, new AbortController(), false, []];
+  const kept = draft(ADVISING).read();
+  // What was typed before, for fields that are only there once the record is read.
+  let known = {};
+  let [series, waiting, asking, shares] = [[], 0, new AbortController(), []];
   const answer = h("div", { class: "answered", role: "status" }, h("p", { class: "note" }, "The advice stands here as soon as there is a record."));
   const soon = () => {
     clearTimeout(waiting);
@@ -43,52 +45,52 @@ export function advising(leaving) {
     changed: (read, reading) => {
       series = read;
       if (reading) take(reading);
+      setTimeout(keep);
       soon();
     },
   });
   /** Takes over the periods a year, the bank's rate and the assets of a record. */
-  const take = ({ periods_per_year, rate }) => {
-    if (periods_per_year) offer(String(periods_per_year));
-    if (rate && !isRateTyped) {
-      bank.show(rate.rates.at(-1), periods());
-      bank.rate.control.value = Number(bank.rate.control.value).toFixed(2);
-      bankNote.textContent = `The last of column ${rate.column}.`;
-    }
-    bank.named(unitOf(periods()));
-    if (shares.map(({ column }) => column).join() !== series.map(({ column }) => column).join()) drawShares();
+  const take = (reading) => {
+    terms.take(reading);
+    const names = series.length > 1 ? series.map(({ column }) => column) : [""];
+    if (shares.map(({ column }) => column).join() !== names.join()) drawShares();
   };
-  const offer = (value) => {
-    if (![...yearly.control.options].some((option) => option.value === value)) yearly.control.append(h("option", { value }, `${value} periods`));
-    yearly.control.value = value;
-  };
-  const periods = () => Number(yearly.control.value) || null;
+  const terms = marketTerms(soon);
   const investor = select({ name: "investor", label: "Investor", note: investorNote, choices: investorChoices(), changed: soon });
   investor.control.value = "balanced";
   const caution = select({ name: "problem.caution", label: "Caution", note: "How much of the uncertainty about the record is guarded against.", choices: CAUTIONS, changed: soon });
-  const yearly = select({ name: "problem.periods_per_year", label: "Periods a year", note: "By the dates of the record, if it has any.", choices: CALENDARS, changed: () => (bank.named(unitOf(periods())), soon()) });
-  const bank = bankRate({ name: "problem.rate_per_step", note: "Assumed until you change it.", changed: () => ((isRateTyped = true), (bankNote.textContent = ""), soon()) });
-  const bankNote = bank.rate.element.querySelector(".note");
-  bank.per.control.value = "year";
-  bank.named("period");
-  bank.rate.control.value = BANK;
   const wealth = input({ name: "wealth", label: "Wealth now", note: "In any currency.", value: "100000", changed: soon });
   const held = h("div", { class: "fields" });
+  const limited = h("div", {});
+  let limits = null;
   const drawShares = () => {
     const isSeveral = series.length > 1;
     const one = ({ column }, index) => ({ column, field: input({ within: `held-${index}-`, name: isSeveral ? `holdings.${column}` : "holding", label: isSeveral ? `${column} held now, %` : "Held now, %", note: "Of wealth. Blank: nothing.", unit: "percent", changed: soon }) });
     shares = (isSeveral ? series : [{ column: "" }]).map(one);
     held.replaceChildren(...shares.map(({ field }) => field.element));
+    limits = isSeveral ? limitFields(series.map(({ column }) => column), soon) : null;
+    limited.replaceChildren(...(limits ? [h("fieldset", {}, h("legend", {}, "Limits"), limits.element)] : []));
+    fill();
+  };
+  const fields = () => [wealth, investor, caution, ...shares.map(({ field }) => field), ...(limits?.fields ?? [])];
+  const fill = () => {
+    for (const { name, control } of fields().filter(({ name }) => name in known)) control.value = known[name];
+    if (limits?.fields.some(({ control }) => control.value !== "")) limits.element.open = true;
+  };
+  const content = () => ({ fields: Object.fromEntries(fields().map(({ name, control }) => [name, control.value])), terms: terms.keep(), record: source.typed() });
+  const keep = () => {
+    if (leaving.aborted) return;
+    if (JSON.stringify(content()) === untouched) draft(ADVISING).drop();
+    else draft(ADVISING).keep(content());
   };
   /** Returns the training request with the record and the settings; `{field, message}` is thrown if one is missing. */
   const compose = () => {
-    if (yearly.control.value === "") throw { field: yearly.name, message: "The record has no dates that show it: choose how many periods make a year." };
-    const rate = bank.read(periods());
-    if (rate === null) throw { field: bank.rate.name, message: "Say what the bank pays; 0 if nothing." };
-    if (rate === undefined) throw { field: bank.rate.name, message: "A bank return per year needs the periods a year." };
+    const rate = terms.rate();
     const request = initial();
-    Object.assign(request.problem, { rate_per_step: rate, periods_per_year: periods(), initial_wealth: typed(wealth.control.value) ?? 100, caution: caution.control.value });
+    Object.assign(request.problem, { rate_per_step: rate, periods_per_year: terms.periods(), initial_wealth: typed(wealth.control.value) ?? 100, caution: caution.control.value });
     request.problem.utility = { kind: "power", risk_aversion: INVESTORS[investor.control.value] };
     withRecord(request, series);
+    request.problem.limits = limits?.limits();
     return request;
   };
   const ask = async () => {
@@ -116,19 +118,34 @@ export function advising(leaving) {
   /** Returns what leads from the advice to a policy and a session of it. */
   const followed = (request, holds) => {
     const keep = () => {
-      draft(FOLLOWING).keep({ json: compact(request), record: source.typed(), choices: { told: bank.per.control.value, periods: yearly.control.value } });
+      draft(FOLLOWING).keep({ json: compact(request), record: source.typed(), choices: terms.choices() });
       draft(OPENING).keep({ wealth: wealth.control.value, ...Object.fromEntries(shares.map(({ field }) => [field.name, field.control.value])) });
     };
-    return h("p", { class: "send" }, h("a", { class: "button", href: FOLLOWING, onclick: keep }, "Follow this for a client"), h("span", { class: "note" }, "Trains a policy on this record, then opens a session that learns from every new return."));
+    const plan = () => draft(PLANNING).keep({ from: "advice", fields: { "problem.initial_wealth": wealth.control.value, investor: investor.control.value, "problem.caution": caution.control.value }, terms: terms.keep(), record: source.typed() });
+    const ahead = request.problem.assets ? "" : h("a", { class: "button quiet", href: PLANNING, onclick: plan }, "Plan for years");
+    return h("p", { class: "send" }, h("a", { class: "button", href: FOLLOWING, onclick: keep }, "Follow this for a client"), ahead, h("span", { class: "note" }, "Trains a policy on this record, then opens a session that learns from every new return."));
   };
   const message = refusal();
   const form = h("form", { class: "advising", novalidate: true, onsubmit: (event) => event.preventDefault() },
     h("fieldset", {}, h("legend", {}, "The returns seen so far"), source.element),
     answer,
-    fieldset("The investor", [wealth, held, ...bank.parts, yearly, investor, caution]), message);
+    fieldset("The investor", [wealth, held, ...terms.parts, investor, caution]), limited, message);
+  const typing = () => {
+    known = {};
+    setTimeout(keep);
+  };
+  for (const happened of ["input", "change"]) form.addEventListener(happened, typing);
   drawShares();
+  const untouched = JSON.stringify(content());
   leaving.addEventListener("abort", () => (asking.abort(), clearTimeout(waiting)));
-  return form;
+  if (kept) {
+    known = kept.fields;
+    fill();
+    terms.restore(kept.terms);
+    source.restore(kept.record);
+  }
+  const again = () => dispatchEvent(new HashChangeEvent("hashchange"));
+  return [kept ? draft(ADVISING).note(again) : "", form];
 }
 
 /** Returns the sections of an advice. */
@@ -136,8 +153,8 @@ function advised(advice, { problem }, holds) {
   const unit = unitOf(problem.periods_per_year);
   const place = { heading: `The coming ${unit}`, end: `at the end of the ${unit}`, cautious: true, price: null, prices: {}, cost: problem.trading_cost, wealth: problem.initial_wealth };
   const doubts = warningList(advice.warnings, problem);
-  const yearly = advice.annualised ? h("p", { class: "note" }, `The bank pays ${percent(advice.annualised.rate, 2)} a year. The record has a mean of ${percent(advice.annualised.mean_return)} a year, with a deviation of ${percent(advice.annualised.deviation)}${problem.assets ? ", for a mix of the assets by their volatility" : ""}.`) : "";
-  if (problem.assets) return [severalAdvice({ ...advice, ...holds, contribution: 0 }, place, problem.assets, [yearly, ...doubts]), levels(advice)];
+  const yearly = yearlyWords(advice, problem.assets ? ", for a mix of the assets by their volatility" : "");
+  if (problem.assets) return [severalAdvice({ ...advice, ...holds, contribution: 0 }, place, problem.assets, [limitWords(problem.limits, advice), yearly, ...doubts]), levels(advice)];
   const worst = advice.worst_case.transport.length > 0 && advice.allocation > 0 ? h("p", { class: "sentence" }, `The worst case that the record allows sets it. ${assumed(advice.worst_case, unit)}`) : "";
   return [adviceView(advice, place, [nothingWords(advice, unit), worst, yearly, ...doubts]).element, levels(advice)];
 }

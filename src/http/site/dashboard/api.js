@@ -6,6 +6,10 @@ import { held, refusedWords, shown } from "./key.js";
 /** Delay before a broken stream is opened again, in milliseconds. */
 const RECONNECT = 1000;
 
+/** The type of a problem with an object that is not there. */
+export const GONE = "/problems/not-found";
+export const WAS_DELETED = "This session was deleted.";
+
 /** A refusal or a failure, as a problem document (RFC 9457). */
 export class Problem extends Error {
   constructor(document) {
@@ -43,24 +47,28 @@ async function send(method, path, body, signal, headers = {}) {
     problem.field = problem.rule = undefined;
     if (method !== "GET") dispatchEvent(new CustomEvent("key-refused", { detail: problem.message }));
   }
+  // Whoever acts on a session has seen it: it was deleted since then.
+  if (problem.type === GONE && problem.field === "session" && method !== "GET") {
+    const session = problem.value;
+    problem.message = WAS_DELETED;
+    problem.field = problem.rule = undefined;
+    dispatchEvent(new CustomEvent("session-deleted", { detail: session }));
+  }
   throw problem;
 }
 
 const parsed = async (answer) => (await answer).json();
 
 export const get = (path, signal) => parsed(send("GET", path, undefined, signal));
-export const post = (path, body, signal) => parsed(send("POST", path, body, signal));
+export const post = (path, body, signal, headers) => parsed(send("POST", path, body, signal, headers));
 export const patch = (path, body) => parsed(send("PATCH", path, body));
 export const remove = (path) => send("DELETE", path);
-export const text = async (path) => (await send("GET", path)).text();
-
-let described;
-
-/** Tells whether this service has a call, such as `/what-if`. */
-export async function offers(path) {
-  described ??= get("/openapi.json").then((description) => description.paths);
-  return path in (await described.catch(() => ({})));
+/** Asks for a page: its text and its headers. */
+export async function page(path, body, signal) {
+  const answer = await send("POST", path, body, signal);
+  return { text: await answer.text(), headers: answer.headers };
 }
+export const text = async (path) => (await send("GET", path)).text();
 
 /**
  * Follows a job: calls `changed(job)` at once and at every change, until the job ends or `signal` aborts. A broken stream is opened again
@@ -86,6 +94,15 @@ export async function follow(job, changed, signal, unheard = () => {}) {
     }
     await new Promise((resolve) => setTimeout(resolve, RECONNECT));
   }
+}
+
+/** Trains a policy and returns its identifier, once it is there. */
+export async function trained(request, signal) {
+  let now = await post("/train", request);
+  await follow(now.job, (job) => (now = job), signal);
+  if (!isOver(now)) now = await get(`/jobs/${now.job}`, signal);
+  if (now.state !== "succeeded") throw new Error(`the training ${now.state}${now.error ? `: ${now.error}` : ""}`);
+  return now.policy;
 }
 
 /** Yields the events of a stream, each with its fields; skips comments, which have no data. */

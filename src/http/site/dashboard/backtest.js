@@ -1,28 +1,27 @@
 // The report of a backtest of one asset: what the strategies earned, and one of them year by year.
 
 import { heldOfAssets, ofAssets, quantOfAssets, resultsOfAssets, walkedAssets } from "./backtest_assets.js";
-import { estimate, ranges, results, START } from "./backtest_figures.js";
+import { estimate, FEWEST_YEARS, isShort, ranges, results, START } from "./backtest_figures.js";
 import { lineChart } from "./chart.js";
 import { csvText, hundred } from "./csv.js";
-import { h, quantSection, section, table } from "./dom.js";
+import { h, quantSection, section } from "./dom.js";
 import { select } from "./form.js";
 import { allocation, count, counted, figures, minus, percent, percentTick, tick, wealth } from "./format.js";
 import { dated, unitOf } from "./periods.js";
 import { investorWords } from "./specification.js";
 import { colourOf, colourOfLevel } from "./strategies.js";
-import { belowHighest, compounded, grouped, places, returnsOf, rolling, worstFalls } from "./track.js";
+import { returnsOf } from "./track.js";
+import { courses, falls, GUTTER, lineOf, rollingYears, years } from "./track_view.js";
 import { changing, ordinal } from "./verdict.js";
 
-/** Number of falls listed. */
-const FALLS = 5;
-/** With fewer years no strategy is called better than another: many shorter records miss a crash that comes once in ten years. */
-const FEWEST_YEARS = 30;
 /** A smaller difference of a certainty equivalent is rounding: wealth starts at 100. */
 const ROUNDING = 1e-6;
 /** Lengths of rolling windows, in years: the first that fits twice into the record is used. */
 const ROLLING = [5, 1];
 /** With fewer returns the service warns about its advice. */
 const SHORT_RECORD = 24;
+/** How cautious the policies are, by the level of caution. */
+const ACTING = { paper: "The cautious ones guard against all that the confidence implies.", bold: "The cautious ones act at the bold level of caution.", balanced: "The cautious ones act at the balanced level of caution.", cautious: "The cautious ones act at the cautious level of caution." };
 const KNOWN = ["all_bank", "sixty_forty", "all_stock"];
 
 /** Returns the report with the values that the page shows and draws. */
@@ -76,7 +75,7 @@ function inYears(date) {
 
 /** Describes the record, the method and the investor. */
 function walked({ choices, lines, unit, times }) {
-  const { every, window, horizon, trading_cost, risk_aversion } = choices;
+  const { every, window, horizon, trading_cost, risk_aversion, caution } = choices;
   const length = lines[0].wealth.length - 1;
   const investor = investorWords(risk_aversion === 1 ? { kind: "log" } : { kind: "power", risk_aversion });
   const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded.` : "Trading is free here, so strategies that trade often look better than they would in reality.";
@@ -86,7 +85,7 @@ function walked({ choices, lines, unit, times }) {
     "div",
     { class: "words" },
     h("p", {}, `${count(lines.filter(({ hindsight }) => !hindsight).length)} ways to hold stocks, through ${counted(length, unit)}, ${times.name(1)} to ${times.name(length)}, for ${investor}.`),
-    h("p", {}, `Every ${counted(every, unit)} policies are trained on the ${counted(window, unit)} before${ahead}, and followed until the next training. No holding uses later returns. ${cost}`),
+    h("p", {}, `Every ${counted(every, unit)} policies are trained on the ${counted(window, unit)} before${ahead}, and followed until the next training. ${ACTING[caution] ?? `The cautious ones act on ${percent(caution.scale, 0)} of the radius.`} No holding uses later returns. ${cost}`),
     window < SHORT_RECORD && h("p", { class: "note wrong" }, few),
   );
 }
@@ -105,10 +104,10 @@ function conclusions(told) {
   ];
   if (best !== main) said.push(`${quoted} comes ${ordinal(main.place)} of ${real.length}, with ${wealth(worth(main))}.`);
   if (uncounted_periods > 0) said.push(`The first ${uncounted_periods === 1 ? `${told.unit} is` : `${counted(uncounted_periods, told.unit)} are`} left out of the years, because the years are counted back from the last ${told.unit}.`);
-  if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} of decisions, fewer than ${FEWEST_YEARS}, so it cannot rank the strategies. A crash that comes once in ten years is missing from many records this short.`);
+  if (isShort(told)) said.push(`The record has ${counted(whole_years, "whole year")} of decisions, fewer than ${FEWEST_YEARS}, so it cannot rank the strategies. A crash that comes once in ten years is missing from many records this short.`);
   else said.push(apart(told, main, quoted));
   said.push(`The worst fall of ${quoted} was ${percent(main.max_drawdown)}, that of all in stocks ${percent(stocks.max_drawdown)}; from ${START} it came to ${wealth(main.final_wealth)}, all in stocks to ${wealth(stocks.final_wealth)}.`);
-  if (whole_years >= FEWEST_YEARS && main.beyond_own_mix) said.push(changing({ name: quoted, allocation: main.mean_allocation, beyond: estimate(main.beyond_own_mix), shown: "the record does" }));
+  if (!isShort(told) && main.beyond_own_mix) said.push(changing({ name: quoted, allocation: main.mean_allocation, beyond: estimate(main.beyond_own_mix), shown: "the record does" }));
   said.push(`It was all in the bank in ${percent(main.all_bank_share, 0)} of the ${told.unit}s.`);
   return said;
 }
@@ -145,125 +144,23 @@ function chosen(told) {
   return section("One strategy through the years", strategy.element, holder);
 }
 
-/** Returns the strategy and the well-known ones, each once. */
-const beside = (told, line) => [line, ...told.known.filter((other) => other !== line)];
-
 function course(told, line) {
-  const { times } = told;
+  const { times, held } = told;
+  const span = ROLLING.find((years) => line.wealth.length > 2 * years * told.periods_per_year);
   const at = (value) => times.after(times.index(value));
-  const x = { values: times.values, label: "Period", format: at, here: at, tick: String, whole: true };
-  const drawn = (one, values) => ({ name: one.name, colour: one.colour, kind: "line", bare: true, values });
-  const gutter = 64;
+  const placed = { gutter: GUTTER, x: { values: times.values, label: "Period", format: at, here: at, tick: String, whole: true } };
   return [
-    lineChart({ title: `Wealth from ${START}, log scale`, gutter, height: 250, x, y: { format: wealth, tick, log: true }, series: beside(told, line).map((one) => drawn(one, one.wealth)) }),
-    lineChart({
-      title: "Below the highest so far",
-      gutter,
-      height: 130,
-      x,
-      y: { format: percent, tick: percentTick, also: [0] },
-      series: [...new Set([line, told.market])].map((one) => drawn(one, belowHighest(one.wealth))),
-    }),
-    ...overYears(told, line, { gutter, x }, drawn),
-    lineChart({
-      title: told.held,
-      gutter,
-      height: 130,
-      x: { ...x, ...times.during },
-      y: { format: allocation, tick: percentTick, also: [0, 0.1] },
-      series: [drawn(line, [...line.periods.allocation, null])],
-    }),
-  ];
-}
-
-/** Shows the yearly return over a rolling window, so that no single start or end decides. */
-function overYears(told, line, placed, drawn) {
-  const { periods_per_year, market } = told;
-  const span = ROLLING.find((years) => line.wealth.length > 2 * years * periods_per_year);
-  if (!span) return [];
-  const of = (one) => rolling(one.wealth, span, periods_per_year);
-  const [own, theirs] = [of(line), of(market)];
-  const all = own.filter((back) => back !== null);
-  const behind = own.filter((back, k) => back !== null && back < theirs[k]).length;
-  const against = line === market ? "" : ` In ${percent(behind / all.length, 0)} of them that was less than \u201c${market.name}\u201d earned.`;
-  return [
+    ...courses(told, line, placed),
+    ...(span ? [rollingYears(told, line, placed, span)] : []),
     lineChart({
       ...placed,
-      title: `Return a year over the ${span > 1 ? `${span} years` : "year"} before`,
-      height: 170,
-      y: { format: percent, tick: percentTick, also: [0] },
-      series: beside(told, line).map((one) => drawn(one, of(one))),
-      note: `Over any ${counted(span, "year")} of the record \u201c${line.name}\u201d earned between ${percent(Math.min(...all))} and ${percent(Math.max(...all))} a year.${against}`,
+      title: held,
+      height: 130,
+      x: { ...placed.x, ...times.during },
+      y: { format: allocation, tick: percentTick, also: [0, 0.1] },
+      series: [lineOf(line, [...line.periods.allocation, null])],
     }),
   ];
-}
-
-/** Lists the worst falls of a strategy: when they began and how long they lasted. */
-function falls(told, line) {
-  const { times, unit, market } = told;
-  const worst = worstFalls(belowHighest(line.wealth), FALLS);
-  if (worst.length === 0) return [h("p", { class: "note" }, `\u201c${line.name}\u201d never fell below its highest.`)];
-  const number = (name, cell) => ({ name, numeric: true, cell });
-  const back = ({ from, to }, wealth) => wealth[to] / wealth[from] - 1;
-  const columns = [
-    { name: "Highest before", cell: ({ from }) => times.after(from) },
-    { name: "Lowest", cell: ({ to }) => times.after(to) },
-    { name: "Recovered", cell: ({ back }) => (back === null ? "Not yet" : times.after(back)) },
-    number("Fall", ({ depth }) => percent(depth)),
-    ...(line === market ? [] : [number(`${market.name} meanwhile`, (fall) => percent(back(fall, market.wealth)))]),
-    number("Lasted", ({ from, back }) => counted((back ?? line.wealth.length - 1) - from, unit)),
-  ];
-  return [h("h3", {}, "Its worst falls"), table(`The worst falls of ${line.name}`, columns, worst)];
-}
-
-/** Shows returns by year beside those of the other strategies, and by month as a map. */
-function years(told, line) {
-  const { dates, periods_per_year } = told;
-  const of = (one) => returnsOf(one.wealth);
-  const where = places(dates, line.wealth.length - 1, periods_per_year);
-  const byYear = grouped(where, ({ year }) => year);
-  const called = dates ? "" : "Year ";
-  const most = Math.max(...byYear.map(([, indices]) => indices.length));
-  const part = (indices) => (indices.length < Math.min(most, periods_per_year) - 5 * (periods_per_year > 100) ? h("span", { class: "under" }, counted(indices.length, told.unit)) : "");
-  const others = beside(told, line).map((one) => ({ one, returns: of(one) }));
-  const over = (returns, indices) => compounded(indices.map((index) => returns[index]));
-  const yearly = table(
-    `Returns by the year of ${line.name} and of others`,
-    [
-      { name: "Year", cell: ([year, indices]) => [`${called}${year}`, part(indices)] },
-      ...others.map(({ one, returns }) => ({ name: one.name, numeric: true, cell: ([, indices]) => percent(over(returns, indices)) })),
-    ],
-    byYear,
-  );
-  return [h("h3", {}, "Year by year"), yearly, ...map(told, line, where, byYear, called)];
-}
-
-const MONTHS = Array.from({ length: 12 }, (_, month) => new Date(Date.UTC(2000, month)).toLocaleDateString("en-GB", { timeZone: "UTC", month: "short" }).slice(0, 3));
-/** Number of shades of gain and of loss in the stylesheet. */
-const SHADES = 4;
-
-/** Shows the parts of each year as cells with their returns: the darker, the larger the gain or loss. */
-function map({ dates, unit }, line, where, byYear, called) {
-  const parts = [...new Set(where.map(({ part }) => part))].filter(Boolean).sort((one, other) => one - other);
-  if (parts.length === 0) return [];
-  const returns = returnsOf(line.wealth);
-  const cells = new Map(grouped(where, ({ year, part }) => `${year} ${part}`).map(([key, indices]) => [key, compounded(indices.map((index) => returns[index]))]));
-  const largest = Math.max(1e-12, ...[...cells.values()].map(Math.abs));
-  const shade = (back) => (Math.abs(back) < 5e-5 ? "" : `${back > 0 ? "gain" : "loss"}${Math.ceil((SHADES * Math.abs(back)) / largest)}`);
-  const cell = (part) => ([year]) => {
-    const back = cells.get(`${year} ${part}`);
-    return back === undefined ? "" : h("span", { class: `shaded ${shade(back)}` }, percent(back));
-  };
-  const whole = { name: "Whole year", numeric: true, cell: ([, indices]) => h("span", { class: "shaded" }, percent(compounded(indices.map((index) => returns[index])))) };
-  const name = (part) => (dates ? MONTHS[part - 1] : part);
-  const grain = dates && parts.length > 4 ? "month" : unit;
-  const drawn = table(
-    `Returns of ${line.name} ${grain} by ${grain}`,
-    [{ name: "Year", cell: ([year]) => `${called}${year}` }, ...parts.map((part) => ({ name: name(part), numeric: true, cell: cell(part) })), whole],
-    byYear,
-  );
-  drawn.classList.add("map");
-  return [h("h3", {}, `${grain[0].toUpperCase()}${grain.slice(1)} by ${grain}`), drawn];
 }
 
 /** Shows the rest for the quant: the report's own sentences, estimates with their ranges, and radii. */

@@ -9,14 +9,26 @@ export const START = 100;
 
 export const estimate = ({ value, interval: [low, high] }) => ({ value, low, high });
 
+/** With fewer years no strategy is called better than another, and no range is drawn: many shorter records miss a crash that comes once in ten years. */
+export const FEWEST_YEARS = 30;
+
+/** Tells whether a record is too short to rank strategies. */
+export const isShort = ({ whole_years }) => whole_years < FEWEST_YEARS;
+
+/** Returns the return a year that compounds to the final wealth; the mean return is higher, because losses count more in growth. */
+const growth = ({ wealth, final_wealth }, periods_per_year) => (final_wealth / START) ** (periods_per_year / (wealth.length - 1)) - 1;
+
 /** Shows the sentences, and all strategies by what a year of each is worth; `more` is added to the note below. */
-export function results({ lines, intervals, assets, unit }, sentences, more = "") {
-  const rows = [...lines].sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
+export function results({ lines, intervals, assets, unit, whole_years, periods_per_year }, sentences, more = "") {
+  const short = isShort({ whole_years });
+  const grown = lines.map((line) => ({ ...line, growth: growth(line, periods_per_year) }));
+  const rows = grown.sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
   const estimated = (format) => ({ value }) => format(value);
   const columns = [
     ["yearly_certainty_equivalent", "A year is worth a sure", estimated(wealth)],
     ["final_wealth", `${START} became`, wealth],
-    ["annual_mean", "Return a year", estimated(percent)],
+    ["growth", "Growth a year", percent],
+    ["annual_mean", "Mean return a year", estimated(percent)],
     ["annual_volatility", "Deviation a year", estimated(percent)],
     ["chance_of_loss", "Chance of loss", estimated(percent)],
     ["worst_twentieth", "Worst 5\u202f% of years", estimated(percent)],
@@ -30,7 +42,7 @@ export function results({ lines, intervals, assets, unit }, sentences, more = ""
     h("div", { class: "words" }, sentences.map((sentence) => h("p", {}, sentence))),
     intervalChart({
       title: `A year from ${START} is worth as much as a sure`,
-      rows: rows.map(({ name, colour, yearly_certainty_equivalent }) => ({ name, colour, ...estimate(yearly_certainty_equivalent) })),
+      rows: rows.map(({ name, colour, yearly_certainty_equivalent: worth }) => ({ name, colour, ...(short ? { value: worth.value } : estimate(worth)) })),
       format: wealth,
       tick,
     }),
@@ -39,7 +51,7 @@ export function results({ lines, intervals, assets, unit }, sentences, more = ""
       [{ name: "Strategy", cell: ({ name }) => name }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: (row) => format(row[key]) }))],
       rows,
     ),
-    h("p", { class: "note" }, `Each range in the chart holds by itself with ${percent(intervals.confidence, 0)} confidence, if coming years are like those seen.${more} A loss is a year that ends with less than it began with. The worst 5\u202f% of years are given by their average return. A year starts with every ${unit}, so years overlap.`),
+    h("p", { class: "note" }, `${short ? `The chart has no ranges: with fewer than ${FEWEST_YEARS} years they would promise too much.` : `Each range in the chart holds by itself with ${percent(intervals.confidence, 0)} confidence, if coming years are like those seen.`}${more} A loss is a year that ends with less than it began with. The worst 5\u202f% of years are given by their average return. A year starts with every ${unit}, so years overlap.`),
   );
 }
 
@@ -51,7 +63,7 @@ export function ranges({ lines, intervals }, names, more) {
     ["yearly_certainty_equivalent", "Certainty equivalent of a year", wealth],
     ...Object.entries(names).map(([key, name]) => [key, name, hundredth]),
     ["sharpe_ratio", "Sharpe ratio", hundredth],
-    ["annual_mean", "Mean return", percent],
+    ["annual_mean", "Mean return a year", percent],
     ["annual_volatility", "Volatility", percent],
     ["chance_of_loss", "Chance of loss", percent],
     ["worst_twentieth", "Worst 5\u202f% of years", percent],

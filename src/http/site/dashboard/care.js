@@ -17,8 +17,9 @@ const REASONS = {
   ending: ["is completed or in its last period", "are completed or in their last period"],
 };
 
-/** Says how many sessions need care, and why. */
-export function careWords({ sessions, any, ...reasons }) {
+/** Says how many sessions need care, and why; `isWarned` if a warning of another kind stands above. */
+export function careWords({ sessions, any, ...reasons }, isWarned = false) {
+  if (any === 0 && isWarned) return "Otherwise no session needs care.";
   if (any === 0) return `None of ${counted(sessions, "session")} needs care.`;
   const parts = Object.entries(REASONS).filter(([reason]) => reasons[reason] > 0);
   const why = parts.map(([reason, [one, many]]) => `${count(reasons[reason])} ${reasons[reason] === 1 ? one : many}`).join(", ");

@@ -187,11 +187,11 @@ export function figure({ title, legend, holder, rows, note }) {
  * text of a position, if it is not label and format. y: `{format, tick, also, log}`; `log` means a logarithmic axis.
  * series: `[{name, values, band, kind: "line" | "bars" | "levels", bare, joined, apart, colour}]`; a missing value is null. Bars and levels
  * span the unit before their x. A `bare` line has no dots, a `joined` line skips missing values, and an `apart` series is dots alone. `band`
- * holds a low and a high end for each value. `colour` defaults to the index of the series. The first position read is `start`, or the last
+ * holds a low and a high end for each value; a series whose `values` are null is its band alone. `colour` defaults to the index of the series. The first position read is `start`, or the last
  * value of the first series. `gutter` aligns charts that stand above each other.
  */
 export function lineChart({ title, x, y, series: given, height = 190, note, start: first, gutter = 0 }) {
-  const series = given.map((one, index) => ({ colour: index, ...one }));
+  const series = given.map((one, index) => ({ colour: index, ...one, isBand: one.values === null, values: one.values ?? x.values.map(() => null) }));
   const shown = x.values
     .map((_, index) => index)
     .filter((index) => series.some(({ values }) => Number.isFinite(values[index])));
@@ -201,14 +201,18 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     "span",
     { class: "legend" },
     here,
-    series.map(({ name, kind, colour, band }, index) =>
-      h("span", {}, name ? [kind === "bars" ? block(colour) : swatch(colour), band && block(colour, "band"), `${name} `] : null, outputs[index]),
+    series.map(({ name, kind, colour, band, isBand }, index) =>
+      h("span", {}, name ? [kind === "bars" ? block(colour) : isBand ? null : swatch(colour), band && block(colour, "band"), `${name} `] : null, outputs[index]),
     ),
   );
   const same = (value) => value;
   const [size, sized] = y.log ? [Math.log, Math.exp] : [same, same];
   const along = x.log ? Math.log : same;
-  const said = ({ values, band }, index) => (band && Number.isFinite(values[index]) ? `${y.format(values[index])} (${band[index].map(y.format).join(" to ")})` : y.format(values[index]));
+  const said = ({ values, band, isBand }, index) => {
+    const ends = band?.[index].map(y.format).join(" to ");
+    if (isBand) return ends;
+    return band && Number.isFinite(values[index]) ? `${y.format(values[index])} (${ends})` : y.format(values[index]);
+  };
   const yDomain = extent(
     series.flatMap(({ values, band }) => [...values, ...(band ?? []).flat()].map((value) => (value === null ? null : size(value)))),
     y.also,

@@ -1,7 +1,7 @@
-// Two policies: what they were trained for, and what they hold at the same average return.
+// Two to four policies: what they were trained for, and what they hold at the same average return.
 
 import { get } from "./api.js";
-import { beside, LETTERS } from "./beside.js";
+import { areSame, beside, joined, LETTERS, numbered } from "./beside.js";
 import { lineChart } from "./chart.js";
 import { h, section } from "./dom.js";
 import { inWords as flowsInWords } from "./flows.js";
@@ -11,28 +11,32 @@ import { unitOf } from "./periods.js";
 import { caution, centreInWords, FRAMEWORKS, isDeclared, moments, utility } from "./specification.js";
 import { surfaceCurve } from "./surface_view.js";
 
-/** Number of points at which the two are evaluated. */
+/** Number of points at which each is evaluated. */
 const ALONG = 61;
 
 export async function policiesBeside(ids, leaving) {
-  const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
-  const asked = both.map(({ specification }) => specification);
-  if (asked.some(isDeclared)) return h("p", { class: "lead" }, "Only policies of investors can be compared. Of these, ", asked.every(isDeclared) ? "both are" : "one is", " of a declared problem: see ", ids.map((id, index) => [index ? " and " : "", policyLink(id)]), ".");
-  const table = beside("Two policies side by side", "policies", "Policy", ids, both.map(({ name }) => name), rows(asked));
-  return [h("p", { class: "lead" }, differences(asked, "They")), table, curves(ids, both, leaving)];
+  const all = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
+  const asked = all.map(({ specification }) => specification);
+  const declared = asked.filter(isDeclared).length;
+  if (declared > 0) {
+    const many = declared < ids.length ? `${numbered(declared)} ${declared === 1 ? "is" : "are"}` : ids.length === 2 ? "both are" : "all are";
+    return h("p", { class: "lead" }, `Only policies of investors can be compared. Of these, ${many} of a declared problem: see `, ids.map((id, index) => [index === 0 ? "" : index === ids.length - 1 ? " and " : ", ", policyLink(id)]), ".");
+  }
+  const size = numbered(ids.length);
+  const table = beside(`${size[0].toUpperCase()}${size.slice(1)} policies side by side`, "policies", "Policy", ids, all.map(({ name }) => name), rows(asked));
+  return [h("p", { class: "lead" }, differences(asked, "They")), table, curves(ids, all, leaving)];
 }
 
 /** Says what differs. It never calls equal what differs, even if no row shows the difference. */
-export function differences([one, other], subject) {
-  const all = rows([one, other]);
-  const apart = all.filter(({ cells: [left, right] }) => left !== right).map(({ name }) => name.toLowerCase());
-  const alike = JSON.stringify(one) === JSON.stringify(other);
-  if (apart.length === 0) return alike ? "The two requests are the same." : `${subject} differ in details that the table below does not show. See each policy's own page.`;
-  const [left, right] = [one, other].map(({ problem, fund, design: { count, ...design }, surrogate, seed }) => ({ ...problem, ...fund, count, design, surrogate, seed }));
-  const fields = new Set([...Object.keys(left), ...Object.keys(right)]);
-  const untold = [...fields].filter((field) => !apart.includes(ROW_OF[field]) && JSON.stringify(left[field]) !== JSON.stringify(right[field]));
+export function differences(asked, subject) {
+  const apart = rows(asked).filter(({ cells }) => !areSame(cells)).map(({ name }) => name.toLowerCase());
+  const text = (value) => JSON.stringify(value);
+  if (apart.length === 0) return areSame(asked.map(text)) ? `The ${numbered(asked.length)} requests are the same.` : `${subject} differ in details that the table below does not show. See each policy's own page.`;
+  const parts = asked.map(({ problem, fund, design: { count, ...design }, surrogate, seed }) => ({ ...problem, ...fund, count, design, surrogate, seed }));
+  const fields = [...new Set(parts.flatMap(Object.keys))];
+  const untold = fields.filter((field) => !apart.includes(ROW_OF[field]) && !areSame(parts.map((part) => text(part[field]))));
   const rest = untold.length === 0 ? "everything else is the same" : "other details also differ";
-  return `${subject} differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
+  return `${subject} differ in ${joined(apart)}; ${rest}.`;
 }
 
 /** The row that shows each field of the problem. */
@@ -71,7 +75,7 @@ const moves = (support) => {
 };
 const NORMS = { scaled_one: "Each asset by its own volatility", sup: "All assets at once" };
 
-/** Returns the rows that compare two specifications, `{problem, fund, design, seed}` each. */
+/** Returns the rows that compare specifications, `{problem, fund, design, seed}` each. */
 export function rows(asked) {
   const problems = asked.map(({ problem }) => problem);
   const row = (name, read, apart) => {
@@ -79,17 +83,20 @@ export function rows(asked) {
     return { name, cells, apart };
   };
   const [one, other] = problems;
-  const less = (read, words) => words(read(other) - read(one));
+  /** Returns the difference of two in words; more have none. */
+  const less = (read, words) => (problems.length === 2 ? words(read(other) - read(one)) : undefined);
   const signed = (value, words) => `${value > 0 ? "+" : ""}${words(value)}`;
-  const records = problems.map(({ history }) => moments(history.map(Math.expm1)));
-  const changed = (field) => JSON.stringify(one[field]) !== JSON.stringify(other[field]);
-  const added = problems.map((problem) => flowsInWords(problem) || "None");
+  const meanOf = ({ history }) => moments(history.map(Math.expm1)).mean;
+  /** Returns the text of a field for each, marked if it reads like that of the first and differs from it. */
+  const marked = (words, field, mark) =>
+    problems.map((problem, index) => (index > 0 && words(problem) === words(one) && JSON.stringify(problem[field]) !== JSON.stringify(one[field]) ? `${words(problem)} (${mark})` : words(problem)));
+  const added = (problem) => flowsInWords(problem) || "None";
   const record = ({ history }) => {
     const { mean, deviation } = moments(history.map(Math.expm1));
     return `${counted(history.length, "return")}: mean ${percent(mean, 2)}, deviation ${percent(deviation, 2)}`;
   };
   return [
-    row("Kind", ({ framework }) => FRAMEWORKS[framework]),
+    row("Framework", ({ framework }) => FRAMEWORKS[framework]),
     row("Assets", (_, { fund }) => (fund ? fund.assets.join(", ") : "One")),
     row("Mix of assets", (_, { fund }) => (fund ? mix(fund.composition) : "None")),
     row("Distance of markets", (_, { fund }) => (fund ? NORMS[fund.ground_norm] : "One asset only")),
@@ -99,21 +106,21 @@ export function rows(asked) {
     row("Bank", ({ rate_per_step }) => percent(rate_per_step, 3), less(({ rate_per_step }) => rate_per_step, (value) => signed(value, (size) => points(size, 3)))),
     row("Trading cost", ({ trading_cost }) => percent(trading_cost, 2), less(({ trading_cost }) => trading_cost, (value) => signed(value, (size) => points(size, 2)))),
     row("Wealth at the start", ({ initial_wealth }) => wealth(initial_wealth), less(({ initial_wealth }) => initial_wealth, (value) => signed(value, wealth))),
-    { name: "Money added", cells: [added[0], added[1] === added[0] && changed("contributions") ? `${added[1]} (other amounts or periods)` : added[1]] },
+    { name: "Money added", cells: marked(added, "contributions", "other amounts or periods") },
     row("Share allowed outside the bank", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
     row("Moves assumed possible", ({ support }) => moves(support)),
     row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count as much as new ones")),
     row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
-    { name: "Record", cells: [record(one), `${record(other)}${changed("history") && record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },
+    { name: "Record", cells: marked(record, "history", "other returns"), apart: less(meanOf, (value) => `mean ${signed(value, (size) => points(size, 2))}`) },
     row("Precision", (_, { design, seed }) => `${counted(design.count, "situation")}, seed ${count(seed)}`),
   ];
 }
 
 /** Draws what each holds near the start, by the average return of the record. */
-function curves(ids, both, leaving) {
-  const holder = h("div", {}, h("p", { class: "note" }, "Reading the two policies\u2026"));
-  const known = both.map(({ specification: { problem } }) => moments(problem.history));
-  Promise.all(ids.map((id, index) => surfaceCurve(id, Math.min(1, both[index].horizon - 1), leaving))).then(
+function curves(ids, all, leaving) {
+  const holder = h("div", {}, h("p", { class: "note" }, "Reading the policies\u2026"));
+  const known = all.map(({ specification: { problem } }) => moments(problem.history));
+  Promise.all(ids.map((id, index) => surfaceCurve(id, Math.min(1, all[index].horizon - 1), leaving))).then(
     (found) => {
       const ranges = found.map(({ range }, index) => range ?? [known[index].mean - known[index].deviation, known[index].mean + known[index].deviation]);
       const [low, high] = [Math.min(...ranges.map(([from]) => from)), Math.max(...ranges.map(([, to]) => to))];

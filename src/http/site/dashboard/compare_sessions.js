@@ -1,8 +1,8 @@
-// Two sessions: the present advice for each, and how they went, by the calendar if both have one.
+// Two to four sessions: the present advice for each, and how they went, by the calendar if all have one.
 
 import { heldInAll, orders } from "./advised.js";
 import { get } from "./api.js";
-import { beside, LETTERS } from "./beside.js";
+import { areSame, beside, joined, LETTERS, numbered } from "./beside.js";
 import { lineChart } from "./chart.js";
 import { falls, grown, risky } from "./comparators.js";
 import { differences, rows as asked } from "./compare_policies.js";
@@ -16,13 +16,15 @@ import { investorsSession } from "./specification.js";
 import { worstFalls } from "./track.js";
 
 export async function sessionsBeside(ids, leaving) {
-  const both = await Promise.all(ids.map((id) => read(id, leaving)));
-  const line = lined(both);
-  const span = common(both, line);
-  const table = beside("Two sessions side by side", "sessions", "Session", ids, both.map(({ session }) => session.name), rows(both, line, span));
-  const specifications = both.map(({ policy }) => policy.specification);
-  const policies = both[0].policy.policy === both[1].policy.policy ? "" : h("p", { class: "sentence" }, differences(specifications, "Their policies"));
-  return [h("p", { class: "lead" }, sentence(both, line, span)), policies, table, courses(both, line, span)];
+  const all = await Promise.all(ids.map((id) => read(id, leaving)));
+  const line = lined(all);
+  const span = common(all, line);
+  const size = numbered(ids.length);
+  const table = beside(`${size[0].toUpperCase()}${size.slice(1)} sessions side by side`, "sessions", "Session", ids, all.map(({ session }) => session.name), rows(all, line, span));
+  const specifications = all.map(({ policy }) => policy.specification);
+  const isOne = new Set(all.map(({ policy }) => policy.policy)).size === 1;
+  const policies = isOne ? "" : h("p", { class: "sentence" }, differences(specifications, "Their policies"));
+  return [h("p", { class: "lead" }, sentence(all, line, span)), policies, table, courses(all, line, span)];
 }
 
 async function read(id, leaving) {
@@ -36,16 +38,16 @@ async function read(id, leaving) {
   return { session, history, policy, problem, action, calendar: calendar(history, problem.periods_per_year), grown: grown(history) };
 }
 
-/** Returns the name of what the two hold besides the bank. */
-const besideBank = (both) => risky(both.find(({ history }) => history.assets)?.history ?? both[0].history);
+/** Returns the name of what they hold besides the bank. */
+const besideBank = (all) => risky(all.find(({ history }) => history.assets)?.history ?? all[0].history);
 
-/** Puts the periods of both on one line: by date if both have dates of one unit, otherwise by number. Returns `{isDated, places, of(one)}`:
+/** Puts the periods of all on one line: by date if all have dates of one unit, otherwise by number. Returns `{isDated, places, of(one)}`:
  * each place is `{name, brief}`, and `of` gives the period of a session at each place, null if it has none. */
-export function lined(both) {
-  const isDated = both.every(({ calendar, grown }) => calendar.dated && grown.every((_, k) => calendar.date(k) !== null)) && new Set(both.map(({ calendar }) => calendar.unit)).size === 1;
+export function lined(all) {
+  const isDated = all.every(({ calendar, grown }) => calendar.dated && grown.every((_, k) => calendar.date(k) !== null)) && new Set(all.map(({ calendar }) => calendar.unit)).size === 1;
   const nameOf = ({ calendar }, k) => (isDated ? calendar.name(k) : k === 0 ? "Start" : `Period ${k}`);
   const found = new Map();
-  for (const one of both)
+  for (const one of all)
     one.grown.forEach((_, k) => {
       const name = nameOf(one, k);
       if (!found.has(name)) found.set(name, { name, order: isDated ? one.calendar.date(k) : k, brief: isDated && k > 0 ? one.calendar.brief(k) : String(k) });
@@ -58,9 +60,9 @@ export function lined(both) {
   return { isDated, places, of };
 }
 
-/** Returns the first and the last place that both have, or null if they share fewer than two. */
-export function common(both, { of, places }) {
-  const periods = both.map(of);
+/** Returns the first and the last place that all have, or null if they share fewer than two. */
+export function common(all, { of, places }) {
+  const periods = all.map(of);
   const shared = places.map((_, at) => at).filter((at) => periods.every((one) => one[at] !== null));
   return shared.length < 2 ? null : [shared[0], shared.at(-1)];
 }
@@ -72,25 +74,23 @@ function levels(one, line, from) {
   return periods.map((k) => (k === null ? null : (100 * one.grown[k]) / start));
 }
 
-function sentence(both, line, span) {
-  const [one, other] = both;
-  const held = both.every(({ action }) => action)
-    ? ` The advice now is to hold ${allocation(heldInAll(one.action))} in ${besideBank(both)} in A, and ${allocation(heldInAll(other.action))} in B.`
-    : "";
+function sentence(all, line, span) {
+  const shares = all.map(({ action }, index) => action && `${allocation(heldInAll(action))} ${index === 0 ? `in ${besideBank(all)} ` : ""}in ${LETTERS[index]}`);
+  const held = shares.every(Boolean) ? ` The advice now is to hold ${joined(shares)}.` : "";
   if (span === null) return `They have no period in common, so their growth cannot be compared.${held}`;
-  const [first, second] = both.map((one) => levels(one, line, span[0])[span[1]]);
+  const grew = all.map((one, index) => `${index === 0 ? "100 in " : "in "}${LETTERS[index]} ${index === 0 ? "has become " : ""}${wealth(levels(one, line, span[0])[span[1]])}`);
   const periods = span[1] - span[0];
-  const when = line.isDated ? `From the end of ${line.places[span[0]].name} to the end of ${line.places[span[1]].name}, which both sessions cover,` : `In their first ${periods === 1 ? "period" : `${count(periods)} periods`}`;
-  return `${when} 100 in A has become ${wealth(first)}, and in B ${wealth(second)}.${held}`;
+  const when = line.isDated ? `From the end of ${line.places[span[0]].name} to the end of ${line.places[span[1]].name}, which ${all.length === 2 ? "both" : "all"} sessions cover,` : `In their first ${periods === 1 ? "period" : `${count(periods)} periods`}`;
+  return `${when} ${joined(grew)}.${held}`;
 }
 
 /** Rows of the policies that are shown even if they do not differ. */
 const ALWAYS = ["Investor", "Caution"];
 
-function rows(both, line, span) {
+function rows(all, line, span) {
   const row = (name, read, apart) => {
-    const values = both.map(read);
-    return { name, cells: values.map((value) => (typeof value === "object" && value !== null ? value.words : (value ?? "\u2013"))), apart: apart && values.every((value) => value !== null) ? apart(values[1].size - values[0].size) : undefined };
+    const values = all.map(read);
+    return { name, cells: values.map((value) => (typeof value === "object" && value !== null ? value.words : (value ?? "\u2013"))), apart: apart && values.length === 2 && values.every((value) => value !== null) ? apart(values[1].size - values[0].size) : undefined };
   };
   const signed = (words) => (value) => `${value > 0 ? "+" : ""}${words(value)}`;
   const money = (size) => ({ size, words: wealth(size) });
@@ -98,11 +98,11 @@ function rows(both, line, span) {
   const trade = ({ action, session, problem }) => orders(action, session.wealth, problem.trading_cost).join(", ").toLowerCase();
   const deepest = ({ history }) => worstFalls(falls(history), 1)[0]?.depth ?? 0;
   const active = (read) => (one) => (one.action ? read(one) : null);
-  // Differences of the two amounts of money mean nothing, so they are not shown.
+  // Differences of amounts of money of several clients mean nothing, so they are not shown.
   const since = span && (line.isDated ? ` since the end of ${line.places[span[0]].name}` : " since the start");
   const last = ({ calendar, session }) => (session.period === 1 ? "none yet" : calendar.name(session.period - 1));
   return [
-    row(`To hold in ${besideBank(both)}`, active(({ action }) => share(heldInAll(action))), signed(points)),
+    row(`To hold in ${besideBank(all)}`, active(({ action }) => share(heldInAll(action))), signed(points)),
     row("To trade", active(trade)),
     row("Worth as much as a sure", active(({ action }) => money(action.certainty_equivalent))),
     row("All in the bank", active(({ action }) => money(action.floor))),
@@ -113,12 +113,12 @@ function rows(both, line, span) {
     row("Last period", last),
     row("Returns seen", ({ session }) => ({ size: session.sample_size, words: count(session.sample_size) }), signed(count)),
     row("Policy", ({ policy }) => called(policy.policy, policy.name)),
-    ...asked(both.map(({ policy }) => policy.specification)).filter(({ name, cells: [left, right] }) => ALWAYS.includes(name) || left !== right),
+    ...asked(all.map(({ policy }) => policy.specification)).filter(({ name, cells }) => ALWAYS.includes(name) || !areSame(cells)),
   ];
 }
 
 /** Draws growth and holdings on one time line; growth starts from 100 at the first common place. */
-function courses(both, line, span) {
+function courses(all, line, span) {
   const { places } = line;
   if (places.length < 2) return "";
   const values = places.map((_, at) => at);
@@ -131,7 +131,7 @@ function courses(both, line, span) {
     tick: (at) => places[at].brief,
     whole: true,
   };
-  const series = (of, more) => both.map((one, index) => ({ name: LETTERS[index], kind: "line", values: of(one), ...more }));
+  const series = (of, more) => all.map((one, index) => ({ name: LETTERS[index], kind: "line", values: of(one), ...more }));
   const at = (one, of) => line.of(one).map((k) => (k === null ? null : (of[k] ?? null)));
   const held = ({ history }) => [null, ...history.observations.map((row) => (row.now ?? row).executed_allocation)];
   const from = span ? span[0] : 0;
@@ -141,6 +141,6 @@ function courses(both, line, span) {
     note,
     lineChart({ title: span && from > 0 ? `What 100 at the end of ${name(from)} has become` : "What 100 has become", gutter: 64, height: 220, x, y: { format: wealth, tick }, series: series((one) => levels(one, line, from)) }),
     lineChart({ title: "Below the highest so far", gutter: 64, height: 130, x, y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] }, series: series((one) => at(one, falls(one.history))) }),
-    lineChart({ title: `Share held in ${besideBank(both)}`, gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series((one) => at(one, held(one)), { kind: "levels" }) }),
+    lineChart({ title: `Share held in ${besideBank(all)}`, gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series((one) => at(one, held(one)), { kind: "levels" }) }),
   );
 }

@@ -10,6 +10,9 @@ import { severalFields } from "./several_fields.js";
 /** What a correction does to its period, in words. */
 export const CHANGES = { replace: "The report is wrong", insert: "A period before it was skipped", remove: "The period should be removed" };
 
+/** Returns the refusal of a correction without a reason, or null. */
+export const unreasoned = ({ name, control }) => (control.value.trim() === "" ? { field: name, message: "Say why." } : null);
+
 /** Returns the form of a correction: its first fields, the rest, and the button that sends it. */
 export function correctionFrame(fields, rest, button) {
   return h(
@@ -38,9 +41,9 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     } else fields.fill(standing(row), (row.now ?? row).log_return);
   };
   const period = select({ within, name: "period", label: "Period", choices: periods.reverse(), changed: (value) => fill(Number(value)) });
-  const { rate_per_step, contributions } = policy.specification.problem;
+  const { rate_per_step, contributions, spending } = policy.specification.problem;
   const contribution = Array.isArray(contributions) ? null : contributions;
-  const blank = { within, advised: null, rate: rate_per_step, contribution };
+  const blank = { within, advised: null, rate: rate_per_step, contribution, spending: spending ? null : undefined };
   // The assets may differ from period to period; fields of the same assets keep what is open.
   let shown = null;
   let fields = history.assets ? null : reportFields({ ...blank, label: "Return, %" });
@@ -74,7 +77,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     if (isReplaced()) return { ...about, ...fields.report() };
     return { ...about, change: change.control.value, ...(change.control.value === "insert" ? { missing: true } : {}) };
   };
-  const trouble = () => (isReplaced() ? fields.trouble() : null);
+  const trouble = () => (isReplaced() ? fields.trouble() : null) ?? unreasoned(reason);
   const once = "a correction counts once.";
   const path = `/sessions/${id}/corrections`;
   const done = "The period is corrected.";

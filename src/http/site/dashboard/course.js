@@ -4,7 +4,8 @@ import { lineChart } from "./chart.js";
 import { falls, mixed, risky, wealths } from "./comparators.js";
 import { h, section } from "./dom.js";
 import { banked } from "./flows.js";
-import { allocation, percent, percentTick, tick, wealth } from "./format.js";
+import { allocation, percent, percentTick, tick } from "./format.js";
+import { inCurrency } from "./money.js";
 import { isCautious } from "./specification.js";
 import { colourOf } from "./strategies.js";
 import { worstFalls } from "./track.js";
@@ -24,6 +25,9 @@ export const benchmarks = (history) =>
       ].map(([name, rule]) => ({ name, colour: colourOf(rule), wealths: [history.initial_wealth, ...history.observations.map(({ account }) => account.benchmarks[rule])] }))
     : [];
 
+/** Returns the name of a session's own line: its client, if it has a name. */
+const ownName = ({ name }) => name || "This session";
+
 /** The common left margin of charts above each other, in pixels. */
 const GUTTER = 64;
 
@@ -36,24 +40,18 @@ function periodsOf({ session, history, calendar }) {
   const horizon = session.rolling ? Math.max(12, lived + 1) : Math.max(session.horizon, lived);
   const values = Array.from({ length: horizon + 1 }, (_, k) => k);
   const x = { values, domain: [0, horizon], label: "Period", format: calendar.after, here: calendar.after, tick: calendar.brief, whole: true };
-  return { horizon, values, x };
+  return { values, x };
 }
 
 /** Draws wealth and falls, the part that a client is shown. */
 export function wealthCourse(shown) {
   const { history } = shown;
-  const { horizon, values, x } = periodsOf(shown);
+  const { values, x } = periodsOf(shown);
   const own = wealths(history);
-  const bank = banked(history, horizon);
   const along = (of) => values.map((k) => of[k] ?? null);
-  const series = [
-    { name: "This session", kind: "line", values: along(own) },
-    ...besides(history).map(({ name, share, colour }) => ({ name, colour, kind: "line", bare: true, values: along(share === 0 ? bank : mixed(history, share)) })),
-    ...benchmarks(history).map(({ name, colour, wealths }) => ({ name, colour, kind: "line", bare: true, values: along(wealths) })),
-  ];
   const deep = falls(history);
   const stocks = falls(history, mixed(history, 1));
-  const charts = [lineChart({ title: "Wealth", gutter: GUTTER, height: 230, x, y: { format: wealth, tick }, series })];
+  const charts = [lineChart({ title: "Wealth", gutter: GUTTER, height: 230, x, y: { format: inCurrency, tick }, series: wealthLines(shown, values, Boolean(shown.policy.specification.problem.spending)) })];
   if (own.length > 1) {
     charts.push(
       lineChart({
@@ -63,19 +61,34 @@ export function wealthCourse(shown) {
         x,
         y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] },
         series: [
-          { name: "This session", kind: "line", values: along(deep) },
+          { name: ownName(shown.session), kind: "line", values: along(deep) },
           { name: `All in ${risky(history)}`, kind: "line", bare: true, values: along(stocks) },
         ],
       }),
     );
   }
-  return section("So far", own.length > 1 ? h("p", { class: "sentence" }, comparison(shown, own)) : "", ...charts);
+  return section("So far", own.length > 1 ? h("p", { class: "sentence" }, comparison(shown)) : "", ...charts);
+}
+
+/**
+ * Returns the lines of a session's wealth and of its comparators after the periods in `values`, the start being 0. If it `spends`, what is spent
+ * ahead is not known, and the bank is drawn no further than the session.
+ */
+function wealthLines({ session, history }, values, spends) {
+  const bank = banked(history, spends ? history.observations.length : values.at(-1));
+  const along = (of) => values.map((k) => of[k] ?? null);
+  return [
+    { name: ownName(session), kind: "line", values: along(wealths(history)) },
+    ...besides(history).map(({ name, share, colour }) => ({ name, colour, kind: "line", bare: true, values: along(share === 0 ? bank : mixed(history, share)) })),
+    ...benchmarks(history).map(({ name, colour, wealths }) => ({ name, colour, kind: "line", bare: true, values: along(wealths) })),
+  ];
 }
 
 /** Compares the session's wealth with the comparators, in a sentence. */
-function comparison({ history }, own) {
-  const worth = (share) => wealth(mixed(history, share).at(-1));
-  return `It is worth ${wealth(own.at(-1))} now. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in ${risky(history)}.`;
+export function comparison({ history }) {
+  const own = wealths(history);
+  const worth = (share) => inCurrency(mixed(history, share).at(-1));
+  return `It is worth ${inCurrency(own.at(-1))} now. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in ${risky(history)}.`;
 }
 
 /** Returns the worst fall as a fact: `[name, value, note]`. */
@@ -132,5 +145,6 @@ export function holdings(shown, action) {
     y: { format: (value) => percent(value, 2), tick: percentTick },
     series: [{ name: "", kind: "line", values: radii.map((radius) => (radius === null ? null : radius * perPoint)) }],
   });
+  caution.classList.add("inside");
   return [chart, caution];
 }

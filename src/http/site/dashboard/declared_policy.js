@@ -19,7 +19,7 @@ export const isMoved = ({ reward }) => (name) => name !== "earned" || (reward ??
 export const statesWords = (states) => Object.entries(states).map(([name, value]) => `${name}: ${plain(value)}`).join(", ");
 
 /** Returns the body of the page of policy `id`, with `map`, its map. `isCompared` tells whether the service can compare it. */
-export function declaredBody(id, { specification, warnings }, isCompared, map, leaving) {
+export function declaredBody(id, { specification, warnings }, map, leaving) {
   const { problem, design } = specification;
   const { horizon, history } = problem;
   const answer = h("div", { id: "decision" });
@@ -38,8 +38,8 @@ export function declaredBody(id, { specification, warnings }, isCompared, map, l
     answer,
     map,
     futuresOf(`/policies/${id}`, leaving, { format: plain, shown: isMoved(problem) }),
-    isCompared ? beside(id, specification) : "",
-    isCompared ? walking(specification) : "",
+    beside(id, specification),
+    walking(specification),
     section("The problem", formulas(problem)),
     h("p", { class: "again", "data-needs": "train" }, h("a", { href: `#/declare?from=${id}` }, "Clone with one thing changed")),
   ];

@@ -2,7 +2,7 @@
 
 import { get, post } from "./api.js";
 import { lineChart } from "./chart.js";
-import { CHANGES, correctionFrame } from "./correction.js";
+import { CHANGES, correctionFrame, unreasoned } from "./correction.js";
 import { csvText } from "./csv.js";
 import { decided, isMoved, plain, statesWords } from "./declared_policy.js";
 import { announce, disclosure, facts, h, section, table } from "./dom.js";
@@ -14,7 +14,7 @@ import { pointed } from "./number_text.js";
 import { calendar, day } from "./periods.js";
 import { save } from "./picture.js";
 import { due } from "./renewal_due.js";
-import { sendReports } from "./report_fields.js";
+import { dayField, sendReports } from "./report_fields.js";
 
 /** Returns the body of the page of session `id` under `policy`. */
 export async function declaredSession(id, session, policy, leaving) {
@@ -79,7 +79,7 @@ function periodFields({ problem: { noise, actions, states } }, within, advised, 
   const isMissing = () => kind.control.value === "missing";
   const seen = input({ within, name: "noise", label: noise.name, note: `What the period brought, ${plain(noise.low)} to ${plain(noise.high)}.` });
   const kind = select({ within, name: "missing", label: "It is", choices: { known: "Known", missing: "Not known" }, changed: () => (seen.control.disabled = isMissing()) });
-  const last = input({ within, name: "date", label: "Last day", note: "For example 2026-09-30. May be blank.", inputmode: "text", value: date ?? "" });
+  const last = dayField(within, date);
   const of = (names, field, label, note) => names.map((name, index) => input({ within: `${within}${index}-`, name: `${field}.${name}`, label: label(name), note: note(name) }));
   const executed = of(Object.keys(actions), "executed", (name) => `${name}, done`, (name) => (advised ? `Blank: ${plain(advised[name])}, as advised.` : "Blank: as advised at that time."));
   const state = of(Object.keys(states), "state", (name) => `${name} after it`, () => "Blank: by the formula.");
@@ -126,7 +126,7 @@ function supposing({ id, session, problem: { actions, noise }, leaving }) {
       return place;
     });
   const times = (value) => `${plain(value)} times the radius`;
-  const caution = drawn("With more or less caution", "radius_scale", [0, 2], { label: "Times the radius", format: times, here: times }, (chart) => [chart("Worth under the worst law", (point) => point.value)]);
+  const caution = drawn("With more or less caution", "radius_scale", [0, 2], { label: "Radius, times", format: times, here: times }, (chart) => [chart("Worth under the worst law", (point) => point.value)]);
   if (session.period >= session.horizon) return [caution];
   const came = (value) => `${noise.name} ${plain(value)}`;
   return [caution, drawn(`After each ${noise.name} that may come, in the period after this one`, "noise", [noise.low, noise.high], { label: noise.name, format: came, here: came }, () => [])];
@@ -171,7 +171,7 @@ function correcting(shown) {
     change: change.control.value,
     ...(change.control.value === "remove" ? {} : fields.report()),
   });
-  const trouble = () => (change.control.value === "remove" ? null : fields.trouble());
+  const trouble = () => (change.control.value === "remove" ? null : fields.trouble()) ?? unreasoned(reason);
   sendReports(form, { ...shown, button, message, fields: { trouble }, path: `/sessions/${id}/corrections`, compose, once: "a correction counts once.", done: "The period is corrected.", words: words(problem) });
   return form;
 }

@@ -83,16 +83,17 @@ export function reveal(details) {
   details.querySelector("input, select, textarea")?.focus();
 }
 
-/** Returns a list of key figures: `[name, value, note]`. */
+/** Returns a list of key figures: `[name, value, note, kind]`; `kind` is "inside" if the figure is not for clients. */
 export function facts(entries) {
-  const fact = ([name, value, note]) =>
-    h("div", {}, h("dt", {}, name), h("dd", {}, value), note ? h("dd", { class: "note" }, note) : null);
+  const fact = ([name, value, note, kind]) =>
+    h("div", { class: kind }, h("dt", {}, name), h("dd", {}, value), note ? h("dd", { class: "note" }, note) : null);
   return h("dl", { class: "facts" }, entries.filter(Boolean).map(fact));
 }
 
-/** Returns a titled part of a page. */
+/** Returns a titled part of a page. A title of two texts ends with what is not for clients. */
 export function section(title, ...children) {
-  const heading = h("h2", { id: `h-${title.toLowerCase().replace(/[^a-z0-9]+/g, "-")}` }, title);
+  const [words, inside] = [title].flat();
+  const heading = h("h2", { id: `h-${words.toLowerCase().replace(/[^a-z0-9]+/g, "-")}` }, words, inside ? h("span", { class: "inside" }, inside) : null);
   return h("section", { "aria-labelledby": heading.id }, heading, children);
 }
 

@@ -3,13 +3,13 @@
 
 import { h } from "./dom.js";
 import { pressed } from "./form.js";
-import { counted } from "./format.js";
+import { counted, minus } from "./format.js";
 import { day } from "./periods.js";
 
 export const UNCONFIRMED = "/problems/unconfirmed";
 
 /** Returns a sentence for every doubt of a problem. */
-export const doubtWords = ({ doubts }) => doubts.map(inWords);
+export const doubtWords = ({ doubts }) => doubts.map((doubt) => minus(inWords(doubt)));
 
 function inWords({ reason, field, value, sentence, missing = [] }) {
   if (missing.length === 1) return `The period that ends on ${day(missing[0])} is missing before ${day(value)}.`;

@@ -30,6 +30,12 @@ export function draft(place) {
 /** The training that goes on with an advice, and the form that opens a session. */
 export const FOLLOWING = "#/train?follow=advice";
 export const OPENING = "#/sessions/new";
+/** The advice for the coming period. */
+export const ADVISING = "#/advise";
+/** The plan for years. */
+export const PLANNING = "#/plan";
+/** The share of a strategy. */
+export const SIZING = "#/sleeve";
 
 const TEXTS = "input[name]:not([type=file], [type=checkbox], [type=radio]), textarea[name]";
 const fieldsOf = (form) => [...form.querySelectorAll(TEXTS)].filter((field) => field.closest("[hidden]") === null);

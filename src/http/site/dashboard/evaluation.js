@@ -14,15 +14,15 @@ import { changing, interval, ordinal } from "./verdict.js";
 /** Histograms shown at once. */
 const SHOWN = 4;
 
-/** Draws the report. `policyLink(id)` returns a link to a policy. */
-export function body(report, policyLink) {
+/** Draws the report. `policyLink(id)` returns a link to a policy; `drawing(id)`, if present, one to the form that compares it on drawn records. */
+export function body(report, policyLink, drawing = null) {
   const ended = outcomes(report);
-  return [compared(report, policyLink), results(report, ended), spreads(report, ended), courses(report), quant(report, ended)];
+  return [compared(report, policyLink), results(report, ended, drawing), spreads(report, ended), courses(report), quant(report, ended)];
 }
 
 const named = ({ strategy }) => strategy;
 
-const coloured = ({ framework, constant_mix }) => (framework ? colourOf(framework) : colourOfMix(constant_mix));
+const coloured = ({ framework, constant_mix }) => (framework || constant_mix === null ? colourOf(framework ?? "own") : colourOfMix(constant_mix));
 
 /** Returns the money put in over all periods, including the start. */
 function putIn({ initial_wealth, contributions, horizon }) {
@@ -77,7 +77,7 @@ const isTrue = ({ histories, problem: { law } }) => histories.kind !== "drawn" &
 const called = ({ framework, name }) => (framework ? `\u201c${name}\u201d` : name);
 
 /** Returns the sentences that state the results. */
-function conclusions({ reference, request }, ended) {
+function conclusions({ reference }, ended) {
   const [best] = ended;
   const bank = ended.find(({ constant_mix }) => constant_mix === 0);
   const stocks = ended.find(({ constant_mix }) => constant_mix === 1);
@@ -91,7 +91,6 @@ function conclusions({ reference, request }, ended) {
     const { low, high } = best.difference?.certainty_equivalent ?? { low: -1, high: 1 };
     const far = low > 0 || high < 0 ? "" : ", but the difference is too small for these futures to show";
     said.push(`${called(main)} comes ${ordinal(place)} of ${ended.length}, worth ${sure(main)}${far}.`);
-    if (isTrue(request)) said.push("Here the record is the true market, so caution can only cost. To see what it may save, draw the histories from the market.");
   }
   if (main) {
     const beside = stocks && stocks !== main ? ` For all in stocks these are ${percent(stocks.wealth.chance_of_loss.value, 0)} and ${wealth(stocks.wealth.worst_twentieth.value)}.` : "";
@@ -100,12 +99,28 @@ function conclusions({ reference, request }, ended) {
   return main?.own_mix ? [...said, changing({ name: called(main), ...main.own_mix, shown: "these futures do" })] : said;
 }
 
-function results(report, ended) {
+/** Kinds of policy without caution. */
+const BOLD = ["plug_in", "known_law"];
+
+/** Says that caution can only cost if futures are drawn from the record, how much it costs, and where to see what it saves. */
+function onlyCosts({ request, reference }, ended, drawing) {
+  const main = ended.find(({ strategy }) => strategy === reference);
+  if (!isTrue(request) || !main?.framework || BOLD.includes(main.framework)) return null;
+  const trusting = ended.find(({ framework }) => framework === "plug_in");
+  const cost = trusting ? trusting.certainty_equivalent.value - main.certainty_equivalent.value : 0;
+  const step = trusting?.certainty_equivalent.value >= 1e5 ? 1 : 0.01;
+  const size = cost >= step / 2 ? `: ${tick(cost, step)} of the ${wealth(trusting.certainty_equivalent.value)} that ${called(trusting)} is worth` : "";
+  const policy = request.policies[main.framework];
+  const words = `Here the record is the true market, so caution can only cost${size}. To see what it saves when the record misleads, compare on records drawn from the market.`;
+  return [h("p", {}, words), drawing && policy ? h("p", { class: "actions" }, drawing(policy)) : null];
+}
+
+function results(report, ended, drawing) {
   const money = (name, figure) => ({ name, numeric: true, cell: ({ wealth: { [figure]: found } }) => wealth(found.value ?? found) });
   const share = (name, figure) => ({ name, numeric: true, cell: (row) => percent(row.wealth[figure].value) });
   return section(
     "What each is worth",
-    h("div", { class: "words" }, conclusions(report, ended).map((sentence) => h("p", {}, sentence))),
+    h("div", { class: "words" }, conclusions(report, ended).map((sentence) => h("p", {}, sentence)), onlyCosts(report, ended, drawing)),
     intervalChart({
       title: "Worth as much as a sure",
       rows: ended.map(({ name, colour, strategy, certainty_equivalent }) => ({ name, colour, isMain: strategy === report.reference, ...certainty_equivalent })),

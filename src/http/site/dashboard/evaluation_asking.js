@@ -4,19 +4,21 @@ import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";
 import { fieldset, input, refusal, select, sending } from "./form.js";
 import { typed } from "./number_text.js";
+import { OWN_FIELD, ownFormula } from "./own_formula.js";
 import { all } from "./pages.js";
 import { policyChoices } from "./session_opening.js";
 import { FRAMEWORKS, investorsOnly } from "./specification.js";
 
 export async function view(query, leaving) {
   const policies = await all("/policies", "policies", leaving);
-  const asked = new URLSearchParams(query ?? "").get("policy");
+  const wanted = Object.fromEntries(new URLSearchParams(query ?? ""));
   const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
   const none = h("p", {}, "An evaluation starts from a policy. ", h("a", { href: "#/train" }, "Train one"), ".");
-  return { title: "Compare out of sample", trail, body: policies.length > 0 ? asking(policies, asked) : none };
+  return { title: "Compare out of sample", trail, body: policies.length > 0 ? asking(policies, wanted) : none };
 }
 
-function asking(policies, asked) {
+/** Returns the form, with the `policy` chosen, and with drawn records if `records` is "drawn". */
+function asking(policies, wanted) {
   const choices = policyChoices(policies);
   const policy = select({
     name: "policy",
@@ -25,7 +27,7 @@ function asking(policies, asked) {
     choices,
   });
   policy.element.classList.add("broad");
-  if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
+  if (policies.some(({ policy }) => policy === wanted.policy)) policy.control.value = wanted.policy;
   const paths = input({ name: "paths", label: "Futures per record", note: "100 to 100,000.", value: "1000" });
   const histories = select({
     name: "histories.kind",
@@ -41,14 +43,16 @@ function asking(policies, asked) {
       h("label", {}, h("input", { type: "checkbox", name: "frameworks", value, checked: true }), words),
     ),
   );
+  const own = ownFormula("A share of wealth from the returns before each period.");
   const drawn = () => (count.element.hidden = histories.control.value !== "drawn");
   histories.control.addEventListener("change", drawn);
+  if (wanted.records === "drawn") histories.control.value = "drawn";
   drawn();
   const send = h("button", { type: "submit" }, "Evaluate");
   const form = h(
     "form",
     { novalidate: true },
-    fieldset("What to compare", [policy, histories, count, paths, frameworks]),
+    fieldset("What to compare", [policy, histories, count, paths, own.field, frameworks]),
     refusal(),
     h(
       "p",
@@ -71,11 +75,12 @@ function asking(policies, asked) {
         histories.control.value === "drawn"
           ? { kind: "drawn", count: typed(count.control.value) }
           : { kind: "given" },
+      ...own.weights(),
     });
     const job = await post("/evaluate", request);
     announce("The evaluation is queued.");
     location.hash = `#/evaluations/${job.job}`;
-  });
+  }, { told: (error) => error.field === OWN_FIELD && (error.field = own.field.name) });
   return form;
 }
 

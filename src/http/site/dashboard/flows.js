@@ -1,6 +1,6 @@
 // Contributions and withdrawals: the amount of each period, and what a start earns in the bank alone.
 
-import { wealth } from "./format.js";
+import { inCurrency } from "./money.js";
 
 /** Returns the money added at the end of `period`, counted from 1; negative if it is withdrawn. */
 const added = ({ contributions }, period) =>
@@ -25,12 +25,17 @@ export function addedIn(history, period) {
 /** Returns the bank's rate of a period: as reported, otherwise the policy's. */
 export const rateIn = (history, period) => standing(history.observations[period - 1]).rate ?? termsOf(history, period).terms.rate_per_step;
 
+/** Returns the money spent at the start of an observed period, with corrections applied; 0 if nothing was. */
+export function spentIn(history, period) {
+  return history.observations[period - 1]?.account?.spent ?? 0;
+}
+
 /** Returns wealth after each period up to `horizon`, if everything is sold at the start and stays in the bank. Observed periods count as
  * reported. */
 export function banked(history, horizon) {
   const held = [history.initial_wealth * (1 - history.terms.trading_cost * history.initial_holding)];
   for (let period = 1; period <= horizon; period++) {
-    held.push(held[period - 1] * (1 + rateIn(history, period)) + addedIn(history, period));
+    held.push((held[period - 1] - spentIn(history, period)) * (1 + rateIn(history, period)) + addedIn(history, period));
   }
   return held;
 }
@@ -38,7 +43,7 @@ export function banked(history, horizon) {
 /** Says what is added or withdrawn at the end of a period; blank if nothing is. */
 export function endWords(amount) {
   if (amount === 0) return "";
-  return `At the end of the period ${wealth(Math.abs(amount))} is ${amount > 0 ? "added" : "withdrawn"}.`;
+  return `At the end of the period ${inCurrency(Math.abs(amount))} is ${amount > 0 ? "added" : "withdrawn"}.`;
 }
 
 /** Says all contributions in a sentence. */
@@ -46,7 +51,7 @@ export function inWords(problem) {
   const { contributions } = problem;
   if (none(problem)) return "";
   if (Array.isArray(contributions)) {
-    const told = (word, amounts) => (amounts.length > 0 ? [`in ${amounts.length} of the periods money is ${word}, ${wealth(Math.abs(amounts.reduce((sum, amount) => sum + amount, 0)))} in all`] : []);
+    const told = (word, amounts) => (amounts.length > 0 ? [`in ${amounts.length} of the periods money is ${word}, ${inCurrency(Math.abs(amounts.reduce((sum, amount) => sum + amount, 0)))} in all`] : []);
     const words = [...told("added", contributions.filter((amount) => amount > 0)), ...told("withdrawn", contributions.filter((amount) => amount < 0))].join(", and ");
     return `${words[0].toUpperCase()}${words.slice(1)}.`;
   }

@@ -7,8 +7,9 @@ const LINE = 26;
 /** Height of a row whose name has a line of its own. */
 const TWO = 42;
 
-/** Draws `rows`, `{name, value, low, high, colour, isMain}`. `noun` heads the column of names; `domain` is the range of the scale. */
-export function intervalChart({ title, noun = "Strategy", rows, format, tick, domain = extent(rows.flatMap(({ low, high }) => [low, high])) }) {
+/** Draws `rows`, `{name, value, low, high, colour, isMain}`; without `low` and `high` there are estimates alone. `noun` heads the column of names. */
+export function intervalChart({ title, noun = "Strategy", rows, format, tick }) {
+  const domain = extent(rows.flatMap(({ value, low = value, high = value }) => [low, high]));
   const names = 20 + 7.2 * Math.max(...rows.map(({ name }) => name.length));
   /** Tells whether the names leave too little room for the ranges beside them. */
   const narrow = (width) => names > 0.55 * width;
@@ -31,7 +32,7 @@ export function intervalChart({ title, noun = "Strategy", rows, format, tick, do
         const y = line(width) * (index + (narrow(width) ? 0.75 : 0.5)) + 2;
         return [
           s("text", { class: `tick name${isMain ? " main" : ""}`, x: 0, y: narrow(width) ? y - 16 : y, dy: "0.32em" }, name),
-          s("line", { class: `range s${colour}`, x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
+          low === undefined ? null : s("line", { class: `range s${colour}`, x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
           s("circle", { class: `dot s${colour}`, cx: x(value), cy: y, r: 4.5 }),
         ];
       }),
@@ -46,8 +47,7 @@ export function intervalChart({ title, noun = "Strategy", rows, format, tick, do
         [
           { name: noun, cell: ({ name }) => name },
           { name: "Estimate", numeric: true, cell: ({ value }) => format(value) },
-          { name: "From", numeric: true, cell: ({ low }) => format(low) },
-          { name: "To", numeric: true, cell: ({ high }) => format(high) },
+          ...(rows[0].low === undefined ? [] : [{ name: "From", numeric: true, cell: ({ low }) => format(low) }, { name: "To", numeric: true, cell: ({ high }) => format(high) }]),
         ],
         rows,
       ),

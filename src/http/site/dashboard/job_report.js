@@ -31,7 +31,10 @@ const reported = (kind, [above, href], drawn) => async (id, leaving) => {
 };
 
 /** Draws an evaluation: of an investor's strategies, or a comparison of policies of a declared problem with rules. */
-const compared = (report, link) => (report.format === "ballast-comparison-1" ? comparison : evaluation).body(report, link);
+const compared = (report, link) => (report.format === "ballast-comparison-1" ? comparison : evaluation).body(report, link, drawing);
+
+/** Returns the link to the form that compares a policy on drawn records. */
+const drawing = (policy) => h("a", { class: "button quiet", "data-needs": "train", href: `#/evaluations/new?policy=${policy}&records=drawn` }, "Draw records");
 
 /** Returns the module of a walk-forward: of an investor's strategies, or of a declared problem. */
 const walkOf = ({ format }) => (format === "ballast-declared-walk-1" ? declaredWalk : backtest);

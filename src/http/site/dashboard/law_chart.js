@@ -52,7 +52,7 @@ export function lawChart({ transport }) {
     here,
     h("span", {}, seen.key, "Seen ", seen.value),
     h("span", {}, worst.key, "Worst market ", worst.value),
-    h("span", {}, moved.key, "of that, moved here ", moved.value),
+    h("span", { class: "inside" }, moved.key, "of that, moved here ", moved.value),
   );
   let x = scale(domain, [0, 1]),
     cursor,

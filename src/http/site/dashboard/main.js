@@ -1,6 +1,6 @@
 // The frame: which view belongs to which address, and what happens on a change from one to the next.
 
-import { offers, Problem } from "./api.js";
+import { Problem, WAS_DELETED } from "./api.js";
 import { announce, h } from "./dom.js";
 import * as advise from "./advise.js";
 import * as backtestAsking from "./backtest_asking.js";
@@ -12,19 +12,27 @@ import { holderWords, lacking, lackWords } from "./holder.js";
 import { ofBacktest, ofEvaluation, ofFrontier } from "./job_report.js";
 import * as jobs from "./jobs.js";
 import { askForKey, held, keyForm } from "./key.js";
+import * as letters from "./letters.js";
+import * as plan from "./plan.js";
 import * as policies from "./policies.js";
 import * as policy from "./policy.js";
+import { leaveByEscape, pageOf, present, presentOnly } from "./present.js";
 import * as renewing from "./renewing.js";
 import * as reporting from "./reporting.js";
 import * as session from "./session.js";
 import * as sessionOpening from "./session_opening.js";
 import * as sessions from "./sessions.js";
+import * as sleeve from "./sleeve.js";
+import * as subscriptions from "./subscriptions.js";
+import * as tearSheet from "./tear_sheet.js";
 import * as train from "./train.js";
 
 /** Address, view, navigation entry, and the role that the view needs, if any. A view is `async (id, leaving) => {title, body}`. */
 const ROUTES = [
   [/^#\/jobs(?:\?(.*))?$/, jobs.view, "jobs"],
   [/^#\/advise$/, advise.view, "sessions"],
+  [/^#\/plan$/, plan.view, "plan"],
+  [/^#\/sleeve$/, sleeve.view, "sessions"],
   [/^#\/train(?:\?(.*))?$/, train.view, "jobs", "train"],
   [/^#\/declare(?:\?(.*))?$/, declare.view, "jobs", "train"],
   [/^#\/policies$/, policies.view, "policies"],
@@ -33,7 +41,10 @@ const ROUTES = [
   [/^#\/report(?:\?(.*))?$/, reporting.view, "sessions", "operate"],
   [/^#\/renew(?:\?(.*))?$/, renewing.view, "sessions", "operate"],
   [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions", "operate"],
-  [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
+  [/^#\/sessions\/([^/?]+)(?:\?present)?$/, session.view, "sessions"],
+  [/^#\/sessions\/([^/]+)\/letter$/, letters.ofSession, "sessions"],
+  [/^#\/sessions\/([^/]+)\/track$/, tearSheet.view, "sessions"],
+  [/^#\/letters(?:\?(.*))?$/, letters.view, "sessions"],
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
   [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations", "train"],
   [/^#\/evaluations\/([^/]+)$/, ofEvaluation, "evaluations"],
@@ -41,12 +52,14 @@ const ROUTES = [
   [/^#\/backtests\/([^/]+)$/, ofBacktest, "evaluations"],
   [/^#\/compare(?:\?(.*))?$/, compare.view, "compare"],
   [/^#\/frontiers\/([^/]+)$/, ofFrontier, "jobs"],
+  [/^#\/subscriptions$/, subscriptions.view, "key"],
   [/^#\/key$/, key, "key"],
 ];
 
 const main = document.querySelector("main");
 let leaving = new AbortController();
 let first = true;
+let shown = "";
 
 /** Shows the view of the address. Focus goes to its heading, as it would on a new page. */
 async function show() {
@@ -57,6 +70,8 @@ async function show() {
   let [page, route, match, lacks] = [, , , []];
   try {
     const hash = location.hash || "#/";
+    shown = pageOf(hash);
+    present();
     [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
     lacks = await lacking();
     // Hiding by style keeps elements hidden that a view adds later.
@@ -90,7 +105,7 @@ async function show() {
 /** The view where a key is entered or forgotten. */
 async function key(_, signal) {
   const note = "If the service asks for keys, it shows nothing without one. Only this tab keeps the key, until you close it.";
-  return { title: "Key", body: [await holderWords(signal), h("p", {}, note), keyForm(() => location.assign("#/"))] };
+  return { title: "Key", body: [await holderWords(signal), h("p", {}, note), keyForm(() => location.assign("#/")), h("p", {}, h("a", { href: "#/subscriptions" }, "Tell another program of events"), ".")] };
 }
 
 const capital = (sentence) => `${sentence[0].toUpperCase()}${sentence.slice(1)}`;
@@ -118,12 +133,19 @@ document.querySelector(".skip").addEventListener("click", (event) => {
   event.preventDefault();
   main.focus();
 });
+addEventListener("keydown", leaveByEscape);
 addEventListener("hashchange", () => {
+  if (presentOnly(shown)) return;
   announce("");
   show();
 });
-addEventListener("key-refused", ({ detail }) => askForKey(detail));
-offers("/evaluate").then((offered) => {
-  document.querySelector("nav [data-view=evaluations]").parentElement.hidden = !offered;
+addEventListener("session-deleted", ({ detail }) => {
+  // Nothing that its page shows stands any more.
+  if (!shown.includes(detail)) return;
+  leaving.abort();
+  const heading = h("h1", { tabindex: -1 }, "Session deleted");
+  main.replaceChildren(h("header", { class: "page" }, heading), h("p", { role: "alert" }, `${WAS_DELETED} `, h("a", { href: "#/sessions" }, "See the sessions"), "."));
+  heading.focus();
 });
+addEventListener("key-refused", ({ detail }) => askForKey(detail));
 show();

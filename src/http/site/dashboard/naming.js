@@ -14,7 +14,7 @@ export const titled = (noun, id, name) => name || `${noun} ${short(id)}`;
 /** Returns the head of a row: the name with the identifier below, or the identifier alone. */
 export function headed(href, id, name) {
   const code = h("code", {}, short(id));
-  return name ? [h("a", { href }, name), h("span", { class: "under" }, code)] : h("a", { href }, code);
+  return name ? [h("a", { href }, name), " ", h("span", { class: "under" }, code)] : h("a", { href }, code);
 }
 
 /** Returns a link to a policy by its identifier; if `asked`, its name is requested and replaces the identifier. */

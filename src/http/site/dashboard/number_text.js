@@ -59,7 +59,7 @@ export function pointed(text) {
 
 /** Returns a number typed in percent as a fraction, or null if it is not a number. */
 export function fraction(text) {
-  const value = typed(text.replace(/\s*%$/, ""));
+  const value = typed(bare(text));
   return typeof value === "number" ? hundredth(value) : null;
 }
 

@@ -14,7 +14,7 @@ export function observeForm(action, { id, session, history, policy, calendar, re
     const read = fields.read();
     preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before, cost: trading_cost });
   };
-  const blank = { advised: action.allocation, rate: rate_per_step, contribution: action.contribution, date: session.next, changed: foretell };
+  const blank = { advised: action.allocation, rate: rate_per_step, contribution: action.contribution, spending: action.spending ?? undefined, date: session.next, changed: foretell };
   const fields = assets ? severalFields(assets, blank) : reportFields({ ...blank, label: `Return in ${calendar.inText(action.period)}, %` });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);

@@ -6,9 +6,10 @@ import { correctionForm } from "./correction.js";
 import { benchmarks, besides } from "./course.js";
 import { csvText, hundred } from "./csv.js";
 import { disclosure, h, reveal, section, table } from "./dom.js";
-import { addedIn, rateIn, standing } from "./flows.js";
+import { addedIn, rateIn, spentIn, standing } from "./flows.js";
 import { pressed } from "./form.js";
-import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
+import { allocation, count, figures, moment, percent, short } from "./format.js";
+import { inCurrency } from "./money.js";
 import { policyLink } from "./naming.js";
 import { firstOf } from "./pages.js";
 import { day } from "./periods.js";
@@ -22,6 +23,9 @@ const NEWEST = 24;
 /** Tells whether trading costs something. */
 const isCostly = ({ policy }) => policy.specification.problem.trading_cost > 0;
 
+/** Tells whether the policy plans spending, or something was spent. */
+const isSpending = ({ policy, history }) => Boolean(policy.specification.problem.spending) || history.observations.some((_, index) => spentIn(history, index + 1) > 0);
+
 /** Formats the return of an asset; blank if there is none. */
 const returned = (log_return) => ((log_return ?? null) === null ? "" : percent(simpleReturn(log_return), 2));
 
@@ -34,6 +38,7 @@ export function observed(shown) {
     const [stands, told] = [(row.now ?? row)[name], row[name]].map((value) => (value === null ? "missing" : words(value)));
     return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As first reported" }, told));
   };
+  const spends = isSpending(shown);
   const period = { name: "Period", cell: (row) => calendar.name(row.period).replace(/^Period /, "") };
   const number = (name, cell) => ({ name, numeric: true, cell });
   const told = (some) =>
@@ -46,8 +51,9 @@ export function observed(shown) {
         ...everyAsset(history).map((name) => number(name, ({ period }) => returned(assetReturns(history, period - 1)?.[name]))),
         number("Advised", now("advised_allocation", allocation)),
         number("Held", now("executed_allocation", allocation)),
-        ...(isCostly(shown) ? [number("Traded", ({ account }) => percent(account.turnover)), number("Cost", ({ account }) => wealth(account.cost))] : []),
-        number("Wealth", now("wealth", wealth)),
+        ...(isCostly(shown) ? [number("Traded", ({ account }) => percent(account.turnover)), number("Cost", ({ account }) => inCurrency(account.cost))] : []),
+        ...(spends ? [number("Spent", now("spent", (amount = 0) => inCurrency(amount)))] : []),
+        number("Wealth", now("wealth", inCurrency)),
         number("Reported", ({ observed_ms }) => moment(observed_ms)),
       ],
       some,
@@ -108,6 +114,7 @@ export function csv({ history, calendar, policy, cautionScale }) {
     ...["from", "to"].map((end, index) => costly && [`Best kept ${end}, %`, ({ band }) => hundred(band?.[index])]),
     ...both("Held", ", %", ({ executed_allocation }) => hundred(executed_allocation)),
     ["Traded, %", ({ account }) => hundred(account.turnover)],
+    ...(isSpending({ policy, history }) ? both("Spent", "", ({ spent }) => spent ?? 0) : []),
     costly && ["Trading cost", ({ account }) => account.cost],
     ...assets.flatMap((name) => [
       [`${name} returned, %`, ({ period }) => simple(assetReturns(history, period - 1)?.[name])],
@@ -127,7 +134,7 @@ export function csv({ history, calendar, policy, cautionScale }) {
 }
 
 const ONE = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
-const REPORT = [...ONE, ...ONE.map((name) => `${name}s`), "missing", "date", "rate", "flow", "wealth"];
+const REPORT = [...ONE, ...ONE.map((name) => `${name}s`), "missing", "date", "rate", "flow", "spent", "wealth"];
 const reportOf = (said) => Object.fromEntries(REPORT.filter((name) => (said[name] ?? false) !== false).map((name) => [name, said[name]]));
 
 /** Sends a confirmed correction, on a press of `button`. */

@@ -37,11 +37,12 @@ export async function all(path, name, signal) {
   return found;
 }
 
-/** Returns a holder with the first `most` rows, drawn by `draw`, and the button `all` that shows all rows, or null if there are no more. */
-export function firstOf(rows, most, draw) {
+/** Returns a holder with the first `most` rows, drawn by `draw`, and the button `all` that shows all rows, or null if there are no more. `now()`
+ * returns the rows when it is pressed. */
+export function firstOf(rows, most, draw, now = () => rows) {
   const holder = h("div", {}, draw(rows.slice(0, most)));
   if (rows.length <= most) return { holder, all: null };
-  const all = h("button", { type: "button", class: "quiet", onclick: () => (holder.replaceChildren(draw(rows)), all.remove()) }, `Show all ${count(rows.length)}`);
+  const all = h("button", { type: "button", class: "quiet", onclick: () => (holder.replaceChildren(draw(now())), all.remove()) }, `Show all ${count(rows.length)}`);
   return { holder, all };
 }
 

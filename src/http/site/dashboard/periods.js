@@ -1,6 +1,7 @@
 // The names of a session's periods: their dates if those are reported, and otherwise their numbers.
 
 import { standing } from "./flows.js";
+import { dateText } from "./format.js";
 
 const DAY = 86_400_000;
 /** A day less than so many days away needs no year. */
@@ -25,15 +26,28 @@ export const unitOf = (periods_per_year) =>
 /** Returns midnight, UTC, of a day such as "2008-09-30". */
 const parsed = (date) => Date.parse(`${date}T00:00:00Z`);
 const written = (time) => new Date(time).toISOString().slice(0, 10);
-const told = (time, options) => new Date(time).toLocaleDateString("en-GB", { timeZone: "UTC", ...options });
+const told = (time, options) => dateText(time, { timeZone: "UTC", ...options });
 
-/** Reads a day, year first or as 30.9.2008, and returns it as 2008-09-30; null if the text is not a day. */
-export function dayOf(text) {
+/** Returns the days that a text may mean: year first, as 30.9.2008, or with slashes in both orders. None if it is not a day. */
+function daysOf(text) {
   const [, ...yearFirst] = /^(\d{4})-(\d\d?)-(\d\d?)$/.exec(text) ?? [];
   const [, ...dayFirst] = /^(\d\d?)\.(\d\d?)\.(\d{4})$/.exec(text) ?? [];
-  const date = [...yearFirst, ...dayFirst.reverse()].map((part) => part.padStart(2, "0")).join("-");
-  const time = parsed(date);
-  return Number.isFinite(time) && written(time) === date ? date : null;
+  const [, one, two, year] = /^(\d\d?)\/(\d\d?)\/(\d{4})$/.exec(text) ?? [];
+  const orders = [yearFirst, dayFirst.reverse(), ...(year ? [[year, two, one], [year, one, two]] : [])];
+  const days = orders.map((parts) => parts.map((part) => part.padStart(2, "0")).join("-"));
+  return [...new Set(days)].filter((date) => Number.isFinite(parsed(date)) && written(parsed(date)) === date);
+}
+
+/** Reads a day and returns it as 2008-09-30. Null if the text is not a day, or may be two, as 1/2/2008. */
+export function dayOf(text) {
+  const [date = null, other] = daysOf(text);
+  return other === undefined ? date : null;
+}
+
+/** Asks which of two days a text such as 1/2/2008 means; null if it does not mean two. */
+export function whichDay(text) {
+  const days = daysOf(text);
+  return days.length === 2 ? `may be ${days.map(day).join(" or ")}: write ${days.join(" or ")}` : null;
 }
 
 /** Formats a day as 30 Sep 2008. */

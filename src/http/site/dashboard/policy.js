@@ -1,6 +1,6 @@
 // One policy: what it was trained for, what it does, and for the quant how well it was solved.
 
-import { download, get, offers, remove } from "./api.js";
+import { download, get, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { declaredBody } from "./declared_policy.js";
 import { disclosure, h, section, table } from "./dom.js";
@@ -16,7 +16,7 @@ import { surfaceView } from "./surface_view.js";
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics, annualised, warnings } = policy;
-  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, await offers("/evaluate"), policyMap(id, specification.problem), leaving));
+  if (isDeclared(specification)) return framed(id, policy, [], declaredBody(id, policy, policyMap(id, specification.problem), leaving));
   const { element, told } = answer(specification, diagnostics);
   const body = [
     h(
@@ -29,12 +29,10 @@ export async function view(id, leaving) {
     ),
     again(id),
     section("What it holds", surfaceView({ id, problem: specification.problem, leaving, told })),
-    futuresOf(`/policies/${id}`, leaving, { format: wealth }),
+    policy.specification.problem.spending ? "" : futuresOf(`/policies/${id}`, leaving, { format: wealth }),
     solved(specification, diagnostics),
   ];
-  const evaluate = (await offers("/evaluate"))
-    ? h("a", { class: "button quiet", href: `#/evaluations/new?policy=${id}` }, "Evaluate")
-    : null;
+  const evaluate = h("a", { class: "button quiet", href: `#/evaluations/new?policy=${id}` }, "Evaluate");
   return framed(id, policy, [h("a", { class: "button", href: `#/sessions/new?policy=${id}` }, "Open a session"), evaluate], body);
 }
 

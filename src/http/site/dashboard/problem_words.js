@@ -1,6 +1,7 @@
 // A refusal in the words of the form: the field by its label, its value and bounds in the unit of the field.
 
-import { wealth } from "./format.js";
+import { inCurrency } from "./money.js";
+import { whichDay } from "./periods.js";
 
 const MINUS = "\u2212";
 /** The parser's names for types of numbers, and the page's. */
@@ -18,7 +19,7 @@ const places = (ahead) => [
   [/problem\.horizon = (?=\d)/g, ""],
   [/problem\.contributions/g, "the money added"],
   [/(?:the )?(?:problem\.)?\bhorizon\b/g, ahead ? `\u201c${ahead}\u201d` : "the number of periods ahead"],
-  [/(?<=\bgive a wealth of )-?[\d.e+-]+/g, (amount) => wealth(Number(amount))],
+  [/(?<=\bgive a wealth of )-?[\d.e+-]+/g, (amount) => inCurrency(Number(amount))],
 ];
 /** The messages of the parser of dates. */
 const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|date)\b/;
@@ -27,13 +28,15 @@ const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|
  * which is 100 % minus the request's share. `ahead` is as above, if the form has such a field. */
 export function problemWords({ value, rule }, label, unit, ahead) {
   const name = label.replace(/, %(?=$|,)/, "");
+  const which = NO_DAY.test(rule) && whichDay(String(value));
+  if (which) return `${name} ${given(value)}; it ${which}.`;
   const words = ruled(rule, unit, ahead);
   // A rule without "must" gives a reason instead of a bound on the value.
   return /^must\b/.test(words) ? `${name} ${given(value, unit)}; it ${words}.` : `${name}: ${words}.`;
 }
 
 function given(value, unit) {
-  if (value === null || value === undefined || value === "") return "is blank";
+  if (value === null || value === undefined || value === "" || value === "0 letters") return "is blank";
   if (typeof value === "object") return "has the wrong form";
   return typeof value === "number" ? `is ${number(value, unit)}` : `is \u201c${value}\u201d`;
 }

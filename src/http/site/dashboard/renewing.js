@@ -1,11 +1,12 @@
 // Renewals: sessions go on with another policy from their coming periods. It already exists, or is trained on the
 // returns seen.
 
-import { follow, get, isOver, post } from "./api.js";
+import { get, post, trained } from "./api.js";
 import { statesWords } from "./declared_policy.js";
 import { announce, h, table } from "./dom.js";
 import { fieldset, refusal, select, sending } from "./form.js";
-import { count, counted, wealth } from "./format.js";
+import { count, counted, dateText } from "./format.js";
+import { inCurrency } from "./money.js";
 import { called, headed } from "./naming.js";
 import { all } from "./pages.js";
 import { standing } from "./flows.js";
@@ -29,7 +30,7 @@ export async function view(query, leaving) {
 
 /** Returns the name of a policy that is retrained from another. */
 function renewedName(name, now) {
-  const month = now.toLocaleDateString("en-GB", { month: "short", year: "numeric" });
+  const month = dateText(now, { month: "short", year: "numeric" });
   const stem = name.split(" (renewed ")[0];
   const when = `renewed ${month}`;
   return stem === "" ? `R${when.slice(1)}` : `${[...stem].slice(0, LONGEST_NAME - when.length - 3).join("")} (${when})`;
@@ -73,7 +74,7 @@ function renewing(sessions, policies, leaving) {
     { name: "Session", cell: ({ session, name }) => h("div", { class: "said" }, headed(`#/sessions/${session}`, session, name), outcomes.get(session)) },
     { name: "Policy now", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, policyName(policy)) },
     { name: "Periods", numeric: true, cell: ({ period, horizon, rolling }) => (rolling ? count(period - 1) : `${count(period - 1)} of ${count(horizon)}`) },
-    { name: "Stands at", numeric: true, cell: (session) => (session.states ? statesWords(session.states) : wealth(session.wealth)) },
+    { name: "Stands at", numeric: true, cell: (session) => (session.states ? statesWords(session.states) : inCurrency(session.wealth)) },
   ], sessions);
   const line = h("p", { class: "note", role: "status", tabindex: -1 });
   const button = h("button", { type: "submit" }, sessions.length === 1 ? "Continue" : `Continue the ${count(sessions.length)}`);
@@ -84,23 +85,16 @@ function renewing(sessions, policies, leaving) {
   };
   /** Trainings by their request, so that sessions with the same record and policy share one. */
   const trainings = new Map();
-  const trained = async (session) => {
+  const trainedFor = async (session) => {
     const [history, policy] = await Promise.all([get(`/sessions/${session.session}/history`, leaving), get(`/policies/${session.policy}`, leaving)]);
     const asked = JSON.stringify((session.states ? anewDeclared : anew)(session, history, policy, new Date()));
-    if (!trainings.has(asked)) trainings.set(asked, train(asked));
+    if (!trainings.has(asked)) trainings.set(asked, trained(asked, leaving));
     tell(session, "its policy is being trained\u2026");
     return trainings.get(asked);
   };
-  const train = async (asked) => {
-    let now = await post("/train", asked);
-    await follow(now.job, (job) => (now = job), leaving);
-    if (!isOver(now)) now = await get(`/jobs/${now.job}`, leaving);
-    if (now.state !== "succeeded") throw new Error(`the training ${now.state}${now.error ? `: ${now.error}` : ""}`);
-    return now.policy;
-  };
   const goneOn = new Set();
   const one = async (session) => {
-    const policy = choice.control.value === ANEW ? await trained(session) : choice.control.value;
+    const policy = choice.control.value === ANEW ? await trainedFor(session) : choice.control.value;
     const { renewals } = await get(`/sessions/${session.session}`, leaving);
     const { period, horizon } = await post(`/sessions/${session.session}/renewals`, { renewal: renewals + 1, policy });
     goneOn.add(session.session);

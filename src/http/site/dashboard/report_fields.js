@@ -5,19 +5,30 @@ import { h } from "./dom.js";
 import { question, UNCONFIRMED } from "./doubts.js";
 import { clear, input, pressed, select, showProblem } from "./form.js";
 import { endWords } from "./flows.js";
-import { allocation, percent, wealth } from "./format.js";
+import { allocation, percent } from "./format.js";
+import { inCurrency } from "./money.js";
 import { fraction, typed } from "./number_text.js";
-import { dayOf } from "./periods.js";
+import { dayOf, isoDay } from "./periods.js";
 import { problemWords } from "./problem_words.js";
 
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "Not known" };
 
 /** The bounds that the service accepts. */
-export const LIMITS = { log_return: [-5, 5], simple_return: [-1, Math.expm1(5)], share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
+export const LIMITS = { log_return: [-5, 5], simple_return: [-1, Math.expm1(5)], share: [0, 1], rate: [-0.5, 0.5], spent: [0, 1e15], wealth: [1e-6, 1e15] };
 
-/** Returns the fields for a period. Blank fields mean the `advised` share and the policy's rate and contribution; the last day is filled in as
- * expected. `advised` is null if it is the advice of that time. */
-export function reportFields({ within, label, advised, rate, contribution, date: likely = null, changed }) {
+/** Returns the field for what was spent before a period, or null if the policy plans no spending. */
+export const spentField = (within, spending, changed) =>
+  spending === undefined ? null : input({ within, name: "spent", label: "Spent", note: `Before the period. Blank: ${spending ? `the ${inCurrency(spending.amount)}` : "as"} advised.`, changed });
+
+/** Returns the field for the last day of a period. It holds the `due` day once that has come, and otherwise names it. */
+export function dayField(within, due) {
+  const isCome = due && due <= isoDay(new Date());
+  return input({ within, name: "date", label: "Last day", note: due && !isCome ? `Due on ${due}. May be blank.` : "For example 2008-09-30. May be blank.", inputmode: "text", value: isCome ? due : "" });
+}
+
+/** Returns the fields for a period. Blank fields mean the `advised` share and the policy's rate and contribution; the last day is filled in
+ * once it has come. `advised` is null if it is the advice of that time, and so is `spending`, which is undefined if the policy plans none. */
+export function reportFields({ within, label, advised, rate, contribution, spending, date: due = null, changed }) {
   const edited = () => changed?.();
   const given = input({
     within,
@@ -44,11 +55,12 @@ export function reportFields({ within, label, advised, rate, contribution, date:
     within,
     name: "flow",
     label: "Money added at the end",
-    note: `Blank: ${contribution === null ? "the policy\u2019s amount" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`,
+    note: `Blank: ${contribution === null ? "the policy\u2019s amount" : `${inCurrency(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`,
     changed: edited,
   });
   const reached = input({ within, name: "wealth", label: "Wealth reached", note: "Blank: computed from the other fields.", changed: edited });
-  const date = input({ within, name: "date", label: "Last day", note: "For example 2008-09-30. May be blank.", inputmode: "text", value: likely ?? "" });
+  const date = dayField(within, due);
+  const spent = spentField(within, spending, edited);
   const more = h(
     "details",
     {},
@@ -57,11 +69,11 @@ export function reportFields({ within, label, advised, rate, contribution, date:
   );
   const isMissing = () => kind.control.value === "missing";
   return {
-    element: h("div", {}, h("div", { class: "fields" }, given.element, date.element, kind.element), more),
+    element: h("div", {}, h("div", { class: "fields" }, given.element, spent?.element, date.element, kind.element), more),
     /** Fills the fields with what was reported. */
     fill(report, logReturn) {
       const texts = new Map([[held, report.executed_allocation], [paid, report.rate]].map(([field, share]) => [field, inPercent(share)]));
-      for (const [field, value] of [[flow, report.flow], [reached, report.wealth], [date, report.date]]) texts.set(field, value ?? "");
+      for (const [field, value] of [[flow, report.flow], [reached, report.wealth], [date, report.date], ...(spent ? [[spent, report.spent]] : [])]) texts.set(field, value ?? "");
       kind.control.value = logReturn === null ? "missing" : "simple_return";
       given.control.disabled = isMissing();
       texts.set(given, logReturn === null ? "" : inPercent(report.simple_return ?? Math.expm1(logReturn)));
@@ -74,11 +86,12 @@ export function reportFields({ within, label, advised, rate, contribution, date:
       const executed = blank(held, advised, fraction);
       const [rateThen, added] = [blank(paid, rate, fraction), blank(flow, contribution, typed)];
       const ended = blank(reached, Number.NaN, typed);
-      if ([value, executed, rateThen, added, ended].some((number) => typeof number !== "number")) return null;
+      const used = spent ? blank(spent, spending?.amount ?? 0, typed) : 0;
+      if ([value, executed, rateThen, added, ended, used].some((number) => typeof number !== "number")) return null;
       const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
       const returned = LIMITS[kind.control.value] ?? LIMITS.simple_return;
-      const numbers = [[given, value, returned], [held, executed, LIMITS.share], [paid, rateThen, LIMITS.rate], [reached, ended, LIMITS.wealth]];
-      return { parts: [{ held: executed, growth }], rate: rateThen, added, ended, missing: isMissing(), numbers, flow, reached };
+      const numbers = [[given, value, returned], [held, executed, LIMITS.share], [paid, rateThen, LIMITS.rate], [reached, ended, LIMITS.wealth], ...(spent ? [[spent, used, LIMITS.spent]] : [])];
+      return { parts: [{ held: executed, growth }], rate: rateThen, added, ended, spent: used, missing: isMissing(), numbers, flow, reached };
     },
     /** Returns the report; fields that cannot be read are sent as typed, so that the service refuses them by name. */
     report() {
@@ -89,6 +102,7 @@ export function reportFields({ within, label, advised, rate, contribution, date:
         [flow, typed],
         [reached, typed],
         [date, dayOf],
+        ...(spent ? [[spent, typed]] : []),
       ];
       for (const [{ name, control }, read] of texts)
         if (control.value.trim() !== "") report[name] = read(control.value.trim()) ?? control.value;
@@ -110,7 +124,7 @@ export const inPercent = (share) => (share === null || share === undefined ? "" 
 /** Says what a report makes of `wealth`, or why it will be refused, in the words of the refusal. In `read`, `parts` are the shares held of each
  * asset and their growths, `numbers` are the fields with their values and bounds. `before` are the shares held before. */
 export function foretold(read, { wealth: now, before, cost }) {
-  const { parts, rate, added, ended, missing, numbers, flow, reached } = read;
+  const { parts, rate, added, ended, spent, missing, numbers, flow, reached } = read;
   const refused = ({ element, control }, value, rule) =>
     `This will be refused. ${problemWords({ value, rule }, element.querySelector("label").textContent, control.dataset.unit)}`;
   const within = ([low, high]) => `in [${low}, ${high}]`;
@@ -121,12 +135,12 @@ export function foretold(read, { wealth: now, before, cost }) {
   if (whole > 1 + 1e-9) return `This will be refused: the shares held add up to ${percent(whole)}, more than 100\u202f%.`;
   const traded = 1 - cost * sum(({ held }, index) => Math.abs(held - before[index]));
   const grown = (1 - whole) * (1 + rate) + sum(({ held, growth }) => held * growth);
-  const left = Number.isNaN(ended) ? now * traded * grown + added : ended;
+  const left = Number.isNaN(ended) ? (now - spent) * traded * grown + added : ended;
   if (left < LIMITS.wealth[0] || left > LIMITS.wealth[1]) {
     const leaves = `the return, the allocation and the amount added give a wealth of ${left}, and wealth must lie ${within(LIMITS.wealth)}`;
     return flow.control.value.trim() === "" ? refused(reached, null, `must be reported: ${leaves}`) : refused(flow, added, `must leave an allowed wealth: ${leaves}`);
   }
-  return `${missing ? "No return; wealth" : "Wealth"} ${wealth(now)} \u2192 ${wealth(left)} at ${allocation(whole)} held. ${endWords(added)}`;
+  return `${missing ? "No return; wealth" : "Wealth"} ${inCurrency(now)} \u2192 ${inCurrency(left)} at ${allocation(whole)} held. ${endWords(added)}`;
 }
 
 /**

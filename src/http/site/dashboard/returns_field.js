@@ -24,7 +24,7 @@ const LONG = 200_000;
 /** The longest history that the service accepts and a chart shows. */
 const MOST = 20_000;
 /** Monthly returns of the US stock market. */
-const EXAMPLE = "/dashboard/us_market_monthly.csv";
+export const EXAMPLE = "/dashboard/us_market_monthly.csv";
 /** Most lines of a chart that can be told apart. */
 const LINES = 7;
 const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolons, tabs or lines.";
@@ -52,6 +52,9 @@ export function returnsField({ name, label, blank = null, example = null, severa
     note.classList.toggle("wrong", outcome === "refused");
     note.classList.toggle("telling", outcome === "read" || outcome === "asked");
     note.textContent = sentence;
+    // What the form said about the text before it was read again.
+    element.querySelector(`#${id}-error`)?.remove();
+    area.setAttribute("aria-describedby", `${id}-note`);
     if (outcome === "refused") area.setAttribute("aria-invalid", "true");
     else area.removeAttribute("aria-invalid");
   };

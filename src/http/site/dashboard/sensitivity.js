@@ -9,10 +9,12 @@ const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 
 const HEADING = "How close the advice is to changing";
 
+const FIXED = "No return changes the advice, because the policy does not learn from new returns.";
+
 /** Returns `{element, ask()}`: the section, and the function that fills it from `/action`. */
 export function nearness({ id, policy, leaving }) {
   const said = (words) => ({ element: section(HEADING, h("p", { class: "sentence" }, words)), ask: async () => {} });
-  if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes the advice, because the policy does not learn from new returns.");
+  if (!LEARN.includes(policy.specification.problem.framework)) return said(FIXED);
   const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Computing the advice for about a hundred other records\u2026"));
   const ask = async () => {
     try {

@@ -28,7 +28,7 @@ function opening(policies, asked, leaving) {
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
   const holding = input({
     name: "holding",
-    label: "Share of it held already, %",
+    label: "Held now, %",
     note: "In stocks. Blank: nothing.",
     unit: "percent",
   });
@@ -85,7 +85,7 @@ function opening(policies, asked, leaving) {
     allow(specification);
     if (states) return;
     holding.element.hidden = assets !== null;
-    const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held already, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
+    const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held now, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
     shares.replaceChildren(...(assets ?? []).map((name, index) => field(name, index).element));
     drafts.restore();
   };

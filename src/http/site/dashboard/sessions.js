@@ -2,20 +2,21 @@
 
 import { advising } from "./advise.js";
 import { advised } from "./advised.js";
-import { get, remove } from "./api.js";
-import { care, careWords } from "./care.js";
-import { h, table } from "./dom.js";
+import { download, get, isOver, remove } from "./api.js";
+import { careWords } from "./care.js";
+import { h } from "./dom.js";
+import { currencyField } from "./firm.js";
 import { input, pressed, select } from "./form.js";
-import { allocation, count, counted, short, wealth } from "./format.js";
+import { count, counted } from "./format.js";
 import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
-import { called, headed, tagList } from "./naming.js";
 import { all } from "./pages.js";
-import { isoDay, nearDay } from "./periods.js";
+import { sampleBook, sampleDeletion } from "./sample_book.js";
+import { isEmpty, sessionRows } from "./session_rows.js";
 import { ticking } from "./ticking.js";
 import { smallestField } from "./trades.js";
 import { welcome } from "./welcome.js";
-import { isWork, orderOf, WORK, worklist } from "./worklist.js";
+import { isWork, orderOf, TO_DO, WORK, worklist } from "./worklist.js";
 
 /** Rows shown at a time: the advice of each needs a call of its own. */
 const PAGE = 50;
@@ -33,16 +34,27 @@ export async function view(_, leaving) {
   if (!(chosen.state in STATES)) chosen.state = "";
   const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
   const now = h("a", { class: "button quiet", href: "#/advise" }, "Advice now");
-  const actions = h("div", { class: "actions" }, now, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
-  const first = isWork(chosen) ? null : await read(chosen, null, leaving);
+  // The address holds the filters, which the letters follow.
+  const letters = h("a", { class: "button quiet", href: "#/letters", onclick: ({ currentTarget }) => (currentTarget.href = `#/letters${/\?.*/.exec(location.hash)?.[0] ?? ""}`) }, "Letters");
+  const actions = h("div", { class: "actions" }, now, h("a", { class: "button quiet", href: "#/plan" }, "Plan for years"), h("a", { class: "button quiet", href: "#/sleeve" }, "Size a strategy"), several, letters, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
+  // Also a list in the order of what is to be done reads a page first: it tells whether there is any session.
+  const first = isWork(chosen) && orderOf(chosen) !== TO_DO ? null : await read(chosen, null, leaving);
   const title = "Overview";
   if (first && isEmpty(first) && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
     const who = await holderWords(leaving);
-    if (policies.length > 0) return { title, actions, body: [lead(), who] };
-    return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome(advising(leaving))]), who] };
+    // While something is trained here, somebody has begun.
+    const sample = jobs.some((job) => !isOver(job)) ? "" : sampleBook(leaving, redrawn);
+    if (policies.length > 0) return { title, actions, body: [lead(), sample, who] };
+    return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome(advising(leaving))]), sample, who] };
   }
   return { title, actions, body: overview(chosen, first, leaving) };
+}
+
+/** Draws the overview again, without its filters. */
+function redrawn() {
+  history.replaceState(null, "", "#/");
+  dispatchEvent(new HashChangeEvent("hashchange"));
 }
 
 const lead = () =>
@@ -52,19 +64,15 @@ const lead = () =>
     "No session yet. A session is one investor who follows a policy: report each return as it comes, and read what to hold next.",
   );
 
-/** Names the sessions that are damaged in the store. */
-const damagedWords = (damaged) => (damaged.length === 0 ? "" : `. Damaged; ask an operator to restore: ${damaged.join(", ")}`);
-
 const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 
 /** Returns the entries of `chosen` that differ from the defaults. */
 const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
 
-const isEmpty = ({ sessions, damaged }) => sessions.length + damaged.length === 0;
-
 /** Reads a page of matching sessions, without counting them: rows are shown before all sessions are read. */
 function read(chosen, after, signal) {
-  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
+  const order = orderOf(chosen);
+  const query = new URLSearchParams([["limit", PAGE], ...differing({ ...chosen, state: chosen.state in WORK ? "" : chosen.state, sort: order === TO_DO ? "" : order }), ...(after === null ? [] : [["after", after]])]);
   return get(`/sessions?${query}`, signal);
 }
 
@@ -76,76 +84,118 @@ async function readTotal({ sort, ...which }, signal) {
 
 /** `first` is the first page, or null if the page must read all sessions for it. */
 function overview(chosen, first, leaving) {
-  const needs = h("p", { class: "note needs", role: "status" });
-  const beyond = h("span", {});
-  const smallest = smallestField(() => {
+  const choose = (state) => {
+    filter.state.control.value = state;
+    list.ask({ state, sort: "" });
+  };
+  const redraw = () => {
     advice.redraw();
     work.redraw();
-    if (isWork(chosen)) ask({});
-  });
-  const advice = advised(leaving, { changed: () => tellBeyond(), smallest: smallest.smallest });
-  const choose = (state) => {
-    control.value = state;
-    ask({ state, sort: "" });
   };
-  const progress = (done, all) => (line.textContent = done < all ? `Reading the advice: ${count(done)} of ${count(all)}\u2026` : "");
-  const work = worklist({ advice, size: PAGE, show: choose, progress, leaving });
-  const ticks = ticking("sessions", {
+  const smallest = smallestField(() => {
+    redraw();
+    if (isWork(chosen)) list.ask({});
+  });
+  const care = careLine(() => choose("care"), leaving);
+  const tellBeyond = () => care.tellBeyond(rows.outside());
+  const advice = advised(leaving, { changed: tellBeyond, smallest: smallest.smallest });
+  const ticks = tickedSessions(async () => {
+    await Promise.all([list.ask({}), judgeAll()]);
+    if (rows.isEmpty() && !filtered(chosen)) redrawn();
+  });
+  const sample = sampleDeletion(leaving, redrawn);
+  const changed = () => {
+    tellBeyond();
+    sample.tell(rows.entries);
+  };
+  const rows = sessionRows(chosen, { first, advice, ticks, ask: (changed) => list.ask(changed), changed });
+  const work = worklist({ advice, size: PAGE, show: choose, progress: rows.progress, warned: care.warned, leaving });
+  const lookAll = async () => work.look(chosen, await readTotal({ ...chosen, state: "" }, leaving));
+  const list = listReading(chosen, { rows, work, advice, lookAll, leaving });
+  const filter = filters(chosen, list.ask, rows.tags, smallest, () => {
+    rows.redraw();
+    redraw();
+  });
+  // The counts of all sessions, independent of the search.
+  const judgeAll = async () => {
+    care.judge((await get("/sessions?limit=1&count=care", leaving)).care);
+    await lookAll();
+  };
+  list.start(first).then(judgeAll).catch(rows.failed);
+  return [sample.element, work.element, care.element, filter.element, rows.ordered, ticks.link, rows.holder, rows.foot];
+}
+
+/** Returns `{element, judge(counts), warned(isWarned), tellBeyond(count)}`: the line that says how many of all sessions need care, with what to press, and that has the calendar of their reports; `show()` lists them. */
+function careLine(show, leaving) {
+  const element = h("p", { class: "note needs", role: "status" });
+  const [beyond, words] = [h("span", {}), h("span", {})];
+  let [counts, isWarned] = [null, false];
+  const tell = () => counts && (words.textContent = careWords(counts, isWarned));
+  const saved = (event) => pressed(event.currentTarget, () => download(event));
+  const calendar = h("a", { href: "/reports.ics", download: "reports.ics", title: "The days on which reports are due, for a calendar program.", onclick: saved }, "Calendar (.ics)");
+  /** Leads to the renewal of the sessions that are completed or in their last period. */
+  const continueEnding = async () => {
+    const ending = await all("/sessions?state=ending", "sessions", leaving);
+    location.hash = `#/renew?sessions=${ending.slice(0, RENEWED).map(({ session }) => session).join(",")}`;
+  };
+  return {
+    element,
+    judge(now) {
+      counts = now;
+      tell();
+      const some = counts.any > 0 ? h("button", { class: "link", onclick: show }, "Show them") : "";
+      const goOn = h("button", { class: "link", "data-needs": "operate", onclick: ({ target }) => pressed(target, continueEnding) }, `Continue the ${count(counts.ending)}`);
+      element.replaceChildren(words, " ", some, " ", ...(counts.ending > 0 ? [goOn, " "] : []), calendar, " ", beyond);
+    },
+    warned(now) {
+      isWarned = now;
+      tell();
+    },
+    tellBeyond: (count) => (beyond.textContent = outsideWords(count)),
+  };
+}
+
+/** Says how many of the sessions shown are outside what their policies were trained for; the list itself does not contain that. */
+const outsideWords = (count) => (count === 0 ? "" : `Of the sessions shown, ${counted(count, "is", "are")} in a situation that the policy was not trained for.`);
+
+/** Returns the ticking of sessions, with what is done for those ticked; `removed()` is called after a deletion. */
+function tickedSessions(removed) {
+  return ticking("sessions", {
     links: [
       { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` },
       { at: "#/renew", words: (ticked) => `Continue the ${count(ticked)}` },
+      { at: "#/letters", words: (ticked) => `Letters to the ${count(ticked)}` },
     ],
     asked: (ticked) => `Delete ${counted(ticked, "session")} and all their reports?`,
     remove: (id) => remove(`/sessions/${id}`),
-    removed: async () => {
-      await Promise.all([ask({}), judgeAll()]);
-      if (isEmpty(page) && !filtered(chosen)) dispatchEvent(new HashChangeEvent("hashchange"));
-    },
+    removed,
   });
-  const tags = h("datalist", { id: "tags" });
-  const known = new Set();
-  const holder = h("div", { class: "listing", onkeydown: moveBetweenRows });
-  const line = h("p", { class: "note", role: "status" });
-  const more = h("button", { class: "quiet" }, "Show more");
-  let [entries, damaged, page, total, asking] = [[], [], first, null, new AbortController()];
+}
+
+/** Returns `{ask(changed), start(first)}`: reads the list that `rows` shows, again with each change of `chosen`, and more of it when asked. */
+function listReading(chosen, { rows, work, advice, lookAll, leaving }) {
+  let [asking, isWorked] = [new AbortController(), false];
   leaving.addEventListener("abort", () => asking.abort());
-  const tellBeyond = () => (beyond.textContent = outsideWords(entries.filter(advice.isOutside).length));
-  const sort = (column) => {
-    const kept = holder.contains(document.activeElement);
-    const down = column !== "name";
-    const [one, other] = down ? [`-${column}`, column] : [column, `-${column}`];
-    ask({ sort: orderOf(chosen) === one ? other : one }).then(() => kept && holder.querySelector("[aria-sort] button")?.focus());
-  };
-  const add = (now) => {
-    page = now;
-    entries.push(...page.sessions);
-    damaged.push(...page.damaged);
-    for (const tag of page.sessions.flatMap(({ tags }) => tags)) known.add(tag);
-    tags.replaceChildren(...[...known].sort().map((value) => h("option", { value })));
-    holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: orderOf(chosen), sort }) : h("p", {}, "No session matches."));
-    ticks.drawn(entries.map(({ session }) => session));
-    more.hidden = page.next === null;
-    tellBeyond();
-    tellTotal();
-  };
-  const tellTotal = () => {
-    if (total !== null) more.hidden ||= entries.length + damaged.length >= total;
-    line.textContent = `${count(entries.length)} of ${total === null ? "\u2026" : count(total)}${damagedWords(damaged)}`;
+  /** Reads a page of the list. So many sessions that the advice of all takes long stand newest first, unless the order is chosen. */
+  const source = async (after, signal) => {
+    const worked = (after === null ? isWork(chosen) : isWorked) ? await work.page(chosen, after, signal) : null;
+    if (after === null) {
+      isWorked = worked !== null;
+      rows.tellOrder(!isWorked && orderOf(chosen) === TO_DO ? "-created" : orderOf(chosen));
+    }
+    return worked ?? read(chosen, after, signal);
   };
   const countAll = async (signal) => {
     try {
-      total = page.total ?? (await readTotal(chosen, signal));
-      tellTotal();
+      rows.tellTotal(rows.page.total ?? (await readTotal(chosen, signal)));
     } catch (error) {
-      failed(error);
+      rows.failed(error);
     }
   };
-  const failed = (error) => {
-    if (error.name !== "AbortError") line.textContent = error.message;
-  };
-  const source = (after, signal) => (isWork(chosen) ? work.page(chosen, after, signal) : read(chosen, after, signal));
   /** Reads the list again with the changed parameters. */
   const ask = async (changed) => {
+    // What is typed just before another page is opened must not change the address of that page.
+    if (leaving.aborted) return;
     const isOther = ["search", "tag"].some((name) => name in changed);
     Object.assign(chosen, changed);
     asking.abort();
@@ -156,136 +206,48 @@ function overview(chosen, first, leaving) {
     try {
       const now = await source(null, signal);
       advice.forget();
-      [entries, damaged, total] = [[], [], null];
-      add(now);
+      rows.clear();
+      rows.add(now);
       await countAll(signal);
       if (isOther) await lookAll();
     } catch (error) {
-      failed(error);
+      rows.failed(error);
     }
   };
-  more.addEventListener("click", async () => {
-    more.disabled = true;
+  rows.more.addEventListener("click", async () => {
+    rows.more.disabled = true;
     const { signal } = asking;
-    await source(page.next, signal).then((now) => signal.aborted || add(now), failed);
-    more.disabled = false;
+    await source(rows.page.next, signal).then((now) => signal.aborted || rows.add(now), rows.failed);
+    rows.more.disabled = false;
   });
-  const { element, state: { control } } = filters(chosen, ask, tags, smallest);
-  const judge = (counts) => {
-    const some = counts.any > 0 ? h("button", { class: "link", onclick: () => choose("care") }, "Show them") : "";
-    const goOn = h("button", { class: "link", "data-needs": "operate", onclick: ({ target }) => pressed(target, continueEnding) }, `Continue the ${count(counts.ending)}`);
-    needs.replaceChildren(careWords(counts), " ", some, " ", ...(counts.ending > 0 ? [goOn, " "] : []), beyond);
-  };
-  /** Leads to the renewal of the sessions that are completed or in their last period. */
-  const continueEnding = async () => {
-    const ending = await all("/sessions?state=ending", "sessions", leaving);
-    location.hash = `#/renew?sessions=${ending.slice(0, RENEWED).map(({ session }) => session).join(",")}`;
-  };
-  // The counts of all sessions, independent of the search.
-  const judgeAll = async () => {
-    const { care } = await get("/sessions?limit=1&count=care", leaving);
-    judge(care);
-    await lookAll();
-  };
-  const lookAll = async () => work.look(chosen, await readTotal({ ...chosen, state: "" }, leaving));
-  const start = async () => {
-    if (first) add(first);
-    else await ask({});
+  /** Shows the first page: the one read already, unless all sessions must be read for it. */
+  const start = async (first) => {
+    if (first === null || isWork(chosen)) return ask({});
+    rows.tellOrder(orderOf(chosen));
+    rows.add(first);
     // One after the other, because each reads all sessions.
-    if (first) await countAll(asking.signal);
-    await judgeAll();
+    await countAll(asking.signal);
   };
-  start().catch(failed);
-  return [work.element, needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
+  return { ask, start };
 }
-
-/** Moves the focus with the arrow keys, Home and End to the same control of another row. */
-function moveBetweenRows(event) {
-  const row = event.target.closest("tbody tr");
-  const rows = row ? [...row.parentElement.children] : [];
-  const at = { ArrowDown: rows.indexOf(row) + 1, ArrowUp: rows.indexOf(row) - 1, Home: 0, End: rows.length - 1 }[event.key];
-  if (at === undefined || !rows[at] || event.altKey || event.ctrlKey || event.metaKey) return;
-  const controls = (one) => [...one.querySelectorAll("a, input")];
-  event.preventDefault();
-  controls(rows[at])[controls(row).indexOf(event.target)]?.focus();
-}
-
-/** Says how many of the sessions shown are outside what their policies were trained for; the list itself does not contain that. */
-const outsideWords = (count) => (count === 0 ? "" : `Of the sessions shown, ${counted(count, "is", "are")} in a situation that the policy was not trained for.`);
 
 /** Returns `{element, state}`: the search and the filters, and the filter by state; calls `ask(changed)` at every change. */
-function filters(chosen, ask, tags, smallest) {
-  let typing = 0;
+function filters(chosen, ask, tags, smallest, changed) {
+  let [typing, typed] = [0, {}];
   const soon = (changed) => {
     clearTimeout(typing);
-    typing = setTimeout(() => ask(changed), PAUSE);
+    Object.assign(typed, changed);
+    typing = setTimeout(() => {
+      ask(typed);
+      typed = {};
+    }, PAUSE);
   };
   const text = { inputmode: "text" };
   const search = input({ ...text, name: "search", label: "Search", value: chosen.search, type: "search", placeholder: "Name, tag or policy", maxlength: 100, changed: (text) => soon({ search: text.trim() }) });
   const tag = input({ ...text, name: "tag", label: "Tag", value: chosen.tag, placeholder: "All", list: "tags", changed: (text) => soon({ tag: text.trim() }) });
   const state = select({ name: "state", label: "State", choices: STATES, changed: (value) => ask({ state: value }) });
   state.control.value = chosen.state;
-  const fields = h("div", { class: "fields" }, search.element, tag.element, tags, state.element, smallest.element);
+  const fields = h("div", { class: "fields" }, search.element, tag.element, tags, state.element, smallest.element, currencyField(changed).element);
   const element = h("form", { role: "search", class: "filters", onsubmit: (event) => event.preventDefault() }, fields);
   return { element, state };
-}
-
-function listed(entries, { ticks, advice, sorted, sort }) {
-  const by = (words, column) => {
-    const [up, down] = [sorted === column, sorted === `-${column}`];
-    const mark = up ? "\u2191" : down ? "\u2193" : "";
-    const button = h("button", { class: "link sorting", onclick: () => sort(column) }, words, h("span", { "aria-hidden": "true" }, ` ${mark}`));
-    return { name: button, label: words, sorted: up ? "ascending" : down ? "descending" : null };
-  };
-  // The identifier tells apart those of one name.
-  const isAlone = (name) => name !== "" && entries.filter((other) => other.name === name).length === 1;
-  return table("Sessions", [
-    {
-      ...by("Session", "name"),
-      cell: ({ session, name, tags }) =>
-        h(
-          "div",
-          { class: "ticked" },
-          ticks.box(session, `session ${called(session, name)}`),
-          h("div", {}, isAlone(name) ? h("a", { href: `#/sessions/${session}`, title: short(session) }, name) : headed(`#/sessions/${session}`, session, name), " ", tagList(tags)),
-        ),
-    },
-    { ...by("Wealth", "wealth"), numeric: true, cell: ({ wealth: now }) => (now === null ? "\u2013" : wealth(now)) },
-    { name: "Held now", numeric: true, cell: ({ holding }) => (holding === null ? "\u2013" : allocation(holding)) },
-    { name: "Last period", numeric: true, cell: change },
-    { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, care(entry)) },
-    { name: "To hold", numeric: true, cell: (entry) => advice.of(entry).hold },
-    { ...by("To trade", "trade"), numeric: true, cell: (entry) => advice.of(entry).trade },
-    { name: "State", cell: (entry) => standing(entry) },
-    { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [nearMoment(created_ms), " ", h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
-  ], entries);
-}
-
-/** Returns the change of wealth in the last period, including money added: an amount, because as a share it would not be a return. */
-function change({ wealth_change }) {
-  if (wealth_change === null || wealth_change === undefined) return "\u2013";
-  return `${wealth_change > 0 ? "+" : ""}${wealth(wealth_change)}`;
-}
-
-const near = (date) => nearDay(date, isoDay(new Date()));
-const nearMoment = (milliseconds) => near(isoDay(new Date(milliseconds)));
-
-/** Shows the last day reported, and when the next report is due or how late it is. */
-function lastReport({ date, last_report_ms }, { next, late }) {
-  const under = (words, wrong) => [" ", h("span", { class: wrong ? "under wrong" : "under" }, words)];
-  const reported = date ? near(date) : last_report_ms ? nearMoment(last_report_ms) : "None yet";
-  const coming = late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : next === null ? null : under(`next ${date ? "" : "about "}${near(next)}`);
-  return [reported, last_report_ms && !date ? under("without a date") : null, coming];
-}
-
-/** Shows the state of a session, its progress, and what needs care. */
-function standing({ state, period, horizon, drift, care }) {
-  const drifting = { warning: "Market may have changed", alarm: "Market has changed" }[drift];
-  const wrong = [state === "waiting" && "for its next policy", care.includes("ending") && state === "active" && "In its last period", drifting].filter(Boolean);
-  return [
-    h("span", { class: `state ${state}` }, state),
-    " ",
-    h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),
-    wrong.map((words) => [" ", h("span", { class: "under wrong" }, words)]),
-  ];
 }

@@ -4,10 +4,11 @@
 import { h } from "./dom.js";
 import { standing } from "./flows.js";
 import { input, select } from "./form.js";
-import { allocation, percent, wealth } from "./format.js";
+import { allocation, percent } from "./format.js";
+import { inCurrency } from "./money.js";
 import { fraction, typed } from "./number_text.js";
 import { dayOf } from "./periods.js";
-import { inPercent, LIMITS } from "./report_fields.js";
+import { dayField, inPercent, LIMITS, spentField } from "./report_fields.js";
 
 const KINDS = { simple: "Gains or losses", partly: "Blank where no price came", missing: "Not known" };
 
@@ -36,16 +37,17 @@ export const assetsHeld = (row) => standing(row).executed_allocations ?? row.ass
  * Returns the fields. `advised` are the shares that blank fields mean, or null for the advice of that time. `rate` and `contribution` are the
  * policy's; `contribution` is null if it differs from period to period. `date` is the expected last day.
  */
-export function severalFields(assets, { within = "", advised, rate, contribution, date = null, changed = null }) {
+export function severalFields(assets, { within = "", advised, rate, contribution, spending, date = null, changed = null }) {
   const part = (list, label, note) =>
     assets.map((name, index) => input({ within: `${within}asset-${index}-`, name: `${list}.${name}`, label: label(name), note: note(name), unit: "percent", changed }));
   const returns = part("simple_returns", (name) => `Return of ${name}, %`, () => null);
   const held = part("executed_allocations", (name) => `${name} held, %`, (name) => (advised ? `Blank: the ${allocation(advised[name])} advised.` : "Blank: as advised."));
   const field = (name, label, note, more = {}) => input({ within, name, label, note, changed, ...more });
-  const day = field("date", "Last day", "For example 2008-09-30. May be blank.", { inputmode: "text", value: date ?? "" });
+  const day = dayField(within, date);
   const paid = field("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`, { unit: "percent" });
-  const flow = field("flow", "Money added at the end", `Blank: ${contribution === null ? "the policy\u2019s amount" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`);
+  const flow = field("flow", "Money added at the end", `Blank: ${contribution === null ? "the policy\u2019s amount" : `${inCurrency(contribution)}, the policy\u2019s`}. \u2212100 is a withdrawal of 100.`);
   const reached = field("wealth", "Wealth reached", "Blank: computed from the other fields.");
+  const spent = spentField(within, spending, changed);
   const isMissing = () => kind.control.value === "missing";
   const isPartly = () => kind.control.value === "partly";
   const silenced = () => returns.forEach(({ control }) => (control.disabled = isMissing()));
@@ -65,7 +67,7 @@ export function severalFields(assets, { within = "", advised, rate, contribution
   const byName = (fields, blank) => Object.fromEntries(assets.map((name, index) => [name, text(fields[index]) === "" ? blank(name) : (fraction(text(fields[index])) ?? text(fields[index]))]));
   const isHeldSaid = () => held.some((field) => text(field) !== "");
   return {
-    element: h("div", {}, elements([...returns, day, kind]), more),
+    element: h("div", {}, elements([...returns, ...(spent ? [spent] : []), day, kind]), more),
     /** Fills the fields with the report of an observed period, with corrections applied. */
     fill(history, index) {
       const [said, back] = [standing(history.observations[index]), assetReturns(history, index)];
@@ -74,7 +76,7 @@ export function severalFields(assets, { within = "", advised, rate, contribution
         returns[at].control.value = known ? inPercent(said.simple_returns?.[name] ?? Math.expm1(back[name])) : "";
         held[at].control.value = inPercent(said.executed_allocations?.[name]);
       });
-      for (const [{ control }, value] of [[paid, inPercent(said.rate)], [flow, said.flow], [reached, said.wealth], [day, said.date]]) control.value = value ?? "";
+      for (const [{ control }, value] of [[paid, inPercent(said.rate)], [flow, said.flow], [reached, said.wealth], [day, said.date], ...(spent ? [[spent, said.spent]] : [])]) control.value = value ?? "";
       const isPartly = back && assets.some((name) => (back[name] ?? null) === null);
       kind.control.value = !back ? "missing" : isPartly ? "partly" : "simple";
       silenced();
@@ -89,7 +91,7 @@ export function severalFields(assets, { within = "", advised, rate, contribution
     report() {
       const report = isMissing() ? { missing: true } : { simple_returns: byName(returns, () => null) };
       if (isHeldSaid()) report.executed_allocations = byName(held, (name) => advised[name]);
-      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, dayOf]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
+      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, dayOf], ...(spent ? [[spent, typed]] : [])]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
       return report;
     },
     /** Returns the values for `foretold`, or null if a field cannot be read; a missing return counts as 0. */
@@ -99,11 +101,12 @@ export function severalFields(assets, { within = "", advised, rate, contribution
       const back = returns.map((field) => (unmoved(field) ? 0 : fraction(text(field))));
       const shares = held.map((field, index) => blank(field, advised[assets[index]], fraction));
       const [paying, added, ended] = [blank(paid, rate, fraction), blank(flow, contribution, typed), blank(reached, Number.NaN, typed)];
-      if ([...back, ...shares, paying, added, ended].some((number) => typeof number !== "number")) return null;
+      const used = spent ? blank(spent, spending?.amount ?? 0, typed) : 0;
+      if ([...back, ...shares, paying, added, ended, used].some((number) => typeof number !== "number")) return null;
       const parts = assets.map((_, index) => ({ held: shares[index], growth: 1 + back[index] }));
       const all = (fields, values, limits) => fields.map((field, index) => [field, values[index], limits]);
-      const numbers = [...all(returns, back, LIMITS.simple_return), ...all(held, shares, LIMITS.share), [paid, paying, LIMITS.rate], [reached, ended, LIMITS.wealth]];
-      return { parts, rate: paying, added, ended, missing: isMissing(), numbers, flow, reached };
+      const numbers = [...all(returns, back, LIMITS.simple_return), ...all(held, shares, LIMITS.share), [paid, paying, LIMITS.rate], [reached, ended, LIMITS.wealth], ...(spent ? [[spent, used, LIMITS.spent]] : [])];
+      return { parts, rate: paying, added, ended, spent: used, missing: isMissing(), numbers, flow, reached };
     },
   };
 }

@@ -141,7 +141,9 @@ export const WARNED = {
   record_in_percent: (_, field) =>
     `The ${field.includes("centre") ? "assumed " : ""}returns vary more than those of any market. Are they percentages that were read as fractions?`,
   trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of what is traded. Is that right?`,
+  inflation_high: ({ spending, periods_per_year }) => `Prices rise ${percent(spending.inflation, 1)} a ${unitOf(periods_per_year)}, more than is usual. Is that the rise of one ${unitOf(periods_per_year)}, or of a year?`,
   tail_heavy: () => "A few returns of the record lie so far out that its uncertainty cannot be measured. Give bounds on the returns.",
+  lone_return: (_, field, message) => `One return of the record, ${minus(/[-\d.]+ %/.exec(message)[0])}, lies far beyond all others. Is it right?`,
   few_alike: () => "Hardly any return of the record came after a figure like the present one, so others count too. Is the present figure meant?",
   jumps: (_, field, message) => minus(message),
 };
@@ -172,6 +174,9 @@ export function meant(form, { noun, job, warnings, problem }, yes) {
 
 /** Returns the share of the radius that is used. */
 export const shareOf = ({ caution, levels }) => caution?.scale ?? levels?.[caution]?.scale ?? 1;
+
+/** Returns the level of caution as the forms name it: the paper's is full. */
+export const cautionName = (level) => (level === "paper" ? "full" : level);
 
 /** Describes the level of caution and its share of the radius, if it is not the paper's. */
 function levelInWords(problem) {
@@ -223,7 +228,7 @@ export function inWords({ problem }, annualised) {
   const all = limit === 1 ? "all" : `up to ${percent(limit, 0)}`;
   return [
     `${MEANINGS[problem.framework]}${guarded}${forgets}${centred && ` ${centred}`}`,
-    `It looks ${counted(problem.horizon, unit)} ahead for ${investorWords(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a ${unit}${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and ${all} of wealth may be in stocks. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
+    `It looks ${counted(problem.horizon, unit)} ahead for ${investorWords(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a ${unit}${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and ${all} of wealth may be in stocks. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}${problem.spending ? `It says what to spend before each ${unit}.` : ""}`.trim(),
     `The record holds ${counted(problem.history.length, "return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a ${unit}.${annualised ? ` That is ${percent(annualised.mean_return, 2)} a year, compounded, with a deviation of ${percent(annualised.deviation, 2)}.` : ""}`,
   ];
 }

@@ -1,5 +1,6 @@
-// Selected rows of a list, and their actions: compare two, take many to one page, or delete them.
+// Selected rows of a list, and their actions: compare up to four, take many to one page, or delete them.
 
+import { MOST, numbered } from "./beside.js";
 import { h } from "./dom.js";
 import { pressed } from "./form.js";
 import { count } from "./format.js";
@@ -9,14 +10,14 @@ const NAMED = 20;
 
 /**
  * Returns `{box(id, name), link, drawn()}` for a list of `kind`, "sessions" or "policies": the checkbox of a row, the actions for the ticked
- * rows, and what to call with the rows that are shown. Two rows may be ticked, or any number if `many` is given: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, with links to
+ * rows, and what to call with the rows that are shown. Up to four rows may be ticked, or any number if `many` is given: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, with links to
  * the addresses `at`, the question before a deletion, the deletion of one row, and what to do afterwards.
  */
 export function ticking(kind, many = null) {
   let ticked = [];
   const [boxes, names] = [new Map(), new Map()];
   const note = h("span", { class: "note", role: "status", tabindex: -1 });
-  const go = h("a", { class: "button quiet", hidden: true }, "Compare the two");
+  const go = h("a", { class: "button quiet", hidden: true });
   const links = (many?.links ?? []).map((link) => ({ ...link, element: h("a", { class: "button quiet", hidden: true }) }));
   let shown = [];
   const every = many && h("button", { type: "button", class: "link", onclick: () => ((ticked = ticked.length > 0 ? [] : [...shown]), tell(), every.focus()) });
@@ -24,11 +25,12 @@ export function ticking(kind, many = null) {
   const tell = () => {
     for (const [id, box] of boxes) box.checked = ticked.includes(id);
     const query = `${kind}=${ticked.map(encodeURIComponent).join(",")}`;
-    go.hidden = ticked.length !== 2;
+    go.hidden = ticked.length < 2 || ticked.length > MOST;
+    go.textContent = go.hidden ? "" : `Compare the ${numbered(ticked.length)}`;
     go.href = `#/compare?${query}`;
     const unseen = ticked.filter((id) => !shown.includes(id)).length;
     const which = many && ticked.length > 0 ? `${count(ticked.length)} ticked${unseen > 0 ? `, ${count(unseen)} of them not shown here` : ""}. ` : "";
-    note.textContent = `${which}${["Tick two to compare them.", "Tick one more to compare the two."][ticked.length] ?? ""}`;
+    note.textContent = `${which}${[`Tick two to ${numbered(MOST)} to compare them.`, "Tick one more to compare."][ticked.length] ?? ""}`;
     if (!many) return;
     link.toggleAttribute("data-ticked", ticked.length > 0);
     every.textContent = ticked.length > 0 ? "Untick all" : `Tick all ${count(shown.length)}`;
@@ -45,8 +47,8 @@ export function ticking(kind, many = null) {
     const control = h("input", { type: "checkbox", class: "tickbox", "aria-label": `${many ? "Tick" : "Compare"} ${name}` });
     control.checked = ticked.includes(id);
     control.addEventListener("change", () => {
-      // If at most two may be ticked, a third tick replaces the first.
-      ticked = control.checked ? [...ticked, id].slice(many ? 0 : -2) : ticked.filter((one) => one !== id);
+      // If no more than those that are compared may be ticked, one more replaces the first.
+      ticked = control.checked ? [...ticked, id].slice(many ? 0 : -MOST) : ticked.filter((one) => one !== id);
       tell();
     });
     boxes.set(id, control);

@@ -36,6 +36,31 @@ export const returnsOf = (levels) => levels.slice(1).map((level, index) => level
 export const rolling = (levels, years, a_year) =>
   levels.map((level, at) => (at < Math.round(years * a_year) ? null : (level / levels[at - Math.round(years * a_year)]) ** (1 / years) - 1));
 
+/** A smaller deviation is rounding. */
+const ROUNDING = 1e-12;
+
+/**
+ * Returns the figures a year of levels, with `a_year` periods a year and the bank's `rates`: the growth, the deviation of the returns, and the
+ * mean excess over the bank by its deviation (Sharpe) and by the deviation of its shortfalls alone (Sortino). A ratio is NaN if it has no
+ * deviation.
+ */
+export function yearlyFigures(levels, rates, a_year) {
+  const returns = returnsOf(levels);
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+  const deviation = (values) => {
+    const middle = mean(values);
+    return Math.sqrt(values.reduce((sum, value) => sum + (value - middle) ** 2, 0) / (values.length - 1));
+  };
+  const excess = returns.map((back, index) => back - rates[index]);
+  const ratio = (size) => (size > ROUNDING ? (mean(excess) / size) * Math.sqrt(a_year) : Number.NaN);
+  return {
+    growth: (levels.at(-1) / levels[0]) ** (a_year / returns.length) - 1,
+    deviation: deviation(returns) * Math.sqrt(a_year),
+    sharpe: ratio(deviation(excess)),
+    sortino: ratio(Math.sqrt(mean(excess.map((back) => Math.min(0, back) ** 2)))),
+  };
+}
+
 /** Compounds successive returns into one. */
 export const compounded = (returns) => returns.reduce((level, back) => level * (1 + back), 1) - 1;
 

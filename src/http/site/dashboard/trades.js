@@ -3,7 +3,7 @@
 import { inMoney } from "./advice.js";
 import { csvText, hundred } from "./csv.js";
 import { input } from "./form.js";
-import { wealth } from "./format.js";
+import { inCurrency } from "./money.js";
 import { typed } from "./number_text.js";
 import { inMoneyByName } from "./several.js";
 
@@ -51,8 +51,13 @@ export function sums(trades) {
 /** Returns the words of the sums: "Buy" and "Sell" with amounts of money, or "Nothing". */
 export function orderWords({ buy, sell }) {
   const parts = [["Buy", buy], ["Sell", sell]].filter(([, size]) => size > 0);
-  return parts.length === 0 ? ["Nothing"] : parts.map(([verb, size]) => `${verb} ${wealth(size)}`);
+  return parts.length === 0 ? ["Nothing"] : parts.map(([verb, size]) => `${verb} ${inCurrency(size)}`);
 }
+
+/** What the file calls the only asset of a session, which has no name. */
+const ONLY = "risky asset";
+/** Returns a share in percent with at most four decimals. */
+const hundredths = (share) => (share === null ? null : Number(hundred(share).toFixed(4)));
 
 /** Returns the file of orders, one a line, for sessions `{entry, trades}` in their order. */
 export function ordersText(found) {
@@ -61,12 +66,18 @@ export function ordersText(found) {
     trades
       .filter(({ small }) => !small)
       .map(({ asset, amount, held, kept, holding, share }) => [
-        entry.name, entry.session, entry.policy_name, asset, amount > 0 ? "buy" : "sell",
-        ...[Math.abs(amount), held, kept].map(cents), hundred(holding), hundred(share), entry.date ?? null,
+        entry.name, entry.session, entry.policy_name, asset ?? ONLY, amount > 0 ? "buy" : "sell",
+        ...[Math.abs(amount), held, kept].map(cents), ...[holding, share].map(hundredths), entry.date ?? null,
       ]),
   );
   return csvText([head, ...rows]);
 }
+
+/** Returns the words of the smallest trade that the browser keeps; blank if there is none. */
+export const smallestWords = () => (keptSmallest() === null ? "" : localStorage.getItem(PLACE));
+
+/** Returns the smallest trade that the browser keeps, or null. */
+export const keptSmallest = () => smallestOf(localStorage.getItem(PLACE) ?? "") ?? null;
 
 const cents = (amount) => Math.round(100 * amount) / 100;
 

@@ -7,7 +7,7 @@ import { fieldset, refusal, sending } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
 import { hasBall, investorsOnly, meant } from "./specification.js";
-import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
+import { put, radiusFor, RATE, trainFields, UTILITY } from "./train_fields.js";
 
 /** The form's initial request; null fields are to be filled in or may be left out. */
 export const initial = () => ({
@@ -73,8 +73,8 @@ export async function view(query, leaving) {
   let request = origin ? requestOf(specification) : initial();
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
-  // Whether the periods a year in the form come from the dates of a record.
-  let isOfDates = false;
+  // Whether the periods a year in the form come from the dates of a record, and the bank's rate that comes from a column of it.
+  let [isOfDates, ofColumn] = [false, null];
   const source = returnsField({
     name: "problem.history",
     label: "Returns or prices",
@@ -82,19 +82,33 @@ export async function view(query, leaving) {
     several: true,
     changed: (series, answer) => {
       withRecord(request, series);
-      if (answer) fields.periods(answer.periods_per_year ?? (isOfDates ? null : request.problem.periods_per_year));
-      if (answer) isOfDates = Boolean(answer.periods_per_year);
+      if (answer) take(answer);
       fields.show(request);
       written();
     },
     bank: (rate) => {
-      put(request, "problem.rate_per_step", rate);
+      fillRate(rate);
       fields.show(request);
       written();
     },
   });
+  const fillRate = (rate) => {
+    put(request, RATE, rate);
+    ofColumn = rate;
+  };
+  /** Takes over the periods a year of a record, and empties what an earlier record filled in and this one does not say. */
+  const take = ({ periods_per_year, rate }) => {
+    if (ofColumn !== null && rate?.rates.at(-1) !== ofColumn) {
+      fillRate(null);
+      fields.show(request);
+    }
+    const filled = ofColumn;
+    fields.periods(periods_per_year ?? (isOfDates ? null : request.problem.periods_per_year));
+    [isOfDates, ofColumn] = [Boolean(periods_per_year), filled];
+  };
   const fields = trainFields((path, value) => {
     put(request, path, value);
+    if (path === RATE) ofColumn = null;
     if (path === "problem.framework") {
       request.problem.radius = radiusFor(value, request.problem.radius);
       request.problem.caution = hasBall({ framework: value }) ? (request.problem.caution ?? "balanced") : undefined;

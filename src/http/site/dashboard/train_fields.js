@@ -65,7 +65,7 @@ const READING = {
 const capital = (word) => word[0].toUpperCase() + word.slice(1);
 
 const PERIODS = "problem.periods_per_year";
-const RATE = "problem.rate_per_step";
+export const RATE = "problem.rate_per_step";
 /** The choices of periods a year. */
 export const CALENDARS = [["", "Choose one"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: other periods"]];
 
@@ -130,7 +130,7 @@ export function trainFields(changed) {
   });
   const framework = select({
     name: "problem.framework",
-    label: "Kind of policy",
+    label: "Framework",
     note: "A cautious one guards against markets worse than the record; one that learns takes every new return into account.",
     choices: OFFERED,
     changed: (value) => changed("problem.framework", value),

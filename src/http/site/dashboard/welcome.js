@@ -14,6 +14,8 @@ export function welcome(start = "") {
       "Ballast tells an investor how much to hold in stocks when nobody knows what the market will do. Nothing has been trained here yet",
       start === "" ? "." : ", and nothing needs to be: give it a record, and it answers at once.",
     ),
+    start === "" ? "" : h("p", { class: "send ahead" }, h("a", { class: "button quiet", href: "#/plan" }, "Plan for years"), h("span", { class: "note" }, "Will it last, and how much may I spend?")),
+    start === "" ? "" : h("p", { class: "send ahead" }, h("a", { class: "button quiet", href: "#/sleeve" }, "Size a strategy"), h("span", { class: "note" }, "How much of the capital does its record support?")),
     start,
     start === "" ? "" : h("h2", {}, "To follow a client for years"),
     h(

@@ -3,7 +3,8 @@
 import { post } from "./api.js";
 import { lineChart } from "./chart.js";
 import { h, section } from "./dom.js";
-import { allocation, percentTick, points, significant, tick, wealth } from "./format.js";
+import { allocation, percentTick, points, significant, tick } from "./format.js";
+import { inCurrency } from "./money.js";
 import { colourOf } from "./strategies.js";
 
 /** From no caution to twice the caution; every point needs a robust step. */
@@ -17,7 +18,9 @@ export function conservatism({ id, leaving, calendar, cautionScale }, action) {
       ({ points }) => holder.replaceChildren(...charts(points, action, cautionScale, calendar.unit)),
       (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error" }, error.message)),
     );
-  return { element: section("With more or less caution", holder), ask };
+  const element = section("With more or less caution", holder);
+  element.classList.add("caution-choice");
+  return { element, ask };
 }
 
 function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
@@ -49,7 +52,7 @@ function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
         height: 170,
         start: own,
         x,
-        y: { format: wealth, tick },
+        y: { format: inCurrency, tick },
         series: [line("", (point) => point.certainty_equivalent), line("All in the bank", ({ floor }) => floor, { bare: true, colour: colourOf("all_bank") })],
       }),
     ),

@@ -2,13 +2,25 @@
 
 import { get } from "./api.js";
 import { disclosure, h, section } from "./dom.js";
-import { figures, minus, oneIn, percent, significant } from "./format.js";
+import { count, figures, minus, oneIn, percent, significant } from "./format.js";
 import { lawChart } from "./law_chart.js";
 
 /** Moves within this distance of the deepest one count as equally deep, in log-return. */
 const NEAR = 0.01;
 /** Other moves are mentioned from this share on. */
 const LITTLE = 5e-4;
+
+/** From this many periods on, a number could be read as the year in which it happens. */
+const MANY = 1000;
+/** The periods of a year, by their unit. */
+const A_YEAR = { day: 252, week: 52, month: 12, quarter: 4 };
+
+/** Says how seldom a period of some probability is: "month in 23", or "month in 175 years". */
+function seldom(unit, probability) {
+  const periods = Math.max(1, Math.round(1 / probability));
+  if (periods < MANY) return `${unit} in ${oneIn(probability)}`;
+  return unit in A_YEAR ? `${unit} in ${count(Math.round(periods / A_YEAR[unit]))} years` : `${unit} of ${periods.toLocaleString("en-GB")}`;
+}
 
 /** Says what the market assumes beyond the returns seen. `unit` is the name of a period, `cautious` whether the policy guards against worse markets. */
 export function assumed({ transport }, unit, cautious = true) {
@@ -19,13 +31,13 @@ export function assumed({ transport }, unit, cautious = true) {
   const deep = moves.filter(({ moved_to }) => moved_to <= lowest + NEAR);
   const rest = share(moves) - share(deep);
   const size = (log) => percent(Math.abs(Math.expm1(log)), Math.abs(Math.expm1(log)) < 0.095 ? 1 : 0);
-  const often = (mass) => (mass > 0.6 ? `most ${unit}s` : `one ${unit} in ${oneIn(mass)}`);
+  const often = (mass) => (mass > 0.6 ? `most ${unit}s` : `one ${seldom(unit, mass)}`);
   const verb = (mass, word) => (mass > 0.6 ? word : `${word}s`);
   const more = rest >= LITTLE ? `, and that ${often(rest)} ${verb(rest, "bring")} less than similar ones did` : "";
   const mass = share(deep);
   if (lowest > 0) {
     const cut = share(moves);
-    return `It counts the best ${cut > 0.4 ? `${percent(cut, 0)} of ${unit}s` : `${unit} in ${oneIn(cut)}`} as only ${size(lowest)}.`;
+    return `It counts the best ${cut > 0.4 ? `${percent(cut, 0)} of ${unit}s` : seldom(unit, cut)} as only ${size(lowest)}.`;
   }
   return `It assumes that ${often(mass)} ${verb(mass, "lose")} ${size(lowest)}${more}.`;
 }

@@ -22,12 +22,14 @@ pub fn made(document: &GuidePage) -> &'static [u8] {
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title} \u{b7} Ballast</title>\n\
+        <link rel=\"alternate\" type=\"text/markdown\" href=\"/guide/{}.md\">\n\
         <link rel=\"icon\" type=\"image/svg+xml\" href=\"/dashboard/icon.svg\">\n\
         <link rel=\"stylesheet\" href=\"/dashboard/style.css\">\n<link rel=\"stylesheet\" href=\"/guide/guide.css\">\n\
         </head>\n<body>\n<a class=\"skip\" href=\"#main\">Skip to the content</a>\n<header class=\"bar\">\n\
         <a class=\"mark\" href=\"/\"><img src=\"/dashboard/icon.svg\" alt=\"\" width=\"24\" height=\"24\">Ballast</a>\n\
         <a class=\"docs\" href=\"/\">Overview</a>\n<a href=\"/docs\">API</a>\n</header>\n\
         <div class=\"guide\">\n{}<main id=\"main\" tabindex=\"-1\">\n{body}</main>\n</div>\n</body>\n</html>\n",
+        document.name,
         list(document, &headings)
     );
     page.leak().as_bytes()
@@ -73,7 +75,7 @@ fn led<'a>(event: Event<'a>, document: &GuidePage) -> Option<Event<'a>> {
     Some(match event {
         Event::Html(text) | Event::InlineHtml(text) => Event::Text(text),
         Event::Start(Tag::Link { link_type, dest_url, title, id }) => {
-            let dest_url = address(&dest_url, document.path).into();
+            let dest_url = address(&dest_url, document.path, "").into();
             Event::Start(Tag::Link { link_type, dest_url, title, id })
         }
         Event::Start(Tag::Image { link_type, dest_url, title, id }) => {
@@ -84,10 +86,11 @@ fn led<'a>(event: Event<'a>, document: &GuidePage) -> Option<Event<'a>> {
     })
 }
 
-/// Returns the address to which a link in the document at `from` leads; a link to anything but a page stays unchanged.
+/// Returns the address to which a link in the document at `from` leads, for pages whose names end with `ending`. A link
+/// to anything but a page stays unchanged.
 ///
-/// Checked by: `every_link_of_every_page_leads_to_what_is_served`.
-fn address(link: &str, from: &str) -> String {
+/// Checked by: `every_link_of_every_page_leads_to_what_is_served`, `every_link_of_the_list_leads_to_markdown`.
+pub(super) fn address(link: &str, from: &str, ending: &str) -> String {
     if link.starts_with('#') || link.contains("://") {
         return link.to_owned();
     }
@@ -102,7 +105,7 @@ fn address(link: &str, from: &str) -> String {
     }
     let path = folders.join("/");
     let target = documents().find(|document| document.path == path);
-    target.map_or_else(|| link.to_owned(), |document| format!("/guide/{}{at}", document.name))
+    target.map_or_else(|| link.to_owned(), |document| format!("/guide/{}{ending}{at}", document.name))
 }
 
 /// Renders the list of all pages by part, with the headings below the current one.

@@ -1,4 +1,5 @@
-//! The stages of work, and the queue of each: who gets a place that becomes free, and who loses one in a full queue.
+//! The stages of work, and the queue of each: which piece of work gets a permit that becomes free, and which one leaves
+//! a full queue.
 
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
@@ -7,10 +8,10 @@ use tokio::sync::oneshot;
 
 use crate::store::Tenant;
 
-/// How long a piece keeps a place while others wait. Most pieces end within it.
+/// How long a piece of work keeps its permit while others wait. Most pieces end within it.
 pub(super) const TURN: Duration = Duration::from_millis(100);
 
-/// How far a piece has come.
+/// The stage that a piece of work has reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
     First,
@@ -27,29 +28,29 @@ impl Stage {
     }
 }
 
-/// Returns the rank of a piece that has worked for so long: the piece of the lowest rank has worked least.
+/// Returns the rank of a piece that has worked for the time `worked`. The piece of the lowest rank has worked least.
 pub(super) fn rank(worked: Duration) -> u128 {
     worked.as_millis() / TURN.as_millis()
 }
 
-/// The places of one stage, and who waits for them.
+/// The permits of one stage, and the pieces that wait for them.
 pub(super) struct StageQueue<G> {
-    /// Places that nobody has; while there are any, all who wait have as many as one tenant may.
+    /// Permits that nobody holds. While there are any, every tenant that waits holds as many as one tenant may.
     pub free: usize,
-    /// Places that one tenant may have.
+    /// Permits that one tenant may hold.
     of_one: usize,
-    /// Pieces that may wait.
+    /// The most pieces that may wait.
     most_waiting: usize,
-    /// Places that each tenant has; none of them 0.
+    /// Permits that each tenant holds; tenants without any are left out.
     pub running: HashMap<Tenant, usize>,
-    /// Tenants that wait, whose turn is next first; each has a queue.
+    /// Tenants that wait, the one whose turn is next first. Each has a queue.
     pub ring: VecDeque<Tenant>,
     pub queues: HashMap<Tenant, VecDeque<WaitingPiece<G>>>,
-    /// True if the next place goes round the tenants, and not to the piece that has worked least.
+    /// True if the next permit goes to the tenant whose turn it is, and not to the piece that has worked least.
     goes_round: bool,
 }
 
-/// A piece that waits for a place.
+/// A piece that waits for a permit.
 pub(super) struct WaitingPiece<G> {
     rank: u128,
     grant: oneshot::Sender<G>,
@@ -65,7 +66,7 @@ impl<G> StageQueue<G> {
         self.free > 0 && !self.is_full_of(tenant)
     }
 
-    /// Returns true if the tenant has as many places as it may.
+    /// Returns true if the tenant holds as many permits as one tenant may.
     pub fn is_full_of(&self, tenant: &Tenant) -> bool {
         self.running_of(tenant) >= self.of_one
     }
@@ -75,7 +76,7 @@ impl<G> StageQueue<G> {
         *self.running.entry(tenant.clone()).or_default() += 1;
     }
 
-    /// Takes a place and returns `None` if there is one for the tenant; else queues for it.
+    /// Takes a permit and returns `None` if there is one for the tenant; otherwise queues for one.
     pub fn ask(&mut self, tenant: &Tenant, rank: u128) -> Option<oneshot::Receiver<G>> {
         if self.may(tenant) {
             self.take(tenant);
@@ -90,7 +91,8 @@ impl<G> StageQueue<G> {
         Some(granted)
     }
 
-    /// Takes a place back and passes it on: by turns to the tenant that has waited longest, and to the piece of the lowest rank.
+    /// Takes a permit back and passes it on: alternately to the tenant whose turn it is, and to the piece of the lowest
+    /// rank.
     pub fn give_back(&mut self, tenant: &Tenant) -> Option<(Tenant, oneshot::Sender<G>)> {
         self.free += 1;
         if let Some(running) = self.running.get_mut(tenant) {
@@ -118,8 +120,9 @@ impl<G> StageQueue<G> {
         Some((tenant, grant))
     }
 
-    /// Removes from a full queue the piece that should make room for one of `tenant`, if any should. Also returns how many
-    /// pieces its tenant keeps in the queue.
+    /// Removes a piece from a full queue if one must make room for a new piece of `tenant` with this rank. Also returns
+    /// how many pieces of the removed one's tenant still wait. Returns `None` if the new piece itself is the one to
+    /// refuse.
     pub fn give_up_one(&mut self, tenant: &Tenant, rank: u128) -> Option<(oneshot::Sender<G>, usize)> {
         self.forget_gone();
         let worst = |(tenant, queue): (&Tenant, &VecDeque<WaitingPiece<G>>)| {

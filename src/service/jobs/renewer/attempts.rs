@@ -16,7 +16,7 @@ pub struct RenewalDue {
     pub state: RenewalState,
     /// The job that trains the policy, or last did; null before there is one.
     pub job: Option<String>,
-    /// Why the last attempt failed.
+    /// The reason why the last job failed; null if it did not fail.
     pub error: Option<String>,
     /// Jobs so far.
     pub attempts: usize,

@@ -8,7 +8,8 @@ use crate::service::sessions::plan::Renewing;
 use crate::service::sessions::session_state::SessionState;
 use crate::store::SessionFacts;
 
-/// Returns the problem of a session's next policy: the present one, on what was observed since, from the present state.
+/// Returns the problem of a session's next policy: the present one, on what was observed since, from the present state,
+/// `elapsed` periods into it.
 ///
 /// # Errors
 /// A recorded report no longer keeps the rules.
@@ -16,7 +17,7 @@ pub(super) fn next_problem(
     policy: &PreparedPolicy,
     standing: &SessionState,
     facts: &SessionFacts,
-    renew: Renewing,
+    (renew, elapsed): (Renewing, usize),
 ) -> Result<Posed, ServiceError> {
     let periods = Periods::of(facts)?;
     match (policy, standing) {
@@ -29,7 +30,7 @@ pub(super) fn next_problem(
         (PreparedPolicy::Investor(advisor), SessionState::Account(account)) => {
             let record = periods.replay()?.record;
             let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
-            let next = advisor.specification().next(record.last(renew.window), rate, account.state.wealth)?;
+            let next = advisor.specification().next(record.last(renew.window), rate, account.state.wealth, elapsed)?;
             Ok(Posed::Investor(next.into()))
         }
         _ => Err(ServiceError::internal("a session has the policy of another problem")),
