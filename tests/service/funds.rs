@@ -277,14 +277,14 @@ async fn money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_for
     app.open_with(json!({ "wealth": 1000.0, "holdings": { "stocks": 0.2, "bonds": 0.1, "gold": 0.0 } })).await;
     let (mut wealth, mut held) = (1000.0, vec![0.2, 0.1, 0.0]);
     let executed = json!({ "stocks": 0.3, "bonds": 0.2, "gold": 0.1 });
-    let rows = [[0.03, 0.004, -0.01], [0.0; 3], [0.02_f64, -0.01, 0.05].map(f64::ln_1p), [-0.04, 0.002, 0.01]];
+    let rows = [[0.03, 0.004, -0.01], [0.0; 3], [0.02_f64, -0.005, 0.05].map(f64::ln_1p), [-0.04, 0.002, 0.01]];
     let named = |values: [f64; 3]| json!({ "stocks": values[0], "bonds": values[1], "gold": values[2] });
     // The report, what the bank paid, what was added, and how many dates have been seen by then.
     let periods = [
         (json!({ "log_returns": named(rows[0]), "date": "2024-01-31", "rate": 0.004 }), 0.004, 10.0, 11),
         (json!({ "missing": true, "date": "2024-02-29", "flow": -30.0 }), 0.001, -30.0, 11),
         (
-            json!({ "simple_returns": named([0.02, -0.01, 0.05]), "executed_allocations": executed, "flow": 0.0,
+            json!({ "simple_returns": named([0.02, -0.005, 0.05]), "executed_allocations": executed, "flow": 0.0,
                 "rate": -0.0005, "date": "2024-03-29" }),
             -0.0005,
             0.0,
@@ -678,7 +678,7 @@ async fn what_is_supposed_of_several_assets_is_what_a_twin_is_told() {
     let start = json!({ "wealth": 110.0, "holdings": holdings });
     let returns = [
         json!({ "log_returns": { "stocks": 0.031, "bonds": -0.004, "gold": 0.012 } }),
-        json!({ "simple_returns": { "stocks": -0.08, "bonds": 0.01, "gold": 0.03 } }),
+        json!({ "simple_returns": { "stocks": -0.06, "bonds": 0.01, "gold": 0.03 } }),
         json!({ "prices": { "stocks": 104.0, "bonds": 99.5, "gold": 51.0 },
             "previous_prices": { "stocks": 100.0, "bonds": 100.0, "gold": 50.0 } }),
     ];
