@@ -97,7 +97,7 @@ async def lived(service: Service, network: AsyncNetwork) -> tuple[list[float], p
         assert steps == sorted(steps) and steps[-1] == 3
         session = await queued.session()
         allocations = []
-        for realised in (0.02, -0.05):
+        for realised in (0.02, -0.04):
             allocations.append((await session.action())["allocation"])
             assert await session.observe(simple_return=realised) is session
         with pytest.raises(ReportGap):
@@ -119,7 +119,7 @@ def test_an_investor_lives_as_in_the_twin(service: Service, ballast: Ballast) ->
         RETURNS, kind="log", horizon=3, rate_per_step=0.001, design={"count": 20}, idempotency_key="of the twins"
     )
     session = queued.session()
-    for expected, realised in zip(allocations, (0.02, -0.05), strict=True):
+    for expected, realised in zip(allocations, (0.02, -0.04), strict=True):
         assert session.action()["allocation"] == expected
         session.observe(simple_return=realised)
     session.observe(log_return=0.01)

@@ -272,7 +272,7 @@ def test_a_session_of_several_assets_starts_from_rows_and_from_a_history_and_is_
     held = sessions[3].assets_action()["holdings"]
     assert held == sessions[0].assets_action()["holdings"] and held["bonds"] == 0.2
     lived = pd.DataFrame(
-        {"bonds": [0.01, -0.02], "stocks": [0.03, 0.04]}, index=pd.period_range("2024-01", periods=2, freq="M")
+        {"bonds": [0.01, -0.015], "stocks": [0.03, 0.04]}, index=pd.period_range("2024-01", periods=2, freq="M")
     )
     first = sessions[0].replay(lived, kind="simple", rate=0.002)
     by_rows = sessions[3].replay(

@@ -17,7 +17,7 @@ from ballast.policy import Opening
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
-    rate, wealth, realised = 0.001, session.wealth, [0.02, -0.05, 0.01]
+    rate, wealth, realised = 0.001, session.wealth, [0.02, -0.04, 0.01]
     assert (session.period, session.horizon, wealth) == (1, 3, 100.0)
     for number, simple_return in enumerate(realised, start=1):
         action = session.action()
