@@ -24,12 +24,14 @@ pub enum ModuleError {
     Missing { name: String },
     #[error("the module {name:?} imports itself through others")]
     Circle { name: String },
+    #[error("the module {name:?} exports {export:?}, and an export must be one name in its declaration")]
+    Unnamed { name: String, export: String },
 }
 
 /// Returns one script with `entries` and all that they import. What `a.js` exports is then the object [`named`] `$a`.
 ///
 /// # Errors
-/// A module is not among `files`, or modules import each other in a circle.
+/// A module is not among `files`, exports anything but a name, or modules import each other in a circle.
 pub fn joined(files: Files, entries: &[&str]) -> Result<String, ModuleError> {
     let mut script = Joining { files, done: BTreeSet::new(), open: Vec::new(), text: String::new() };
     entries.iter().try_for_each(|entry| script.add(entry))?;
@@ -80,6 +82,10 @@ impl Joining {
         self.done.insert(name.into());
         let mut exports = Vec::new();
         let body: Vec<String> = source.lines().map(|line| within(line, &mut exports)).collect();
+        let is_letter = |letter: char| letter.is_ascii_alphanumeric() || "_$".contains(letter);
+        if let Some(export) = exports.iter().find(|export| export.is_empty() || !export.chars().all(is_letter)) {
+            return Err(ModuleError::Unnamed { name: name.into(), export: export.clone() });
+        }
         let (object, body, exports) = (named(name), body.join("\n"), exports.join(", "));
         self.text
             .push_str(&format!("// {name}\nconst {object} = (() => {{\n{body}\nreturn {{ {exports} }};\n}})();\n"));
@@ -114,6 +120,7 @@ mod tests {
             "b.js" => b"import { own } from \"./d.js\";\nexport const b = own;\nexport async function* c(x) {\n  return \"export\";\n}",
             "d.js" => b"export class own {}\nexport function gone() {}",
             "round.js" => b"import { back } from \"./back.js\";",
+            "two.js" => b"export const [one, two] = [1, 2];",
             "back.js" => b"import { round } from \"./round.js\";",
             _ => return None,
         })
@@ -130,9 +137,13 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_of_imports_and_a_module_that_is_not_there_are_named() {
+    fn modules_that_cannot_be_joined_are_named() {
         let words = |entry| joined(files, &[entry]).unwrap_err().to_string();
         assert_eq!(words("round.js"), "the module \"round.js\" imports itself through others");
+        assert_eq!(
+            words("two.js"),
+            "the module \"two.js\" exports \"[one,\", and an export must be one name in its declaration"
+        );
         assert_eq!(words("none.js"), "the file \"none.js\", which draws the report, is missing");
     }
 }

@@ -32,7 +32,8 @@ const ownName = ({ name }) => name || "This session";
 const GUTTER = 64;
 
 /** A chart's axis spans at least this much. */
-export const [LEAST_FALL, LEAST_SHARE] = [0.01, 0.1];
+export const LEAST_FALL = 0.01;
+export const LEAST_SHARE = 0.1;
 
 /** Returns the positions of the periods from the start to the horizon, with their names. */
 function periodsOf({ session, history, calendar }) {
