@@ -28,7 +28,7 @@ pub enum ModuleError {
     Unnamed { name: String, export: String },
 }
 
-/// Returns one script with `entries` and all that they import. What `a.js` exports is then the object [`named`] `$a`.
+/// Returns one script with `entries` and all that they import. What `a.js` exports is then the object `$a`.
 ///
 /// # Errors
 /// A module is not among `files`, exports anything but a name, or modules import each other in a circle.

@@ -210,7 +210,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   await page.getByLabel("Strategies").selectOption({ label: "The one-step rule" });
   await page.getByLabel("Windows").fill("1; all");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.getByText("Windows is 1; it must be from 2 to 10000.").waitFor();
+  await page.getByText("Windows is 1; it must be from 2 to 10,000.").waitFor();
   await page.getByLabel("Windows").fill("8; all");
   await page.getByLabel("A formula of your own").fill("1/deviation8 +");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();

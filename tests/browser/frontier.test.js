@@ -40,7 +40,9 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     const rows = await page.getByRole("table", { name: "Lost on average a year" }).locator("tbody tr").allInnerTexts();
     for (const [index, { lost: { value, low, high } }] of report.resampled[0].points.entries()) assert.ok(plain(rows[index]).includes([value, low, high].map((figure) => `${(figure / 100).toFixed(3)} %`).join("|").replace("|", " (").replace("|", " to ")), rows[index]);
     await page.getByText("Sentences of the report, and a table for each kind of record").click();
-    assert.equal(await page.locator("section:has-text('For the quant')").getByRole("table").count(), 3);
+    const tables = page.locator("section:has-text('For the quant')").getByRole("table");
+    await tables.nth(2).waitFor();
+    assert.equal(await tables.count(), 3);
     const whole = plain(await page.locator("main").innerText());
     for (const sentence of report.sentences) assert.ok(whole.includes(plain(sentence)), sentence);
     assert.ok(!/undefined|NaN|null/.test(whole), whole);
