@@ -130,7 +130,7 @@ fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralR
     if !(2..=found).contains(&count) {
         return Err(fewer(count, found));
     }
-    record.rows.drain(..found - count);
+    record.rows = record.rows.of(found - count..found);
     record.bank.drain(..found - count);
     record.dates.drain(..found - count);
     sentence.push_str(&format!(" The last {count} periods are used, from {}.", record.dates[0]));

@@ -9,6 +9,7 @@ use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::walk_forward::ActualPeriod;
 use ballast::control::request::annualised::compounded;
+use ballast::control::request::asset_history::AssetHistory;
 pub use ballast::control::request::frequency::Frequency;
 use ballast::returns::{Choices, Holds, Kind, Question, Reading, Record, Series, Unit, decoded, read};
 use clap::Args;
@@ -291,7 +292,8 @@ impl AnyReturns {
         let Calendar { dates, frequency: Some(frequency), periods_per_year, rates, .. } = calendar else {
             return Err(ReturnsError::NoFrequency { rule: SEVERAL });
         };
-        let row = |period: usize| record.series.iter().map(|series| series.log_returns[period]).collect();
+        let of = |series: &Series, period: usize| series.log_returns.get(period.checked_sub(series.missing)?).copied();
+        let row = |period: usize| record.series.iter().map(|series| of(series, period)).collect();
         let by_option = rate.map_or(String::new(), |rate| format!(" The bank pays {:.3} % by --rate.", 100.0 * rate));
         Ok(AnyReturns::Several(SeveralReturns {
             sentence: format!(
@@ -301,7 +303,7 @@ impl AnyReturns {
             ),
             record: AssetsRecord {
                 assets: record.series.iter().map(|series| series.column.clone()).collect(),
-                rows: (0..dates.len()).map(row).collect(),
+                rows: AssetHistory::new(&(0..dates.len()).map(row).collect::<Vec<_>>()),
                 bank: rates,
                 dates,
                 frequency,

@@ -45,7 +45,8 @@ impl Posed {
             Posed::Investor(specification) => {
                 let completed = specification.completed()?;
                 let (training, advising) = (estimate::training(&completed, threads), estimate::advising(&completed));
-                let warnings = completed.problem.warnings();
+                let estimated = completed.fund.as_ref().and_then(|fund| fund.history.warning(&fund.assets));
+                let warnings = completed.problem.warnings().into_iter().chain(estimated).collect();
                 Completed { posed: Posed::Investor(completed.into()), training, advising, warnings }
             }
             Posed::Declared(declared) => {

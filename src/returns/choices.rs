@@ -86,6 +86,10 @@ pub struct Choices {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<bool>,
+    /// If true, columns that begin later than others keep their own beginning; if false, the older rows of all are left out
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unequal: Option<bool>,
     /// If true, numbers that are unusual for an asset are right: a deviation above 30 % a period or 150 % a year, a
     /// mean above 100 % a year beyond chance, or a return far from all others
     #[arg(long)]
@@ -116,6 +120,7 @@ impl Choices {
             comma_parts: more.comma_parts.or(self.comma_parts),
             one_record: more.one_record.or(self.one_record),
             gaps: more.gaps.or(self.gaps),
+            unequal: more.unequal.or(self.unequal),
             unusual: more.unusual.or(self.unusual),
             excess: more.excess.or(self.excess),
             latest: more.latest.or(self.latest),

@@ -1,14 +1,19 @@
 //! The rows that have numbers in the columns that are read: blank rows around them are left out, and holes among them
-//! found.
+//! found. A column may begin later than others.
 
 use super::choices::Choices;
 use super::outcome::Stop;
 use super::sheet::Column;
 use super::words::counted;
 
-/// Rows that have a number in every column that is read.
+/// Fewer rows are left out without a question: a year of months.
+const WORTH_ASKING: usize = 12;
+
+/// Rows that have a number in every column that is read, or in every one that has begun.
 pub struct KeptRows {
     pub rows: Vec<usize>,
+    /// Those of each column from its oldest number on.
+    pub own: Vec<Vec<usize>>,
     /// Rows in the same span that lack a number in some column.
     pub holes: Vec<usize>,
     /// Sentences about the rows before and after that are left out.
@@ -16,11 +21,12 @@ pub struct KeptRows {
 }
 
 impl KeptRows {
-    /// Selects the rows that all columns share. A column that begins later than others cuts the older rows of all.
+    /// Selects the rows that all columns share, or those of the longest with `unequal`. A column that begins much later than
+    /// others is asked about.
     ///
     /// # Errors
     /// A column has no numbers, or ends before the others.
-    pub fn of(chosen: &[&Column], is_newest_first: bool) -> Result<Self, Stop> {
+    pub fn of(chosen: &[&Column], is_newest_first: bool, unequal: Option<bool>) -> Result<Self, Stop> {
         let spans = chosen.iter().map(|column| span(column)).collect::<Result<Vec<_>, Stop>>()?;
         let outer = |of: fn(&(usize, usize)) -> usize| spans.iter().map(of);
         let (first, last) = (outer(|span| span.0).min().unwrap_or(0), outer(|span| span.1).max().unwrap_or(0));
@@ -44,15 +50,31 @@ impl KeptRows {
         }
         let (from, to) = if is_newest_first { (first, earliest_last) } else { (latest_first, last) };
         let cut = last - first - to.saturating_sub(from);
+        let young = if is_newest_first { ends(to, |span| span.1) } else { ends(from, |span| span.0) };
+        let column = chosen[young.unwrap_or(0)];
+        let line = column.cells[if is_newest_first { to } else { from }].line();
+        let (name, rows) = (&column.name, counted(cut, "older row"));
+        let oldest = format!("Column {name} has its oldest number in line {line}");
+        let all = match unequal {
+            None if cut >= WORTH_ASKING && last - first - cut >= WORTH_ASKING => {
+                return Err(ask(&format!("{oldest}, {rows} after others."), name, &rows));
+            }
+            Some(true) => cut > 0,
+            _ => false,
+        };
         if cut > 0 {
-            let young = if is_newest_first { ends(to, |span| span.1) } else { ends(from, |span| span.0) };
-            let column = chosen[young.unwrap_or(0)];
-            let line = column.cells[if is_newest_first { to } else { from }].line();
-            let rows = counted(cut, "older row");
-            remarks.push(format!("Column {} has its oldest number in line {line}: {rows} left out.", column.name));
+            let then = if all { "its returns before are estimated".to_owned() } else { format!("{rows} left out") };
+            remarks.push(format!("{oldest}: {then}."));
         }
-        let (holes, rows) = (from..=to).partition(|row| chosen.iter().any(|column| column.cells[*row].is_missing()));
-        Ok(KeptRows { rows, holes, remarks })
+        let (from, to) = if all { (first, last) } else { (from, to) };
+        let has_begun = |at: usize, row: usize| if is_newest_first { row <= spans[at].1 } else { row >= spans[at].0 };
+        let is_hole = |row: &usize| {
+            chosen.iter().enumerate().any(|(at, column)| has_begun(at, *row) && column.cells[*row].is_missing())
+        };
+        let (holes, rows): (Vec<usize>, Vec<usize>) = (from..=to).partition(is_hole);
+        let own = |at: usize| rows.iter().copied().filter(|row| has_begun(at, *row)).collect();
+        let own = (0..chosen.len()).map(own).collect();
+        Ok(KeptRows { rows, own, holes, remarks })
     }
 
     /// Adds a remark about the holes that are skipped, or asks whether they may be.
@@ -75,6 +97,17 @@ impl KeptRows {
         let choices = Choices { gaps: Some(true), ..Choices::default() };
         Err(Stop::question("gaps", question, vec![("Leave the rows out".to_owned(), choices)]))
     }
+}
+
+/// Asks whether the column `name`, which begins later than others, limits the rows of all.
+fn ask(what: &str, name: &str, rows: &str) -> Stop {
+    let unequal = |unequal| Choices { unequal: Some(unequal), ..Choices::default() };
+    let question = format!("{what} Leave these out for all columns, or keep them?");
+    let options = vec![
+        (format!("Leave {rows} out"), unequal(false)),
+        (format!("Keep them: what {name} would have earned before is estimated from the others"), unequal(true)),
+    ];
+    Stop::question("unequal", question, options)
 }
 
 /// Returns the first and the last row in which a column has a number.

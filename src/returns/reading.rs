@@ -89,9 +89,10 @@ fn outcome(text: &str, choices: &Choices) -> (Result<Record, Stop>, Vec<ColumnFo
 fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
     let chosen = sheet.chosen(choices)?;
     let dates = sheet.column(Holds::Dates);
-    let mut kept = KeptRows::of(&chosen, is_newest_first(dates, choices))?;
-    let mark = mark(chosen.iter().flat_map(|column| column.at(&kept.rows)), choices)?;
-    let numbers = chosen.iter().map(|column| numbers(column, column.at(&kept.rows), mark));
+    let mut kept = KeptRows::of(&chosen, is_newest_first(dates, choices), choices.unequal)?;
+    let cells = || chosen.iter().zip(&kept.own).map(|(column, rows)| (*column, column.at(rows)));
+    let mark = mark(cells().flat_map(|(_, cells)| cells), choices)?;
+    let numbers = cells().map(|(column, cells)| numbers(column, cells, mark));
     let mut numbers = numbers.collect::<Result<Vec<Numbers>, Stop>>()?;
     if kept.rows.len() < FEWEST {
         return Err(Stop::refused("One number is not a record of returns: give at least two."));
@@ -129,8 +130,8 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
         kept.check_holes(&chosen, are_prices && order.frequency == Some(Frequency::Daily), choices)?;
         order = ordered(dates, sheet.times(), &kept.rows, choices)?;
     }
-    let count = returns[0].simple.len();
-    alike(&chosen, &returns, choices)?;
+    let count = returns.iter().map(|returns| returns.simple.len()).max().unwrap_or(0);
+    alike(&chosen, (&returns, &kept), choices)?;
     if count < FEWEST {
         return Err(Stop::refused(
             "Two prices give one return, but at least two returns are needed. Give another price.",
@@ -155,10 +156,12 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
 }
 
 /// Requires columns that are read together to be of one kind and in one unit.
-fn alike(chosen: &[&Column], returns: &[ColumnReturns], choices: &Choices) -> Result<(), Stop> {
+fn alike(chosen: &[&Column], (returns, kept): (&[ColumnReturns], &KeptRows), choices: &Choices) -> Result<(), Stop> {
     let first = &returns[0];
     let other = |differs: &dyn Fn(&ColumnReturns) -> bool| returns.iter().position(differs);
-    if let Some(index) = other(&|other| other.simple.len() != first.simple.len()) {
+    // Prices give one return less than they are.
+    let lost = |at: usize| kept.own[at].len() - returns[at].simple.len();
+    if let Some(index) = (0..returns.len()).find(|at| lost(*at) != lost(0)) {
         let what = |index: usize| called(returns[index].kind, returns[index].unit);
         return Err(Stop::refused(format!(
             "Column {} holds {}, and column {} holds {}. Read them one at a time, or give both in one form.",

@@ -20,7 +20,7 @@ pub struct Record {
     pub sentence: String,
     /// All columns of the text.
     pub columns: Vec<ColumnFound>,
-    /// The columns that were read, all of one length.
+    /// The columns that were read. They end together, and one may begin later.
     pub series: Vec<Series>,
     /// The number of returns in the text; the series hold fewer if `latest` limits them.
     pub count: usize,
@@ -54,6 +54,9 @@ pub struct Series {
     /// The unit of the numbers; absent for prices.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// The number of periods of the record before its first return.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub missing: usize,
     /// Log-returns, as the service accepts them.
     pub log_returns: Vec<f64>,
     /// Simple returns of the same periods, as fractions.
@@ -69,6 +72,10 @@ pub struct Series {
     /// Deviation times the square root of the periods in a year.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation_per_year: Option<f64>,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The rate that the bank paid in each period, as a fraction.
@@ -106,7 +113,7 @@ impl Order {
 pub struct ColumnContents {
     pub names: Vec<String>,
     pub order: Order,
-    /// Returns by column, all of one length.
+    /// Returns by column, which end together.
     pub returns: Vec<ColumnReturns>,
     pub rate: Option<BankRate>,
     /// The number of latest returns to use.
@@ -119,7 +126,8 @@ impl ColumnContents {
     /// Returns the record of the latest periods, with the sentence that describes it.
     pub fn record(self, columns: Vec<ColumnFound>) -> Record {
         let ColumnContents { names, order, returns, rate, used, remarks } = self;
-        let (count, periods_per_year) = (returns[0].simple.len(), order.periods_per_year());
+        let count = returns.iter().map(|returns| returns.simple.len()).max().unwrap_or(0);
+        let periods_per_year = order.periods_per_year();
         let Order { dates, is_turned, frequency, .. } = order;
         let series =
             names.into_iter().zip(returns).map(|(column, returns)| Series::of(column, returns, used, periods_per_year));
@@ -150,20 +158,33 @@ impl Series {
     }
 
     fn of(column: String, returns: ColumnReturns, used: usize, periods_per_year: Option<usize>) -> Self {
-        let last = |values: Vec<f64>| values[values.len() - used..].to_vec();
+        let last = |values: Vec<f64>| values[values.len().saturating_sub(used)..].to_vec();
         let ColumnReturns { kind, unit, simple, logarithmic } = returns;
         let (simple_returns, log_returns) = (last(simple), last(logarithmic));
+        let missing = used - log_returns.len();
         let (mean, deviation) = moments(&simple_returns);
         let mean_per_year = periods_per_year.map(|periods| compounded(mean, periods as f64));
         let deviation_per_year = periods_per_year.map(|periods| deviation * (periods as f64).sqrt());
-        Series { column, kind, unit, log_returns, simple_returns, mean, deviation, mean_per_year, deviation_per_year }
+        Series {
+            column,
+            kind,
+            unit,
+            missing,
+            log_returns,
+            simple_returns,
+            mean,
+            deviation,
+            mean_per_year,
+            deviation_per_year,
+        }
     }
 }
 
 impl Record {
     /// Returns for example "240 monthly simple returns in percent, January 1999 to December 2018, as in column market."
     fn what(&self, span: Option<(Date, Date)>) -> String {
-        let used = self.series[0].log_returns.len();
+        let Series { missing, ref log_returns, .. } = self.series[0];
+        let used = missing + log_returns.len();
         let latest = if used < self.count { format!("The latest {used} of {}", self.count) } else { used.to_string() };
         let adjective = self.frequency.map_or(String::new(), |frequency| format!(" {}", frequency.adjective()));
         let Series { kind, unit, .. } = self.series[0];

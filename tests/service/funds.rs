@@ -57,8 +57,8 @@ async fn shrunk_means_are_lived_as_the_library_has_them(mut app: App) {
     app.train(&half).await;
     app.open_with(json!({ "wealth": 1000.0 })).await;
     let advised = |advisor: &Advisor, means: MeansRule| {
-        let mut fund = Fund::at(rows(), means, vec![0.0; 3]);
-        let state = fund.renew(rows(), Learning::default(), 1000.0, 0.0);
+        let mut fund = Fund::at(rows().into(), means, vec![0.0; 3]);
+        let state = fund.renew(rows().into(), Learning::default(), 1000.0, 0.0);
         let (state, solution) = fund.compose(advisor, advisor.specification().fund.as_deref().unwrap(), 0, &state);
         (advisor.advise(0, &state, AdviceMode::Surrogate).allocation, solution.unwrap().allocation)
     };
@@ -106,7 +106,7 @@ async fn a_session_of_several_assets_is_lived_by_their_names(mut app: App) {
     let factor = of.radius_factor.unwrap();
     assert_eq!(number(&policy["specification"]["fund"]["radius_factor"]), factor);
     assert!(factor > 1.0);
-    let mut fund = Fund::at(rows(), MeansRule::default(), vec![0.2, 0.1, 0.0]);
+    let mut fund = Fund::at(rows().into(), MeansRule::default(), vec![0.2, 0.1, 0.0]);
     let start = State::new(&fund.returns(), 1000.0, Learning::default()).unwrap().with_holding(0.3).unwrap();
     let (state, _) = fund.compose(&advisor, of, 0, &start);
     let expected = advisor.advise(0, &state, AdviceMode::Surrogate);
@@ -454,7 +454,7 @@ fn identical_columns_are_one_asset() {
     single["design"]["initial_laws"] = json!("resampled");
     let asset = crate::support::policies::advisor(single);
     let rows: Vec<Vec<f64>> = one.iter().map(|&z| vec![z; 3]).collect();
-    let mut held = Fund::at(rows, MeansRule::default(), vec![0.0; 3]);
+    let mut held = Fund::at(rows.into(), MeansRule::default(), vec![0.0; 3]);
     let state = State::new(&held.returns(), 100.0, Learning::default()).unwrap();
     let of = fund.specification().fund.clone().unwrap();
     let (state, _) = held.compose(&fund, &of, 0, &state);
@@ -478,17 +478,17 @@ fn what_is_traded_within_the_fund_is_paid_for() {
     let (advisor, dear) = (costly(1e-6), costly(0.1));
     let of = advisor.specification().fund.as_deref().unwrap();
     let state = |fund: &Fund| State::new(&fund.returns(), 100.0, Learning::default()).unwrap();
-    let mut held = Fund::at(rows(), MeansRule::default(), vec![0.0; 3]);
+    let mut held = Fund::at(rows().into(), MeansRule::default(), vec![0.0; 3]);
     let even = held.composition.clone();
     held.compose(&advisor, of, 0, &state(&held));
     assert_ne!(held.composition, even);
-    let mut stayed = Fund::at(rows(), MeansRule::default(), even.iter().map(|share| 0.5 * share).collect());
+    let mut stayed = Fund::at(rows().into(), MeansRule::default(), even.iter().map(|share| 0.5 * share).collect());
     let start = state(&stayed).with_holding(0.5).unwrap();
     stayed.compose(&dear, dear.specification().fund.as_deref().unwrap(), 0, &start);
     assert_eq!(stayed.composition, even);
 
     // From a half in stocks to a half in bonds all of it is sold and bought: of 100 there are 99.8 left at 0.2 %.
-    let stocks = Fund::at(rows(), MeansRule::default(), vec![0.5, 0.0, 0.0]);
+    let stocks = Fund::at(rows().into(), MeansRule::default(), vec![0.5, 0.0, 0.0]);
     let executed = [0.0, 0.5, 0.0];
     let dynamics = Dynamics::plain(0.0, 0.002);
     let realised = PeriodOutcome { traded: Some(stocks.traded(&executed)), ..PeriodOutcome::of(0.5, 0.0) };
@@ -560,7 +560,7 @@ fn the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard() {
         composition,
         ..advisor.specification().fund.as_deref().unwrap().clone()
     };
-    let mut start = Fund::at(rows, MeansRule::default(), vec![0.0; 3]);
+    let mut start = Fund::at(rows.into(), MeansRule::default(), vec![0.0; 3]);
     start.composition = vec![0.5, 0.5, 0.0];
     let state = State::new(&start.returns(), 100.0, Learning::default()).unwrap();
     let promise = advisor.advise(0, &state, AdviceMode::Resolve);
@@ -614,7 +614,12 @@ fn a_policy_of_a_fund_is_what_its_assets_give() {
     assert_eq!(refused(&|other| other.design.initial_laws = InitialLaws::Given), "design.initial_laws");
     assert_eq!(refused(&|other| other.fund.as_mut().unwrap().radius_factor = Some(0.5)), "fund.radius_factor");
     assert_eq!(refused(&|other| other.problem.learning = Learning::Decay { half_life: 9.0 }), "problem.learning");
-    assert_eq!(refused(&|other| other.fund.as_mut().unwrap().history[0][0] = 9.0), "fund.history[0][0]");
+    let with = |value: f64| {
+        let mut rows = rows();
+        rows[0][0] = value;
+        move |other: &mut Specification| other.fund.as_mut().unwrap().history = rows.clone().into()
+    };
+    assert_eq!(refused(&with(9.0)), "fund.history[0][0]");
 }
 
 /// Two assets that hedge each other: their fund in equal parts does not vary, and is no law to be learned from.

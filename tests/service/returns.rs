@@ -453,3 +453,40 @@ fn ordinary_records_are_not_asked_about() {
         assert!(record.sentence.contains("as fractions"), "{}", record.sentence);
     }
 }
+
+/// An asset that begins twenty months later is asked about: the older rows are left out, or it keeps its own beginning. In
+/// either order of the rows, and as returns or as prices, the same returns are read.
+#[test]
+fn a_column_that_begins_later_is_asked_about() {
+    let level = |month: usize, asset: f64| 100.0 + (asset * month as f64).sin() * 4.0;
+    for (is_price, is_turned) in [(true, false), (true, true), (false, false), (false, true)] {
+        let cell = |month: usize, asset: f64| match is_price {
+            true => format!("{:.4}", level(month, asset)),
+            false => format!("{:.6}", level(month + 1, asset) / level(month, asset) - 1.0),
+        };
+        let row = |month: usize| {
+            let young = if month < 20 { String::new() } else { cell(month, 0.7) };
+            format!("{}-{:02}-28,{},{young}", 2010 + month / 12, 1 + month % 12, cell(month, 1.3))
+        };
+        let mut rows: Vec<String> = (0..60).map(row).collect();
+        if is_turned {
+            rows.reverse();
+        }
+        let text = format!("date,old,young\n{}\n", rows.join("\n"));
+        let chosen = Choices { columns: vec!["old".into(), "young".into()], ..Choices::default() };
+        let Reading::Asked { questions, .. } = read(&text, &chosen) else { panic!("{text}") };
+        assert_eq!(questions.iter().map(|one| one.asks).collect::<Vec<&str>>(), ["unequal"]);
+        assert!(questions[0].question.contains("Column young has its oldest number in line"), "{questions:?}");
+        let with = |unequal: bool| match read(&text, &Choices { unequal: Some(unequal), ..chosen.clone() }) {
+            Reading::Read(record) => record,
+            other => panic!("{other:?}"),
+        };
+        let (common, whole, lost) = (with(false), with(true), usize::from(is_price));
+        let lengths = |record: &Record| record.series.iter().map(|one| one.log_returns.len()).collect::<Vec<usize>>();
+        assert_eq!((lengths(&common), lengths(&whole)), (vec![40 - lost; 2], vec![60 - lost, 40 - lost]));
+        assert_eq!(whole.series.iter().map(|one| one.missing).collect::<Vec<usize>>(), [0, 20]);
+        assert_eq!(whole.series[1].log_returns, common.series[1].log_returns);
+        assert_eq!(whole.series[0].log_returns[20..], common.series[0].log_returns);
+        assert_eq!(whole.dates.unwrap().len(), 60 - lost);
+    }
+}

@@ -39,4 +39,5 @@ mod streams;
 mod surrogate;
 mod templates;
 mod transport;
+mod unequal_records;
 mod walk_forward;

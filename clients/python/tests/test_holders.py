@@ -7,7 +7,7 @@ import datetime
 import io
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -267,7 +267,7 @@ def test_a_session_of_several_assets_starts_from_rows_and_from_a_history_and_is_
     ]
     starts = [session.history()["history"] for session in sessions]
     assert starts[1] == starts[2] == starts[0]
-    np.testing.assert_allclose(starts[0], np.log1p(rows), atol=1e-15)
+    np.testing.assert_allclose(cast("Any", starts[0]), np.log1p(rows), atol=1e-15)
     sessions.append(policy.session(history=sessions[0].history()))
     held = sessions[3].assets_action()["holdings"]
     assert held == sessions[0].assets_action()["holdings"] and held["bonds"] == 0.2

@@ -220,7 +220,7 @@ def test_a_session_of_several_assets(ballast: Ballast) -> None:
     )
     policy = training.policy()
     moved = policy.session(history=record[["bonds", "stocks"]], kind="log", holdings={"stocks": 0.5, "bonds": 0.0})
-    np.testing.assert_allclose(moved.history()["history"], record.to_numpy(), atol=1e-15)
+    np.testing.assert_allclose(cast("Any", moved.history()["history"]), record.to_numpy(), atol=1e-15)
     assert moved.assets_action()["holdings"]["stocks"] == 0.5
     with pytest.raises(ValueError, match="must have those of the policy"):
         policy.session(history=record.rename(columns={"bonds": "gold"}))

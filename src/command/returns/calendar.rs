@@ -33,7 +33,7 @@ impl Calendar {
         let Some(periods_per_year) = periods_per_year.or(record.periods_per_year) else {
             return Err(ReturnsError::NoFrequency { rule: ONE });
         };
-        let count = record.series.first().map_or(0, |series| series.log_returns.len());
+        let count = record.series.first().map_or(0, |series| series.missing + series.log_returns.len());
         let numbered = || (1..=count).map(|row| format!("row {row}")).collect();
         let (dates, frequency) = (record.dates.clone().unwrap_or_else(numbered), record.frequency);
         let (bank, rates) = match (rate, &record.rate) {

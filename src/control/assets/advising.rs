@@ -49,7 +49,7 @@ fn step_above(
     let [lowest, highest] = fund.action_interval;
     PortfolioStep::new(
         ReturnScenarios { returns: rows, radius, floors },
-        problem.ground_norm.at(rows),
+        problem.ground_norm.at(rows, &problem.history),
         utility(fund),
         fund.rate_per_step,
         ActionInterval { lowest, highest },

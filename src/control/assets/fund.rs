@@ -27,6 +27,7 @@ use crate::control::policy::advisor::Advisor;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::state::{PeriodOutcome, State};
 use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
@@ -39,7 +40,7 @@ use crate::numerics::transport::water_filling::inverse_volatility;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fund {
     /// Log-returns that make up the law, date by date.
-    pub rows: Vec<Vec<f64>>,
+    pub rows: AssetHistory,
     /// The means that the law gives the assets.
     pub means: MeansRule,
     /// Share of each asset in the fund; they sum to 1.
@@ -76,7 +77,7 @@ impl AssetsProblem {
     }
 
     /// Returns the problem that a policy was trained for, with `history` as its record; `None` if it has one asset.
-    pub fn of(specification: &Specification, history: Vec<Vec<f64>>) -> Option<Self> {
+    pub fn of(specification: &Specification, history: AssetHistory) -> Option<Self> {
         let Specification { problem, fund, .. } = specification;
         let fund = fund.as_deref()?;
         Some(AssetsProblem {
@@ -110,7 +111,7 @@ fn total(shares: &[f64]) -> f64 {
 
 impl Fund {
     /// Starts a fund from the returns `rows` and these shares of wealth, before a composition is chosen.
-    pub fn at(rows: Vec<Vec<f64>>, means: MeansRule, holdings: Vec<f64>) -> Self {
+    pub fn at(rows: AssetHistory, means: MeansRule, holdings: Vec<f64>) -> Self {
         let composition = inverse_volatility(&rows);
         Fund { rows, means, before: composition.clone(), composition, holdings }
     }
@@ -125,7 +126,7 @@ impl Fund {
 
     /// Makes `rows` with these means the returns of the law, as a renewal does, and returns the state with the law of the
     /// fund.
-    pub fn renew(&mut self, rows: Vec<Vec<f64>>, learning: Learning, wealth: f64, holding: f64) -> State {
+    pub fn renew(&mut self, rows: AssetHistory, learning: Learning, wealth: f64, holding: f64) -> State {
         self.rows = rows;
         State { law: learning.law(&self.returns()), wealth, holding }
     }
@@ -194,7 +195,7 @@ impl Fund {
         let grown: Vec<f64> = executed.iter().zip(log_returns).map(|(share, z)| share * z.exp()).collect();
         let whole: f64 = grown.iter().sum();
         self.holdings = grown.iter().map(|share| if whole > 0.0 { share / whole * holding } else { 0.0 }).collect();
-        self.rows.extend(learned);
+        learned.into_iter().for_each(|row| self.rows.push(row));
     }
 
     /// Prepares the period after `step`: chooses the composition if the policy advises that period, and returns the
@@ -236,7 +237,13 @@ impl Fund {
             let utility = RelativeUtility::new(problem.utility, state.wealth * (1.0 + problem.rate_per_step));
             let [lowest, highest] = problem.action_interval;
             let total = ActionInterval { lowest, highest };
-            let step = PortfolioStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
+            let step = PortfolioStep::new(
+                law,
+                fund.ground_norm.at(&self.rows, &self.rows),
+                utility,
+                problem.rate_per_step,
+                total,
+            );
             // A cold start, so that the proposal depends on the returns seen alone.
             solution.insert(step.within(compositions.clone()).solve(None)).clone()
         });

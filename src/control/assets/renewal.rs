@@ -1,13 +1,14 @@
 //! The specification of the policy that follows another, for one asset or several.
 
 use crate::control::error::FieldError;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::specification::Specification;
 use crate::control::request::support::Interval;
 
 impl Specification {
     /// Returns the specification of the policy that follows after `elapsed` periods: the same, with the returns `record`,
-    /// date after date, and the last observed `rate`. If the problem depends on wealth or secures spending, present wealth replaces initial
+    /// date after date and NaN before an asset's first, and the last observed `rate`. If the problem depends on wealth or secures spending, present wealth replaces initial
     /// wealth and the design interval is scaled with it. With spending the horizon comes nearer, and otherwise not.
     /// Renewals of sessions and walk-forwards of several assets call it.
     ///
@@ -33,7 +34,7 @@ impl Specification {
             return Ok(next);
         };
         let rows = record.chunks_exact(fund.assets.len()).map(<[f64]>::to_vec).collect();
-        match AssetsProblem::of(&next, rows) {
+        match AssetsProblem::of(&next, AssetHistory::marked(rows)) {
             Some(problem) => problem.training(next.design, next.surrogate, next.seed),
             None => Ok(next),
         }

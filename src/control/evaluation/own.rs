@@ -4,6 +4,7 @@ use crate::control::error::FieldError;
 use crate::control::evaluation::account::{PathOutcome, shares_ended};
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::own_formula::{OwnFormula, ReturnSums};
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::own_weights::{OwnAssetsWeights, OwnShares, OwnWeights, field};
 use crate::control::request::specification::ProblemSpecification;
 
@@ -43,7 +44,7 @@ pub fn shares_of_one(
 /// A formula without a value in one of the periods from `first` on.
 pub fn shares_of_assets(
     weights: &OwnAssetsWeights,
-    rows: &[Vec<f64>],
+    rows: &AssetHistory,
     bank: &[f64],
     first: usize,
 ) -> Result<Vec<NamedShares>, FieldError> {
@@ -54,6 +55,10 @@ pub fn shares_of_assets(
             OwnShares::Given(shares) => return Ok((name.clone(), shares.clone())),
             OwnShares::Formula(text) => text,
         };
+        if !rows.are_equal() {
+            let rule = "must be shares by date: formulas need a return of every asset on every date";
+            return Err(FieldError::new(field(name), text, rule));
+        }
         let formula = OwnFormula::parse(&field(name), text)?;
         let at = |period: usize| {
             if period < first {

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::asset_history::AssetHistory;
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::caution::CautionLevel;
 use super::caution_rules::{check_support, check_within};
@@ -96,8 +97,10 @@ pub struct AssetsProblem {
     /// The log-returns of each asset that the adversary may use. Default: `worst_seen`.
     #[serde(default)]
     pub support: Option<Support>,
-    /// Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset.
-    pub history: Vec<Vec<f64>>,
+    /// Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset, null before the asset's
+    /// first return. What such an asset would have earned then follows from the assets with longer records, by regression.
+    #[schema(value_type = Vec<Vec<Option<f64>>>)]
+    pub history: AssetHistory,
 }
 
 impl AssetsProblem {
@@ -216,7 +219,7 @@ pub fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
 /// The first that breaks a rule.
 pub fn check_rows(
     named: &str,
-    rows: &[Vec<f64>],
+    rows: &AssetHistory,
     assets: &[String],
     support: Option<Support>,
 ) -> Result<(), FieldError> {
@@ -224,11 +227,14 @@ pub fn check_rows(
         let rule = format!("must hold {} to {} dates", DATES.start(), DATES.end());
         return Err(FieldError::new(named, format!("{} dates", rows.len()), rule));
     }
+    let width = |row: &Vec<f64>| row.len() != assets.len();
+    if let Some(date) = rows.iter().position(width) {
+        let rule =
+            format!("must have one log-return for each of the {} assets, or null before its first", assets.len());
+        return Err(FieldError::new(format!("{named}[{date}]"), format!("{} values", rows[date].len()), rule));
+    }
+    rows.check(named, assets)?;
     for (date, row) in rows.iter().enumerate() {
-        if row.len() != assets.len() {
-            let rule = format!("must have one log-return for each of the {} assets", assets.len());
-            return Err(FieldError::new(format!("{named}[{date}]"), format!("{} values", row.len()), rule));
-        }
         for (asset, &value) in row.iter().enumerate() {
             rules::log_return(&format!("{named}[{date}][{asset}]"), value)?;
         }
@@ -239,6 +245,11 @@ pub fn check_rows(
     }
     let Some(support) = support else { return Ok(()) };
     check_support("problem.support", support)?;
+    if !rows.are_equal() && support.given().is_some() {
+        let rule =
+            "must not be between if a record begins later than others: a return that is filled in may lie outside";
+        return Err(FieldError::new("problem.support.rule", "between", rule));
+    }
     for (date, row) in rows.iter().enumerate() {
         for (asset, &value) in row.iter().enumerate() {
             check_within(support, || format!("{named}[{date}][{asset}]"), value)?;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use super::asset_history::AssetHistory;
 use super::assets::{ASSETS, DATES, NAMES, check_names};
 use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, days, defaults, frequency};
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
@@ -52,13 +53,13 @@ pub struct AssetsBacktestRequest {
     /// Names of the assets, 2 to 30, all different, in the order of the columns.
     #[schema(example = json!(["stocks", "bonds"]))]
     pub assets: Vec<String>,
-    /// Log-returns of the assets, oldest first, without gaps; each period has one value for each asset. Exactly one of
-    /// this and `simple_returns` is given.
+    /// Log-returns of the assets, oldest first, without gaps; each period has one value for each asset, null before the
+    /// asset's first return. Exactly one of this and `simple_returns` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub log_returns: Option<Vec<Vec<f64>>>,
+    pub log_returns: Option<Vec<Vec<Option<f64>>>>,
     /// Simple returns of the assets, `price / previous price - 1`, in the same layout as `log_returns`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub simple_returns: Option<Vec<Vec<f64>>>,
+    pub simple_returns: Option<Vec<Vec<Option<f64>>>>,
     /// Return of the bank per period, as a fraction from -0.5 to 0.5: one number for all periods, or one for each.
     pub rate: Rates,
     /// Date of each period, evenly spaced: `2008-01-31`, `2008-01` or `2008`.
@@ -170,7 +171,7 @@ impl Bounded for AssetsBacktestRequest {
 impl AssetsBacktestRequest {
     /// Returns the name of the field that holds the returns, and its values. The values are empty if both fields or
     /// neither are given.
-    pub fn returns(&self) -> (&'static str, &[Vec<f64>]) {
+    pub fn returns(&self) -> (&'static str, &[Vec<Option<f64>>]) {
         match (&self.log_returns, &self.simple_returns) {
             (Some(returns), None) => ("log_returns", returns),
             (None, Some(returns)) => ("simple_returns", returns),
@@ -179,12 +180,10 @@ impl AssetsBacktestRequest {
     }
 
     /// Returns the log-returns, date by date.
-    pub fn log_rows(&self) -> Vec<Vec<f64>> {
-        let rows = self.returns().1.iter();
-        match self.simple_returns {
-            Some(_) => rows.map(|row| row.iter().map(|value| value.ln_1p()).collect()).collect(),
-            None => rows.cloned().collect(),
-        }
+    pub fn log_rows(&self) -> AssetHistory {
+        let log_return = |value: f64| if self.simple_returns.is_some() { value.ln_1p() } else { value };
+        let row = |row: &Vec<Option<f64>>| row.iter().map(|value| value.map(log_return)).collect();
+        AssetHistory::new(&self.returns().1.iter().map(row).collect::<Vec<_>>())
     }
 
     /// Checks the record as it is given. Returns its frequency and the number of periods in a year.
@@ -208,8 +207,8 @@ impl AssetsBacktestRequest {
                 let rule = format!("must have one return for each of the {} assets", self.assets.len());
                 return Err(FieldError::new(format!("{field}[{period}]"), format!("{} values", row.len()), rule));
             }
-            for (asset, &value) in row.iter().enumerate() {
-                within(&format!("{field}[{period}][{asset}]"), value, low, high)?;
+            for (asset, value) in row.iter().enumerate() {
+                value.map_or(Ok(()), |value| within(&format!("{field}[{period}][{asset}]"), value, low, high))?;
             }
         }
         self.rate.check(rows.len())?;

@@ -6,6 +6,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
+use super::asset_history::AssetHistory;
 use super::assets::AssetsProblem;
 use super::bounds::{Bounded, FieldBounds, ValueBounds};
 use super::caution::CautionLevel;
@@ -242,12 +243,12 @@ fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
 }
 
 fn as_assets(problem: &ProblemSpecification) -> AssetsProblem {
-    let rows = problem.history.iter().map(|&value| vec![value]).collect();
-    asked_of(vec!["asset".to_owned()], rows, problem)
+    let rows: Vec<Vec<f64>> = problem.history.iter().map(|&value| vec![value]).collect();
+    asked_of(vec!["asset".to_owned()], rows.into(), problem)
 }
 
 /// Returns the one-period problem of these assets with the options that `problem` has for one asset.
-pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSpecification) -> AssetsProblem {
+pub fn asked_of(assets: Vec<String>, history: AssetHistory, problem: &ProblemSpecification) -> AssetsProblem {
     AssetsProblem {
         assets,
         ground_norm: GroundNorm::default(),

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::asset_history::AssetHistory;
 use super::limits::WeightLimits;
 use super::means::MeansRule;
 use crate::numerics::transport::water_filling::{GroundMetric, inverse_volatility};
@@ -29,8 +30,9 @@ pub struct FundSpecification {
     /// on the sample size alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius_factor: Option<f64>,
-    /// Log-returns by date, oldest first; each date has one value for each asset.
-    pub history: Vec<Vec<f64>>,
+    /// Log-returns by date, oldest first; each date has one value for each asset, null before its first return.
+    #[schema(value_type = Vec<Vec<Option<f64>>>)]
+    pub history: AssetHistory,
 }
 
 /// How the composition of the fund is chosen. Default: `one_step`.
@@ -54,7 +56,8 @@ pub enum CompositionRule {
 #[serde(rename_all = "snake_case")]
 pub enum GroundNorm {
     /// The sum of the assets' moves, each weighted by the asset's inverse volatility. The weights sum to 1, so moving
-    /// all assets by s costs s.
+    /// all assets by s costs s. If only n_i of the n returns of an asset are its own, its weight is `sqrt(n_i / n)` of
+    /// that.
     #[default]
     ScaledOne,
     /// The largest move of any asset.
@@ -62,10 +65,14 @@ pub enum GroundNorm {
 }
 
 impl GroundNorm {
-    /// Returns the ground cost for a history.
-    pub fn at(self, rows: &[Vec<f64>]) -> GroundMetric {
+    /// Returns the ground cost for the law of `rows`, which are `known` with the means of the law. An asset whose record
+    /// is short is cheaper to move than a whole one: the ball grows in its direction and shrinks in none.
+    pub fn at(self, rows: &[Vec<f64>], known: &AssetHistory) -> GroundMetric {
         match self {
-            GroundNorm::ScaledOne => GroundMetric::Weighted(inverse_volatility(rows)),
+            GroundNorm::ScaledOne if known.are_equal() => GroundMetric::Weighted(inverse_volatility(rows)),
+            GroundNorm::ScaledOne => GroundMetric::Weighted(
+                inverse_volatility(rows).iter().zip(known.evidence()).map(|(k, e)| k * e).collect(),
+            ),
             GroundNorm::Sup => GroundMetric::Sup,
         }
     }

@@ -1,6 +1,7 @@
 //! The requests: their fields, their defaults, and every rule they must satisfy. No mathematics.
 
 pub mod annualised;
+pub mod asset_history;
 pub mod assets;
 pub mod backtest;
 pub mod backtest_assets;

@@ -1,6 +1,7 @@
 //! Every rule a specification must satisfy, checked before any work.
 
 use crate::control::error::FieldError;
+use crate::control::request::asset_history::LARGEST_LOG_RETURN;
 use crate::control::request::bounds::{Bounded, FieldBounds, ValueBounds};
 pub use crate::control::request::bounds::{interval, whole, within};
 use crate::control::request::contributions::Contributions;
@@ -22,8 +23,8 @@ pub const COUNT: std::ops::RangeInclusive<usize> = 10..=10_000;
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Allowed number of log-returns in a history.
 pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
-/// Largest log-return in absolute value: a factor of 148 in one step.
-pub const LOG_RETURN: f64 = 5.0;
+/// Largest log-return in absolute value.
+pub const LOG_RETURN: f64 = LARGEST_LOG_RETURN;
 /// Allowed simple returns: those whose log-returns are allowed.
 pub const SIMPLE_RETURN: (f64, f64) = (-0.993_262_053_000_914_5, 147.413_159_102_576_6);
 /// Largest number of simulated returns in the design: 800 MB.

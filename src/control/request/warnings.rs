@@ -9,6 +9,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::control::request::annualised::{self, compounded};
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::centre_rules::LEAST_LIKE;
 use crate::control::request::specification::ProblemSpecification;
@@ -73,6 +74,8 @@ pub enum WarningCode {
     TailHeavy,
     /// One return of the record lies more than 4 times as far from the median as any other.
     LoneReturn,
+    /// An asset has no returns in the first periods of the record, so they are estimated.
+    EstimatedReturns,
     /// At the bandwidth of a conditional centre fewer than 30 returns count, so it is widened.
     FewAlike,
     /// A formula of a declared problem jumps as a state or the noise moves.
@@ -224,6 +227,26 @@ impl ProblemSpecification {
         .into_iter()
         .flatten()
         .collect()
+    }
+}
+
+impl AssetHistory {
+    /// Says which assets' early returns are estimated.
+    ///
+    /// Checked by: `tests/solver/unequal_records.rs::a_young_asset_is_named_in_a_warning`.
+    pub fn warning(&self, names: &[String]) -> Option<Warning> {
+        let of = |(name, missing): (&String, &usize)| {
+            (*missing > 0).then(|| format!("{} of {} returns of {name}", self.len() - missing, self.len()))
+        };
+        let young: Vec<String> = names.iter().zip(self.missing()).filter_map(of).collect();
+        let text = || {
+            format!(
+                "holds {}; those before are estimated by regression on the assets with longer records, and their law \
+                 counts as less certain",
+                young.join(", ")
+            )
+        };
+        (!young.is_empty()).then(|| warning(WarningCode::EstimatedReturns, "problem.history", text()))
     }
 }
 

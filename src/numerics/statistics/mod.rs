@@ -7,3 +7,4 @@ pub mod moving_mean;
 pub mod shrinkage;
 pub mod summary;
 pub mod tail_index;
+pub mod unequal_records;

@@ -102,7 +102,10 @@ struct CheckedAssets {
 impl AssetsAdvised {
     fn of(problem: &AssetsProblem, holdings: &[f64], fund: &OnePeriod) -> Result<Self, FieldError> {
         let (advice, why_nothing) = AssetsAdvice::of(problem, holdings, fund)?;
-        let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
+        let estimated = problem.history.warning(&problem.assets);
+        let (annualised, warnings) =
+            (fund.problem().annualised(), fund.problem().warnings().into_iter().chain(estimated));
+        let warnings = warnings.collect();
         Ok(AssetsAdvised { advice, why_nothing, annualised, warnings })
     }
 }

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 
 use crate::control::assets::fund::Fund;
 use crate::control::problem::dynamics::Dynamics;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::means::MeansRule;
 use crate::service::entries::periods::{Periods, ReplayedPeriod};
 use crate::service::entries::record::SessionRecord;
@@ -61,8 +62,13 @@ impl FixedShares {
             Some(assets) => assets.fund.holdings.clone(),
             None => vec![start.state.holding],
         };
-        let fund =
-            Fund { rows: Vec::new(), means: MeansRule::default(), before: composition.clone(), composition, holdings };
+        let fund = Fund {
+            rows: AssetHistory::default(),
+            means: MeansRule::default(),
+            before: composition.clone(),
+            composition,
+            holdings,
+        };
         FixedShares { wealth: Some(start.state.wealth), fund, total, sold: 0.0 }
     }
 

@@ -20,7 +20,7 @@ use crate::service::error::ServiceError;
 use crate::service::process::memory::Large;
 use crate::service::sessions::Sessions;
 use crate::service::sessions::account_state::AccountState;
-use crate::service::sessions::assets::Composition;
+use crate::service::sessions::assets::{Composition, PlannedAssets};
 use crate::service::sessions::content::{answer, content};
 use crate::service::sessions::initial_history::InitialHistory;
 use crate::service::sessions::plan::{Renew, Renewed, SessionPlan};
@@ -174,12 +174,11 @@ impl Sessions {
             Read::Declared(history) => return Ok(Large { value: HistoryAnswer::Declared(history.into()), room }),
         };
         let first = periods.first_changed();
-        let changed = match first < periods.all.len() {
-            true => {
-                turn.begin().await?;
-                self.changed(tenant, session, &periods, first).await?
-            }
-            false => Vec::new(),
+        let changed = if first < periods.all.len() {
+            turn.begin().await?;
+            self.changed(tenant, session, &periods, first).await?
+        } else {
+            Vec::new()
         };
         let SessionPlan { terms, assets, .. } = SessionPlan::of(&facts.row)?;
         let start = periods.at_start().account()?.clone().with_law(terms.learning).state;
@@ -191,6 +190,7 @@ impl Sessions {
         let (observations, (corrections, renewals), record, row) = self.apart(tenant, is_large, listing).await??;
         let first = self.policies.advisor(tenant, &row.policy).await?;
         let initial_radius = self.advising.run(tenant, move || first.radius(&start)).await?;
+        let missing = assets.as_ref().map(PlannedAssets::missing);
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
         let SessionRow { session, policy, account, initial_history: history, .. } = row;
         let InitialAccount { wealth, holding } =
@@ -202,8 +202,8 @@ impl Sessions {
             initial_wealth: wealth,
             initial_holding: holding,
             initial_radius,
-            history: InitialHistory::of(history, assets.as_ref().map(Vec::len)),
-            record: InitialHistory::of(record.all().to_vec(), assets.as_ref().map(|_| record.assets())),
+            history: InitialHistory::of(history, missing),
+            record: record.shown(),
             assets,
             composed,
             observations,

@@ -1,8 +1,12 @@
 //! All that was observed of the noise of a session, date by date.
 
+use std::borrow::Cow;
+
 use crate::control::problem::state::LEAST_LEARNED;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::assets::DATES;
 use crate::control::request::rules;
+use crate::service::sessions::initial_history::InitialHistory;
 
 /// The noise of a period: the log-returns of the assets, or the one noise of a declared problem in the unit of the
 /// solver.
@@ -42,15 +46,23 @@ impl PeriodNoise {
 pub struct SessionRecord {
     assets: usize,
     values: Vec<f64>,
+    /// The number of dates before each asset's first return, whose values were filled in.
+    missing: Vec<usize>,
     /// The period of each date; 0 for the last date of the initial history, -1 for the one before, and so on.
     dates: Vec<i64>,
 }
 
 impl SessionRecord {
-    /// Builds the record of so many assets, at least one, from an initial history.
-    pub(in crate::service) fn new(assets: usize, values: Vec<f64>) -> Self {
-        let dates = values.len() / assets;
-        SessionRecord { assets, values, dates: (1 - dates as i64..=0).collect() }
+    /// Builds the record of one asset or another noise from an initial history.
+    pub(in crate::service) fn new(values: Vec<f64>) -> Self {
+        SessionRecord::of_assets(values, vec![0])
+    }
+
+    /// Builds the record of several assets from an initial history, date after date, with the number of dates before the
+    /// first return of each.
+    pub(in crate::service) fn of_assets(values: Vec<f64>, missing: Vec<usize>) -> Self {
+        let dates = values.len() / missing.len();
+        SessionRecord { assets: missing.len(), values, missing, dates: (1 - dates as i64..=0).collect() }
     }
 
     /// Appends the returns of a period, if there is one of every asset.
@@ -66,9 +78,13 @@ impl SessionRecord {
         self.dates.push(date);
     }
 
-    /// Returns each date with its row.
-    pub(in crate::service) fn dated(&self) -> impl Iterator<Item = (i64, &[f64])> {
-        self.dates.iter().copied().zip(self.values.chunks_exact(self.assets))
+    /// Returns each date with its returns, `None` before an asset's first one.
+    pub(in crate::service) fn dated(&self) -> impl Iterator<Item = (i64, Vec<Option<f64>>)> {
+        let row = |(number, (date, row)): (usize, (i64, &[f64]))| {
+            let own = row.iter().zip(&self.missing);
+            (date, own.map(|(value, missing)| (number >= *missing).then_some(*value)).collect())
+        };
+        self.dates.iter().copied().zip(self.values.chunks_exact(self.assets)).enumerate().map(row)
     }
 
     /// Returns the number of assets.
@@ -81,15 +97,41 @@ impl SessionRecord {
         &self.values
     }
 
-    /// Returns those of the last `window` dates, at most as many as a history may hold.
-    pub(in crate::service) fn last(&self, window: Option<usize>) -> &[f64] {
+    /// Returns those of the last `window` dates, at most as many as a history may hold, NaN before an asset's first one.
+    pub(in crate::service) fn last(&self, window: Option<usize>) -> Cow<'_, [f64]> {
         let longest = if self.assets > 1 { DATES } else { rules::HISTORY_LENGTH };
         let most = window.unwrap_or(usize::MAX).min(*longest.end()) * self.assets;
-        &self.values[self.values.len().saturating_sub(most)..]
+        let first = self.values.len().saturating_sub(most);
+        let values = &self.values[first..];
+        if self.missing.iter().all(|missing| *missing <= first / self.assets) {
+            return values.into();
+        }
+        let own = |(place, value): (usize, &f64)| {
+            let is_missing = (first + place) / self.assets < self.missing[place % self.assets];
+            if is_missing { f64::NAN } else { *value }
+        };
+        values.iter().enumerate().map(own).collect()
     }
 
-    /// Splits the values into one row for each date.
-    pub(in crate::service) fn rows_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
+    /// Returns all returns of several assets.
+    pub(in crate::service) fn returns(&self) -> AssetHistory {
+        AssetHistory::filled(self.rows_of(&self.values), self.missing.clone())
+    }
+
+    /// Returns those of the last `window` dates of several assets, as if they were the whole record.
+    pub(in crate::service) fn last_returns(&self, window: Option<usize>) -> AssetHistory {
+        AssetHistory::marked(self.rows_of(&self.last(window)))
+    }
+
+    /// Returns all returns as answers show them.
+    pub(in crate::service) fn shown(&self) -> InitialHistory {
+        match self.assets {
+            1 => InitialHistory::One(self.values.clone()),
+            _ => InitialHistory::Several(self.returns()),
+        }
+    }
+
+    fn rows_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
         values.chunks_exact(self.assets).map(<[f64]>::to_vec).collect()
     }
 }

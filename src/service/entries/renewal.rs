@@ -164,7 +164,7 @@ fn go_on(periods: &Periods, plan: &SessionPlan, onto: &Advisor, renew: &Renew) -
     let terms = plan.terms(onto, dates, observed);
     let terms = terms.map_err(|rule| FieldError::new("policy", &renew.policy, rule))?;
     let standing = standing.account()?.renewed(&record, window, &terms, change.as_ref())?;
-    accepts(onto, record.last(window), &standing)?;
+    accepts(onto, &record.last(window), &standing)?;
     let standing = SessionState::Account(standing.into());
     Ok(Continuation { standing, terms, next: NextPolicy::Account(change) })
 }

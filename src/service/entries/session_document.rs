@@ -167,7 +167,7 @@ impl ExportedStart {
         let assets = plan.assets.as_ref();
         let is_investor = plan.problem.is_none();
         let history = (is_investor && self.history != own)
-            .then(|| InitialHistory::of(self.history.clone(), assets.map(|assets| assets.names.len())));
+            .then(|| InitialHistory::of(self.history.clone(), assets.map(|assets| assets.missing())));
         SessionStart {
             policy: self.policy.clone(),
             history,

@@ -77,10 +77,13 @@ impl AccountState {
         row: &SessionRow,
         plan: &SessionPlan,
     ) -> Result<(Self, SessionRecord), ServiceError> {
-        let columns = plan.assets.as_ref().map_or(1, |assets| assets.names.len());
-        let record = SessionRecord::new(columns, row.initial_history.clone());
-        let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed }| {
-            Assets::with_composition(names, record.rows_of(record.all()), plan.terms.means, composed).map(Box::new)
+        let history = row.initial_history.clone();
+        let record = match &plan.assets {
+            Some(assets) => SessionRecord::of_assets(history, assets.missing()),
+            None => SessionRecord::new(history),
+        };
+        let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed, .. }| {
+            Assets::with_composition(names, record.returns(), plan.terms.means, composed).map(Box::new)
         });
         let assets = assets.transpose()?;
         let learning = plan.terms.learning;
@@ -124,7 +127,7 @@ impl AccountState {
         let mut assets = self.assets.clone();
         let state = match &mut assets {
             Some(assets) => {
-                let rows = record.rows_of(last);
+                let rows = record.last_returns(window);
                 check_rows(
                     change.map_or("history", |_| "records"),
                     &rows,
@@ -139,10 +142,10 @@ impl AccountState {
                 assets.fund.means = terms.means;
                 assets.fund.renew(rows, terms.learning, self.state.wealth, holding)
             }
-            None => State::new(last, self.state.wealth, terms.learning)?.with_holding(self.state.holding)?,
+            None => State::new(&last, self.state.wealth, terms.learning)?.with_holding(self.state.holding)?,
         };
         let seen = match &assets {
-            Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
+            Some(_) => Some(Assets::means(&record.returns())),
             None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
         };
         let AccountState { price, days, bet, .. } = *self;

@@ -93,12 +93,12 @@ impl AssetChange {
 
     /// Returns the dates of `record` on which every asset has a return.
     pub(in crate::service) fn record(&self, record: &SessionRecord) -> SessionRecord {
-        let mut changed = SessionRecord::new(self.columns.len(), Vec::new());
+        let mut changed = SessionRecord::of_assets(Vec::new(), vec![0; self.columns.len()]);
         for (date, row) in record.dated() {
             // Dates are numbers of periods, and 0 or less for the history.
             let ago = usize::try_from(self.observed as i64 - date).unwrap_or(usize::MAX);
             let of = |column: &ReturnSource| match column {
-                ReturnSource::Kept(index) => Some(row[*index]),
+                ReturnSource::Kept(index) => row[*index],
                 ReturnSource::Entering(values) => *values.get(values.len().checked_sub(ago.checked_add(1)?)?)?,
             };
             let joint: Option<Vec<f64>> = self.columns.iter().map(of).collect();

@@ -11,6 +11,7 @@ use crate::control::assets::fund::Fund;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::state::State;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::by_name::by_name;
 use crate::control::request::fund::CompositionRule;
 use crate::control::request::means::MeansRule;
@@ -60,13 +61,22 @@ pub struct Composition {
 pub struct PlannedAssets {
     pub(in crate::service) names: Vec<String>,
     pub(in crate::service) composed: Composition,
+    /// The number of dates of the history before each asset's first return; empty if it is 0 for all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    missing: Vec<usize>,
 }
 
 impl PlannedAssets {
+    /// Returns the number of dates of the history before each asset's first return.
+    pub(in crate::service) fn missing(&self) -> Vec<usize> {
+        if self.missing.is_empty() { vec![0; self.names.len()] } else { self.missing.clone() }
+    }
+
     /// Returns true if these are the same assets and holdings, whatever the composition is.
     pub(in crate::service) fn is_like(&self, other: &PlannedAssets) -> bool {
         let (own, shares) = (&self.composed.composition, &other.composed.composition);
         self.names == other.names
+            && self.missing == other.missing
             && self.composed.holdings == other.composed.holdings
             && own.keys().eq(shares.keys())
             && shares.values().all(|share| (0.0..=WHOLE).contains(share))
@@ -95,7 +105,7 @@ impl Assets {
     /// The holdings are not shares of wealth in these assets.
     pub(in crate::service) fn at(
         names: &[String],
-        rows: Vec<Vec<f64>>,
+        rows: AssetHistory,
         means: MeansRule,
         holdings: Option<&BTreeMap<String, f64>>,
     ) -> Result<Self, FieldError> {
@@ -114,7 +124,7 @@ impl Assets {
     /// The answer names other assets.
     pub(in crate::service) fn with_composition(
         names: &[String],
-        rows: Vec<Vec<f64>>,
+        rows: AssetHistory,
         means: MeansRule,
         reported: &Composition,
     ) -> Result<Self, FieldError> {
@@ -135,7 +145,9 @@ impl Assets {
 
     /// Returns the assets as the start of a session stores them.
     pub(in crate::service) fn planned(&self) -> PlannedAssets {
-        PlannedAssets { names: self.names.to_vec(), composed: self.composed() }
+        let rows = &self.fund.rows;
+        let missing = if rows.are_equal() { Vec::new() } else { rows.missing().to_vec() };
+        PlannedAssets { names: self.names.to_vec(), composed: self.composed(), missing }
     }
 
     /// Returns the assets as answers show them.

@@ -6,22 +6,29 @@ use serde::de::{Error, SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::request::asset_history::AssetHistory;
+
 /// Log-returns known at the start of a session, oldest first.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum InitialHistory {
     /// Returns of one asset.
     One(Vec<f64>),
-    /// Rows of several assets, one row a date; each row has one number for each asset.
-    Several(Vec<Vec<f64>>),
+    /// Rows of several assets, one row a date; each row has one number for each asset, null before its first return.
+    #[schema(value_type = Vec<Vec<Option<f64>>>)]
+    Several(AssetHistory),
 }
 
 impl InitialHistory {
-    /// Builds the history of one asset, or of so many from values date after date.
-    pub(in crate::service) fn of(values: Vec<f64>, assets: Option<usize>) -> Self {
-        match assets {
+    /// Builds the history of one asset, or of several from values date after date and the number of dates before the first
+    /// return of each.
+    pub(in crate::service) fn of(values: Vec<f64>, missing: Option<Vec<usize>>) -> Self {
+        match missing {
             None => InitialHistory::One(values),
-            Some(assets) => InitialHistory::Several(values.chunks_exact(assets).map(<[f64]>::to_vec).collect()),
+            Some(missing) => {
+                let rows = values.chunks_exact(missing.len()).map(<[f64]>::to_vec).collect();
+                InitialHistory::Several(AssetHistory::filled(rows, missing))
+            }
         }
     }
 
@@ -42,19 +49,25 @@ impl<'de> Deserialize<'de> for InitialHistory {
         if rows > 0 && rows < dates.len() {
             return Err(D::Error::custom("must be numbers or rows of numbers, not both"));
         }
-        let of = |date: Date| match date {
-            Date::Number(value) => vec![value],
-            Date::Row(values) => values,
+        let row = |date: &Date| match date {
+            Date::Number(_) => None,
+            Date::Row(values) => Some(values.clone()),
         };
-        let read: Vec<Vec<f64>> = dates.into_iter().map(of).collect();
-        Ok(if rows > 0 { InitialHistory::Several(read) } else { InitialHistory::One(read.concat()) })
+        let number = |date: &Date| match date {
+            Date::Number(value) => Some(*value),
+            Date::Row(_) => None,
+        };
+        Ok(match rows {
+            0 => InitialHistory::One(dates.iter().filter_map(number).collect()),
+            _ => InitialHistory::Several(AssetHistory::new(&dates.iter().filter_map(row).collect::<Vec<_>>())),
+        })
     }
 }
 
 /// The log-returns of a date.
 enum Date {
     Number(f64),
-    Row(Vec<f64>),
+    Row(Vec<Option<f64>>),
 }
 
 impl<'de> Deserialize<'de> for Date {
@@ -81,7 +94,7 @@ impl<'de> Deserialize<'de> for Date {
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, row: A) -> Result<Date, A::Error> {
-                Vec::<f64>::deserialize(SeqAccessDeserializer::new(row)).map(Date::Row)
+                Vec::<Option<f64>>::deserialize(SeqAccessDeserializer::new(row)).map(Date::Row)
             }
         }
 

@@ -82,7 +82,7 @@ impl ProblemState {
             session: row.session.as_str().into(),
             formulas,
         };
-        Ok((start, SessionRecord::new(1, history)))
+        Ok((start, SessionRecord::new(history)))
     }
 
     /// Returns the number of noises known.

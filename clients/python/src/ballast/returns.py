@@ -98,8 +98,8 @@ class Read(NamedTuple):
 
     #: A sentence that says what was read, for a person to check.
     sentence: str
-    #: Log-returns, a list for each asset.
-    series: list[list[float]]
+    #: Log-returns, a list for each asset, ``None`` before its first one.
+    series: list[list[Any]]
     kind: wire.Kind
     dates: list[str] | None = None
     periods_per_year: int | None = None
@@ -109,7 +109,7 @@ class Read(NamedTuple):
     is_turned: bool = False
 
     @property
-    def rows(self) -> list[list[float]]:
+    def rows(self) -> list[list[float | None]]:
         """Returns a row for each period."""
         return [list(row) for row in zip(*self.series, strict=True)]
 
@@ -137,7 +137,7 @@ async def read(
     series, paid = reading["series"], reading.get("rate")
     return Read(
         reading["sentence"],
-        [one["log_returns"] for one in series],
+        [[None] * one.get("missing", 0) + one["log_returns"] for one in series],
         series[0]["kind"],
         reading.get("dates"),
         reading.get("periods_per_year"),

@@ -30,13 +30,13 @@ class Annualised(TypedDict):
 Asset: TypeAlias = str
 
 
-LogReturnItem: TypeAlias = float
+LogReturnItem: TypeAlias = float | None
 
 
 LogReturn: TypeAlias = list[LogReturnItem]
 
 
-SimpleReturnItem: TypeAlias = float
+SimpleReturnItem: TypeAlias = float | None
 
 
 SimpleReturn: TypeAlias = list[SimpleReturnItem]
@@ -73,7 +73,7 @@ class AssetsPeriods(TypedDict):
 ActionIntervalItem: TypeAlias = float
 
 
-HistoryItemItem: TypeAlias = float
+HistoryItemItem: TypeAlias = float | None
 
 
 HistoryItem: TypeAlias = list[HistoryItemItem]
@@ -656,7 +656,7 @@ class FrontierPoint(TypedDict):
 Scale: TypeAlias = float
 
 
-HistoryItem2Item: TypeAlias = float
+HistoryItem2Item: TypeAlias = float | None
 
 
 HistoryItem2: TypeAlias = list[HistoryItem2Item]
@@ -786,7 +786,7 @@ InitialHistories: TypeAlias = InitialHistories1 | InitialHistories2
 """Histories that paths start from."""
 
 
-InitialHistory: TypeAlias = list[float] | list[list[float]]
+InitialHistory: TypeAlias = list[float] | list[list[float | None]]
 """Log-returns known at the start of a session, oldest first."""
 
 
@@ -2121,7 +2121,7 @@ class WantedSpending(TypedDict):
     """
 
 
-WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "inflation_high", "tail_heavy", "lone_return", "few_alike", "jumps"]
+WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high", "inflation_high", "tail_heavy", "lone_return", "estimated_returns", "few_alike", "jumps"]
 """Kind of a warning."""
 
 
@@ -2303,8 +2303,8 @@ class AssetsBacktestRequest(TypedDict):
     """Names of the assets, 2 to 30, all different, in the order of the columns."""
     log_returns: NotRequired[list[LogReturn] | None]
     """
-    Log-returns of the assets, oldest first, without gaps; each period has one value for each asset. Exactly one of
-    this and `simple_returns` is given.
+    Log-returns of the assets, oldest first, without gaps; each period has one value for each asset, null before the
+    asset's first return. Exactly one of this and `simple_returns` is given.
     """
     simple_returns: NotRequired[list[SimpleReturn] | None]
     """Simple returns of the assets, `price / previous price - 1`, in the same layout as `log_returns`."""
@@ -2455,7 +2455,10 @@ class AssetsProblem(TypedDict):
     caution: NotRequired[CautionLevel | None]
     support: NotRequired[Support | None]
     history: list[HistoryItem]
-    """Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset."""
+    """
+    Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset, null before the asset's
+    first return. What such an asset would have earned then follows from the assets with longer records, by regression.
+    """
 
 
 class BacktestFigures(Performance):
@@ -2563,6 +2566,8 @@ class Choices(TypedDict):
     """If true, numbers in several columns are one record, read line by line"""
     gaps: NotRequired[bool | None]
     """If true, a record with missing periods is accepted as it is, without the rows that have no number"""
+    unequal: NotRequired[bool | None]
+    """If true, columns that begin later than others keep their own beginning; if false, the older rows of all are left out"""
     unusual: NotRequired[bool | None]
     """
     If true, numbers that are unusual for an asset are right: a deviation above 30 % a period or 150 % a year, a
@@ -2817,7 +2822,7 @@ class FundSpecification(TypedDict):
     on the sample size alone.
     """
     history: list[HistoryItem2]
-    """Log-returns by date, oldest first; each date has one value for each asset."""
+    """Log-returns by date, oldest first; each date has one value for each asset, null before its first return."""
 
 
 class Futures(TypedDict):
@@ -3019,8 +3024,11 @@ class Problem(TypedDict):
     radius: NotRequired[RadiusRule | None]
     caution: NotRequired[CautionLevel | None]
     support: NotRequired[Support | None]
-    history: list[list[float]]
-    """Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset."""
+    history: list[list[float | None]]
+    """
+    Log-returns by date, oldest first, 2 to 10,000 dates; each date has one value for each asset, null before the asset's
+    first return. What such an asset would have earned then follows from the assets with longer records, by regression.
+    """
 
 
 class PlanQuestionAssetsProblem(TypedDict):
@@ -3208,6 +3216,8 @@ class Series(TypedDict):
     kind: Kind
     """The kind of the numbers in the column."""
     unit: NotRequired[Unit | None]
+    missing: NotRequired[int]
+    """The number of periods of the record before its first return."""
     log_returns: list[float]
     """Log-returns, as the service accepts them."""
     mean: float
@@ -4317,7 +4327,7 @@ class Record(TypedDict):
     columns: list[ColumnFound]
     """All columns of the text."""
     series: list[Series]
-    """The columns that were read, all of one length."""
+    """The columns that were read. They end together, and one may begin later."""
     count: int
     """The number of returns in the text; the series hold fewer if `latest` limits them."""
     dates: NotRequired[list[str] | None]

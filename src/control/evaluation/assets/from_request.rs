@@ -99,7 +99,7 @@ impl AssetsBacktest {
     /// Returns warnings about likely mistakes, judged on the inverse-volatility fund over the first periods that are
     /// decided. Fields are named as in `request`.
     pub fn warnings(&self, request: &AssetsBacktestRequest) -> Vec<Warning> {
-        let rows = self.record.known(self.first, self.choices.windows.iter().copied().flatten().max());
+        let rows = &self.record.known(self.first, self.choices.windows.iter().copied().flatten().max());
         let returns = fund_returns(&self.choices.means.applied(rows), &inverse_volatility(rows));
         let problem = ProblemSpecification {
             periods_per_year: Some(self.record.periods_per_year as f64),
@@ -107,7 +107,8 @@ impl AssetsBacktest {
             support: Some(self.choices.support),
             ..ProblemSpecification::of(returns, self.record.bank[self.first - 1])
         };
-        problem.warnings().into_iter().map(|warning| warning.of_walk(request.returns().0)).collect()
+        let estimated = rows.warning(&self.record.assets);
+        problem.warnings().into_iter().chain(estimated).map(|warning| warning.of_walk(request.returns().0)).collect()
     }
 }
 

@@ -24,6 +24,7 @@ use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::pool;
 use crate::control::progress::Watch;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::assets::{AssetsProblem, check_names, check_rows};
 use crate::control::request::backtest::{too_long, usual_window};
 use crate::control::request::backtest_assets::StrategyFamily;
@@ -48,7 +49,7 @@ pub struct AssetsRecord {
     /// Names of the assets.
     pub assets: Vec<String>,
     /// Log-returns, one row per period and one column per asset.
-    pub rows: Vec<Vec<f64>>,
+    pub rows: AssetHistory,
     /// Simple returns of the bank.
     pub bank: Vec<f64>,
     /// Dates, with the precision of the frequency.
@@ -107,8 +108,8 @@ pub struct AssetsWalked {
 
 impl AssetsRecord {
     /// Returns the log-returns before `period` that are within a window.
-    fn known(&self, period: usize, window: Option<usize>) -> &[Vec<f64>] {
-        &self.rows[window.map_or(0, |window| period.saturating_sub(window))..period]
+    fn known(&self, period: usize, window: Option<usize>) -> AssetHistory {
+        self.rows.of(window.map_or(0, |window| period.saturating_sub(window))..period)
     }
 }
 
@@ -132,7 +133,7 @@ impl AssetsBacktest {
         let support = Some(backtest.choices.support);
         for window in &backtest.choices.windows {
             for start in backtest.starts() {
-                let known = backtest.record.known(start, *window);
+                let known = &backtest.record.known(start, *window);
                 check_rows("simple_returns", known, &backtest.record.assets, support).map_err(|error| {
                     let rule = format!("{}, in the {} periods before period {}", error.rule, known.len(), start + 1);
                     FieldError::new(error.field, error.value, rule)
@@ -295,7 +296,7 @@ impl AssetsBacktest {
             support: Some(self.choices.support),
             ..ProblemSpecification::of(Vec::new(), self.record.bank[period - 1])
         };
-        let rows = self.record.known(period, window).to_vec();
+        let rows = self.record.known(period, window);
         let (means, limits) = (self.choices.means, self.choices.limits.clone());
         AssetsProblem { means, limits, ..asked_of(self.record.assets.clone(), rows, &specification) }
     }
@@ -372,7 +373,10 @@ mod tests {
     fn record(assets: usize, periods: usize, of: impl Fn(usize, usize) -> f64) -> AssetsRecord {
         AssetsRecord {
             assets: (0..assets).map(|asset| format!("asset {asset}")).collect(),
-            rows: (0..periods).map(|period| (0..assets).map(|asset| of(asset, period)).collect()).collect(),
+            rows: (0..periods)
+                .map(|period| (0..assets).map(|asset| of(asset, period)).collect())
+                .collect::<Vec<_>>()
+                .into(),
             bank: vec![BANK; periods],
             dates: (0..periods).map(|period| period.to_string()).collect(),
             frequency: Frequency::Quarterly,
@@ -550,7 +554,7 @@ mod tests {
             message(record(30), AssetsChoices { every: 0, ..usual.clone() }),
             "every is 0: must lie in [1, 10000]"
         );
-        let still = AssetsRecord { rows: vec![vec![0.01, 0.02]; 30], ..record(30) };
+        let still = AssetsRecord { rows: vec![vec![0.01, 0.02]; 30].into(), ..record(30) };
         let still = message(still, usual.clone());
         assert!(still.contains("must vary") && still.ends_with("in the 8 periods before period 9"), "{still}");
         let alike = AssetsRecord { assets: vec!["a".into(), "a".into()], ..record(30) };

@@ -18,6 +18,7 @@ use crate::control::evaluation::yearly_worth::INITIAL_WEALTH;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::problem::state::State;
 use crate::control::progress::Watch;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::specification::{DesignSpecification, InitialLaws, Specification, SurrogateSpecification};
 use crate::control::request::terms::Terms;
@@ -94,10 +95,11 @@ impl WalkState {
     }
 
     /// Returns the fund and the state, renewed with the returns `rows`.
-    fn renewed(&self, rows: Vec<Vec<f64>>) -> (Fund, State) {
+    fn renewed(&self, rows: AssetHistory) -> (Fund, State) {
         let (composition, holdings) = (self.composition.clone(), self.holdings.clone());
         let means = self.specification.means();
-        let mut fund = Fund { rows: Vec::new(), means, before: composition.clone(), composition, holdings };
+        let mut fund =
+            Fund { rows: AssetHistory::default(), means, before: composition.clone(), composition, holdings };
         let state = fund.renew(rows, self.specification.problem.learning, self.wealth, self.holding);
         (fund, state)
     }
@@ -112,7 +114,7 @@ impl FundWalk<'_> {
     /// Returns the training of the last policy as if the fund of inverse volatilities were its only asset, for estimates
     /// of its size.
     pub fn last_of_fund(&self) -> Option<Specification> {
-        let history = self.record.known(self.starts().last()?, self.window).to_vec();
+        let history = self.record.known(self.starts().last()?, self.window);
         let problem = AssetsProblem { history, ..self.problem.clone() }.of_fund();
         let design = DesignSpecification { initial_laws: InitialLaws::Resampled, ..self.design.clone() };
         Specification { design, ..Specification::of(problem, self.seed) }.completed().ok()
@@ -149,7 +151,7 @@ impl FundWalk<'_> {
         before: Option<&WalkState>,
         (watch, kept): (&Watch, Cache),
     ) -> Result<WalkedTenure, TrainError> {
-        let rows = self.record.known(start, self.window).to_vec();
+        let rows = self.record.known(start, self.window);
         let specification = self.specification(start, before, &rows)?;
         let policy = Training::with(&specification, kept.clone())?.run(watch)?;
         let advisor = Advisor::with(policy, kept);
@@ -184,11 +186,11 @@ impl FundWalk<'_> {
         &self,
         start: usize,
         before: Option<&WalkState>,
-        rows: &[Vec<f64>],
+        rows: &AssetHistory,
     ) -> Result<Specification, FieldError> {
         match before {
             Some(WalkState { specification, wealth, .. }) => {
-                specification.next(&rows.concat(), Some(self.record.bank[start - 1]), *wealth, 0)
+                specification.next(&rows.as_given().concat(), Some(self.record.bank[start - 1]), *wealth, 0)
             }
             None => self.problem.training(self.design.clone(), SurrogateSpecification::default(), self.seed),
         }

@@ -10,6 +10,7 @@ use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::compositions::CompositionSet;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
+use crate::control::request::asset_history::AssetHistory;
 use crate::control::request::backtest_assets::StrategyFamily;
 use crate::control::request::caution::CautionLevel;
 use crate::control::request::fund::GroundNorm;
@@ -162,7 +163,7 @@ impl AssetsStrategy {
             if is_start && period > first {
                 done();
             }
-            let rows = backtest.record.known(period, self.window);
+            let rows = &backtest.record.known(period, self.window);
             let compositions = backtest.compositions(held.last().map(|shares: &Vec<f64>| (period, shares)));
             let mut solved = |norm: GroundNorm, caution: CautionLevel| {
                 let step = step(backtest, period, rows, norm, balls[stretch].radius_at(caution));
@@ -223,13 +224,19 @@ fn nearest(compositions: Option<&CompositionSet>, shares: Vec<f64>) -> Vec<f64> 
 }
 
 /// Returns the one-step problem before a period. The bank is assumed to keep paying its last rate.
-fn step(backtest: &AssetsBacktest, period: usize, rows: &[Vec<f64>], norm: GroundNorm, radius: f64) -> PortfolioStep {
+fn step(
+    backtest: &AssetsBacktest,
+    period: usize,
+    known: &AssetHistory,
+    norm: GroundNorm,
+    radius: f64,
+) -> PortfolioStep {
     let rate = backtest.record.bank[period - 1];
     // Under power and log utility the solution does not depend on wealth.
     let utility = RelativeUtility::new(backtest.utility(), 1.0 + rate);
-    let rows = &backtest.choices.means.applied(rows);
+    let rows = &backtest.choices.means.applied(known);
     let law = ReturnScenarios { returns: rows, radius, floors: floors(backtest.choices.support, rows) };
-    PortfolioStep::new(law, norm.at(rows), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
+    PortfolioStep::new(law, norm.at(rows, known), utility, rate, ActionInterval { lowest: 0.0, highest: 1.0 })
 }
 
 /// Returns the covariance of log-returns, given date by date.

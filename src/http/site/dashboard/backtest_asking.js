@@ -7,7 +7,7 @@ import { fieldset, input, refusal, select, sending } from "./form.js";
 import { fraction, typed } from "./number_text.js";
 import { OWN_FIELD, ownFormula } from "./own_formula.js";
 import { unitOf } from "./periods.js";
-import { returnsField } from "./returns_field.js";
+import { byDate, returnsField } from "./returns_field.js";
 import { INVESTORS, investorChoices, investorNote, meant } from "./specification.js";
 import { CAUTIONS } from "./train_fields.js";
 
@@ -105,7 +105,7 @@ function asking() {
   const compose = () => {
     const { series, dates } = record;
     const request = isSeveral()
-      ? { assets: series.map(({ column }) => column), log_returns: series[0].log_returns.map((_, date) => series.map(({ log_returns }) => log_returns[date])), dates }
+      ? { assets: series.map(({ column }) => column), log_returns: byDate(series), dates }
       : { log_returns: series[0].log_returns, dates };
     request.rate = bank.read(a_year()) ?? record.rate?.rates;
     request.risk_aversion = investor.control.value === OWN ? typed(text(aversion)) : INVESTORS[investor.control.value];

@@ -268,8 +268,14 @@ function offered({ rate: { column, rates }, periods_per_year }, bank) {
   return h("p", {}, h("button", { type: "button", class: "quiet", onclick: use }, label));
 }
 
+/** Returns the log-returns of columns date by date, null before the first of a column. */
+export function byDate(series) {
+  const [{ missing = 0, log_returns }] = series;
+  return Array.from({ length: missing + log_returns.length }, (_, date) => series.map(({ missing = 0, log_returns }) => log_returns[date - missing] ?? null));
+}
+
 function picture({ series, dates }) {
-  const [values, ...others] = series.map(({ log_returns }) => log_returns.map(Math.expm1));
+  const [values, ...others] = series.map(({ missing = 0, log_returns }) => [...Array(missing).fill(null), ...log_returns.map(Math.expm1)]);
   const at = (index) => (index < values.length ? (dates?.[index] ?? String(index + 1)) : "");
   return lineChart({
     title: `Returns read, ${at(0)} to ${at(values.length - 1)}`,

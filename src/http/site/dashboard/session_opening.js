@@ -8,7 +8,7 @@ import { moment, short } from "./format.js";
 import { labelFields } from "./naming.js";
 import { fraction, pointed, typed } from "./number_text.js";
 import { all } from "./pages.js";
-import { returnsField } from "./returns_field.js";
+import { byDate, returnsField } from "./returns_field.js";
 import { isDeclared } from "./specification.js";
 
 export async function view(query, leaving) {
@@ -123,7 +123,7 @@ function opening(policies, asked, leaving) {
       const typedIn = Object.keys(states).map((name, index) => [name, begins.querySelectorAll("input")[index].value.trim()]);
       if (typedIn.some(([, text]) => text !== "")) request.state = Object.fromEntries(typedIn.map(([name, text]) => [name, text === "" ? states[name].start : pointed(text)]));
     }
-    if (!states && known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
+    if (!states && known.length > 0) request.history = assets ? byDate(inOrder(known, assets)) : known[0].log_returns;
     const wealth = states ? null : typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
     const share = (text) => fraction(text) ?? text.trim();
@@ -144,11 +144,10 @@ function opening(policies, asked, leaving) {
   return drafts.isKept ? [drafts.note(again), form] : form;
 }
 
-/** Arranges returns date by date, in the order of `assets`, or in that of the columns if their names are not those of the assets. */
-function byDate(series, assets) {
+/** Returns the columns in the order of `assets`, or as they are if their names are not those of the assets. */
+function inOrder(series, assets) {
   const named = assets.map((name) => series.find(({ column }) => column === name));
-  const columns = named.every(Boolean) ? named : series;
-  return columns[0].log_returns.map((_, date) => columns.map(({ log_returns }) => log_returns[date]));
+  return named.every(Boolean) ? named : series;
 }
 
 /** Returns the reasons why a session with a policy cannot be renewed automatically or roll, by the choice they disable. */

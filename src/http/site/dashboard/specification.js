@@ -144,6 +144,7 @@ export const WARNED = {
   inflation_high: ({ spending, periods_per_year }) => `Prices rise ${percent(spending.inflation, 1)} a ${unitOf(periods_per_year)}, more than is usual. Is that the rise of one ${unitOf(periods_per_year)}, or of a year?`,
   tail_heavy: () => "A few returns of the record lie so far out that its uncertainty cannot be measured. Give bounds on the returns.",
   lone_return: (_, field, message) => `One return of the record, ${minus(/[-\d.]+ %/.exec(message)[0])}, lies far beyond all others. Is it right?`,
+  estimated_returns: (_, field, message) => `The record holds ${/holds (.*?);/.exec(message)[1]}. What came before is estimated from the assets with longer records. Is that meant?`,
   few_alike: () => "Hardly any return of the record came after a figure like the present one, so others count too. Is the present figure meant?",
   jumps: (_, field, message) => minus(message),
 };

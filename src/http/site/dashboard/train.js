@@ -5,7 +5,7 @@ import { announce, h } from "./dom.js";
 import { draft } from "./draft.js";
 import { fieldset, refusal, sending } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
-import { returnsField } from "./returns_field.js";
+import { byDate, returnsField } from "./returns_field.js";
 import { hasBall, investorsOnly, meant } from "./specification.js";
 import { put, radiusFor, RATE, trainFields, UTILITY } from "./train_fields.js";
 
@@ -54,7 +54,7 @@ export function withRecord({ problem }, series) {
     return;
   }
   problem.assets = series.map(({ column }) => column);
-  problem.history = series[0].log_returns.map((_, date) => series.map(({ log_returns }) => log_returns[date]));
+  problem.history = byDate(series);
   for (const name of ["framework", "learning", "centre"]) delete problem[name];
   problem.composition ??= "one_step";
   if (problem.radius?.rule === "chi_square") problem.radius = radiusFor("adaptive", problem.radius);

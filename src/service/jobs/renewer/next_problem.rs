@@ -30,7 +30,7 @@ pub(super) fn next_problem(
         (PreparedPolicy::Investor(advisor), SessionState::Account(account)) => {
             let record = periods.replay()?.record;
             let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
-            let next = advisor.specification().next(record.last(renew.window), rate, account.state.wealth, elapsed)?;
+            let next = advisor.specification().next(&record.last(renew.window), rate, account.state.wealth, elapsed)?;
             Ok(Posed::Investor(next.into()))
         }
         _ => Err(ServiceError::internal("a session has the policy of another problem")),
