@@ -308,7 +308,7 @@ fn set_aside(name: &str, reason: &str) -> Stop {
 
 fn ask(values: &[&Column]) -> Stop {
     let option = |column: &&Column| {
-        let first: Vec<&str> = column.cells.iter().take(3).map(|cell| cell.text.as_ref()).collect();
+        let first: Vec<&str> = column.given().into_iter().take(3).collect();
         let label = format!("{} ({} \u{2026})", column.name, first.join("; "));
         (label, Choices { columns: vec![column.name.clone()], ..Choices::default() })
     };

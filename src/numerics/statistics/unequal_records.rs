@@ -14,10 +14,10 @@
 //! of Financial Economics 45, equation 8. Its covariances are met up to the sampling error of the residuals taken.
 //! Checked by: `tests/solver/unequal_records.rs`.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Singular values below this share of the largest count as 0: such regressors are collinear.
-const SINGULAR: f64 = 1e-10;
+/// Eigenvalues below this share of the largest count as 0: such regressors are collinear.
+const SINGULAR: f64 = 1e-12;
 /// Least number of own returns, and the least for each longer record that they are regressed on.
 const LEAST: usize = 12;
 const LEAST_FOR_EACH: usize = 3;
@@ -34,7 +34,7 @@ pub fn longer_records(missing: &[usize]) -> Vec<usize> {
 }
 
 /// Fills the first `missing[j]` dates of each column j of `rows`, within `bounds`. Every asset needs [`least_returns`], and
-/// one a return on the first date. Cost O(n d^3) for n dates and d assets.
+/// one a return on the first date. Cost O(n d^3) for n dates and d assets that all begin at different dates.
 pub fn fill(rows: &mut [Vec<f64>], missing: &[usize], bounds: (f64, f64)) {
     let mut starts: Vec<usize> = missing.iter().copied().filter(|start| *start > 0).collect();
     starts.sort_unstable();
@@ -60,25 +60,29 @@ pub fn fill(rows: &mut [Vec<f64>], missing: &[usize], bounds: (f64, f64)) {
 /// The returns of the older assets over the dates of a regression, less their means.
 struct Regressors {
     means: Vec<f64>,
-    /// The pseudo-inverse, one row for each asset.
+    /// One row for each date.
+    table: DMatrix<f64>,
+    /// The pseudo-inverse of their products, summed over the dates.
     inverse: DMatrix<f64>,
 }
 
 impl Regressors {
     fn new(rows: &[Vec<f64>], assets: &[usize]) -> Self {
-        let means: Vec<f64> =
-            assets.iter().map(|asset| rows.iter().map(|row| row[*asset]).sum::<f64>() / rows.len() as f64).collect();
+        let mean = |asset: &usize| rows.iter().map(|row| row[*asset]).sum::<f64>() / rows.len() as f64;
+        let means: Vec<f64> = assets.iter().map(mean).collect();
         let table = DMatrix::from_fn(rows.len(), assets.len(), |date, place| rows[date][assets[place]] - means[place]);
-        let decomposed = table.svd(true, true);
-        let least = SINGULAR * decomposed.singular_values.max();
-        let inverse = decomposed.pseudo_inverse(least).unwrap_or_else(|_| DMatrix::zeros(assets.len(), rows.len()));
-        Regressors { means, inverse }
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(table.tr_mul(&table));
+        let least = SINGULAR * eigenvalues.max();
+        let inverses = eigenvalues.map(|value| if value > least { value.recip() } else { 0.0 });
+        let inverse = &eigenvectors * DMatrix::from_diagonal(&inverses) * eigenvectors.transpose();
+        Regressors { means, table, inverse }
     }
 
     /// Returns the level and the slopes of least squares.
     fn fit(&self, own: &[f64]) -> (f64, Vec<f64>) {
         let mean = own.iter().sum::<f64>() / own.len() as f64;
-        let slopes = &self.inverse * DVector::from_iterator(own.len(), own.iter().map(|value| value - mean));
+        let own = DVector::from_iterator(own.len(), own.iter().map(|value| value - mean));
+        let slopes = &self.inverse * self.table.tr_mul(&own);
         let level = mean - slopes.iter().zip(&self.means).map(|(slope, mean)| slope * mean).sum::<f64>();
         (level, slopes.as_slice().to_vec())
     }
