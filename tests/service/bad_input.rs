@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::support::values::replaced;
 use crate::support::{App, specification};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -152,10 +153,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
 
 /// `specification(2)` with the value at a pointer replaced or added.
 fn with(pointer: &str, value: Value) -> Value {
-    let mut request = specification(2);
-    let (parent, name) = pointer.rsplit_once('/').unwrap();
-    request.pointer_mut(parent).unwrap()[name] = value;
-    request
+    replaced(specification(2), pointer, value)
 }
 
 /// Names of the properties of the request, from the description of the interface.

@@ -1,6 +1,7 @@
 //! The cost of more or less caution on records like the one at hand: `POST /frontier` and the library behind it.
 
 use crate::support::App;
+use crate::support::values::replaced;
 use ballast::control::cache::Cache;
 use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::FrontierReport;
@@ -217,9 +218,7 @@ async fn what_cannot_be_tried_is_refused_by_name() {
         ("/more", json!(1), "more"),
     ];
     for (pointer, value, field) in cases {
-        let mut request = whole.clone();
-        let (parent, name) = pointer.rsplit_once('/').unwrap();
-        request.pointer_mut(parent).unwrap()[name] = value;
+        let request = replaced(whole.clone(), pointer, value);
         let (status, problem) = app.post("/frontier", &request).await;
         assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{pointer}: {problem}");
     }

@@ -1,6 +1,6 @@
 //! Limits on the composition of several assets: in a session, in advice, in a walk-forward and in a frontier.
 
-use crate::support::values::number;
+use crate::support::values::{number, replaced};
 use crate::support::{App, several_assets};
 use ballast::control::cache::Cache;
 use ballast::control::evaluation::assets::AssetsBacktest;
@@ -121,9 +121,7 @@ async fn limits_that_break_a_rule_are_refused_by_name() {
         ("/max_turnover", json!(3.0), "problem.limits.max_turnover"),
         ("/groups", json!([{ "name": "all", "assets": NAMES, "max": 0.9 }]), "problem.limits.groups[0].max"),
     ] {
-        let mut limits = limits();
-        let (parent, key) = pointer.rsplit_once('/').unwrap();
-        limits.pointer_mut(parent).unwrap()[key] = value;
+        let limits = replaced(limits(), pointer, value);
         for mut request in [several_assets(2), json!({ "problem": several_assets(1)["problem"] })] {
             request["problem"]["limits"] = limits.clone();
             let path = if request["design"].is_object() { "/train" } else { "/advise" };

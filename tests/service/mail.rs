@@ -4,7 +4,8 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::support::{App, patience, postgres, specification};
+use crate::subscriptions::{a_job_ends, listed, until};
+use crate::support::{App, postgres, specification};
 use ballast::service::process::config::{Config, StoreLocation};
 use ballast::service::subscriptions::mail_server::MailServer;
 use base64::Engine as _;
@@ -131,20 +132,8 @@ async fn subscribe(app: &App, request: Value) -> String {
     made["subscription"].as_str().unwrap().to_owned()
 }
 
-async fn listed(app: &App) -> Value {
-    app.get("/subscriptions").await.1["subscriptions"][0].clone()
-}
-
-async fn until(what: &str, mut reached: impl AsyncFnMut() -> bool) {
-    patience::until(what, async || reached().await.then_some(())).await;
-}
-
-async fn a_job_ends(app: &App, seed: usize) -> String {
-    let mut small = specification(1);
-    small["seed"] = json!(seed);
-    let job = app.queue(&small).await;
-    app.until(&job, |job| job["state"] == "succeeded").await;
-    job
+async fn only(app: &App) -> Value {
+    listed(app).await[0].clone()
 }
 
 fn to_someone() -> Value {
@@ -157,16 +146,16 @@ async fn a_server_that_fails_and_recovers_gets_each_event_under_one_identifier()
         mailbox.answer("451 try again later");
         let subscription = subscribe(&app, to_someone()).await;
         let job = a_job_ends(&app, 1).await;
-        until("two attempts fail", async || listed(&app).await["failures"].as_u64() >= Some(2)).await;
-        let error = listed(&app).await["last_error"].as_str().unwrap().to_owned();
+        until("two attempts fail", async || only(&app).await["failures"].as_u64() >= Some(2)).await;
+        let error = only(&app).await["last_error"].as_str().unwrap().to_owned();
         assert!(error.contains("451") && error.contains("try again later"), "{error}");
         mailbox.answer("250 accepted");
-        until("it is delivered", async || listed(&app).await["delivered"] == 1).await;
+        until("it is delivered", async || only(&app).await["delivered"] == 1).await;
         let first = mailbox.messages();
         assert_eq!(first.len(), 3, "three attempts, the last of which succeeds");
         assert!(first.iter().all(|message| *message == first[0]), "a repeat is the same message");
         a_job_ends(&app, 2).await;
-        until("another is delivered", async || listed(&app).await["delivered"] == 2).await;
+        until("another is delivered", async || only(&app).await["delivered"] == 2).await;
         let messages = mailbox.messages();
         assert_ne!(header(&messages[3], "Message-ID"), header(&messages[0], "Message-ID"));
         let message = &messages[0];
@@ -200,8 +189,8 @@ async fn an_address_that_is_refused_is_given_up_and_can_be_sent_to_again() {
     mailbox.refuse("RCPT", "550 no such person");
     let id = subscribe(&app, to_someone()).await;
     let job = a_job_ends(&app, 1).await;
-    until("it is given up", async || listed(&app).await["dead"] == 1).await;
-    let letter = listed(&app).await["dead_letters"][0].clone();
+    until("it is given up", async || only(&app).await["dead"] == 1).await;
+    let letter = only(&app).await["dead_letters"][0].clone();
     assert_eq!(letter["attempts"], 3);
     assert!(letter["error"].as_str().unwrap().contains("no such person"), "{letter}");
     assert!(letter["body"].as_str().unwrap().contains(&job), "{letter}");
@@ -209,7 +198,7 @@ async fn an_address_that_is_refused_is_given_up_and_can_be_sent_to_again() {
     mailbox.refuse("NONE", "");
     let (status, resent) = app.send(Method::POST, &format!("/subscriptions/{id}/resend"), None).await;
     assert_eq!((status.as_u16(), &resent), (200, &json!({ "queued": 1 })));
-    until("it is delivered", async || listed(&app).await["delivered"] == 1).await;
+    until("it is delivered", async || only(&app).await["delivered"] == 1).await;
     let messages = mailbox.messages();
     let expected = format!("<{}@house.example>", letter["delivery"].as_str().unwrap());
     assert_eq!(messages.iter().map(|message| header(message, "Message-ID")).collect::<Vec<_>>(), [expected]);
@@ -243,7 +232,7 @@ async fn the_password_is_sent_and_never_without_the_encryption_that_is_required(
     let app = App::configured(|config| quickly(config, &plain)).await;
     subscribe(&app, to_someone()).await;
     a_job_ends(&app, 1).await;
-    until("it is delivered", async || listed(&app).await["delivered"] == 1).await;
+    until("it is delivered", async || only(&app).await["delivered"] == 1).await;
     let shown = format!("AUTH PLAIN {}", STANDARD.encode("\0house\0p@ss"));
     assert!(mailbox.commands().contains(&shown), "{:?}", mailbox.commands());
     // The server offers no encryption, so a client that requires it says nothing more.
@@ -252,8 +241,8 @@ async fn the_password_is_sent_and_never_without_the_encryption_that_is_required(
         let app = App::configured(|config| quickly(config, &url)).await;
         subscribe(&app, to_someone()).await;
         a_job_ends(&app, 1).await;
-        until("it fails", async || listed(&app).await["failures"].as_u64() >= Some(1)).await;
-        let error = listed(&app).await["last_error"].as_str().unwrap().to_owned();
+        until("it fails", async || only(&app).await["failures"].as_u64() >= Some(1)).await;
+        let error = only(&app).await["last_error"].as_str().unwrap().to_owned();
         assert!(!error.contains("ss@"), "{error}");
     }
     let commands = unable.commands();
@@ -268,8 +257,8 @@ async fn a_server_that_does_not_answer_ends_the_attempt() {
     mailbox.state.lock().unwrap().delay = Duration::from_secs(600);
     subscribe(&app, to_someone()).await;
     a_job_ends(&app, 1).await;
-    until("the attempt ends", async || listed(&app).await["failures"].as_u64() >= Some(1)).await;
-    assert_eq!(listed(&app).await["last_error"], "no answer within 10 s");
+    until("the attempt ends", async || only(&app).await["failures"].as_u64() >= Some(1)).await;
+    assert_eq!(only(&app).await["last_error"], "no answer within 10 s");
 }
 
 #[tokio::test(flavor = "multi_thread")]

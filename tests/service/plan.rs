@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::support::values::number;
+use crate::support::values::{number, replaced};
 use crate::support::{App, specification};
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{PeriodOutcome, State};
@@ -224,9 +224,7 @@ async fn a_plan_is_that_of_the_library_and_names_its_faults() {
         ("/colour", json!("red"), "colour"),
     ];
     for (pointer, value, field) in faults {
-        let mut question = question.clone();
-        let (parent, name) = pointer.rsplit_once('/').unwrap();
-        question.pointer_mut(parent).unwrap()[name] = value;
+        let question = replaced(question.clone(), pointer, value);
         let (status, problem) = app.post("/plan", &question).await;
         assert_eq!((status.as_u16(), problem["field"].as_str()), (422, Some(field)), "{problem}");
     }

@@ -1,5 +1,6 @@
 //! The share of the capital that a strategy's record supports, over HTTP.
 
+use crate::support::values::replaced;
 use crate::support::{App, several_assets};
 use ballast::service::advice::sleeve::SleeveRequest;
 use serde_json::{Value, json};
@@ -52,9 +53,7 @@ async fn a_strategy_is_sized_as_by_the_library_and_faults_are_named() {
         ("/colour", json!("red"), "colour"),
     ];
     for (pointer, value, field) in faults {
-        let mut question = question.clone();
-        let (parent, name) = pointer.rsplit_once('/').unwrap();
-        question.pointer_mut(parent).unwrap()[name] = value;
+        let question = replaced(question.clone(), pointer, value);
         let (status, problem) = app.post("/sleeve", &question).await;
         assert_eq!((status.as_u16(), problem["field"].as_str()), (422, Some(field)), "{problem}");
     }

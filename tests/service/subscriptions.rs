@@ -108,7 +108,7 @@ async fn subscribe(app: &App, request: Value) -> (String, String) {
     (made["subscription"].as_str().unwrap().to_owned(), made["secret"].as_str().unwrap().to_owned())
 }
 
-async fn listed(app: &App) -> Value {
+pub(crate) async fn listed(app: &App) -> Value {
     app.get("/subscriptions").await.1["subscriptions"].clone()
 }
 
@@ -123,12 +123,12 @@ async fn over_either(story: impl AsyncFn(App)) {
     story(App::configured(shared).await).await;
 }
 
-async fn until(what: &str, mut reached: impl AsyncFnMut() -> bool) {
+pub(crate) async fn until(what: &str, mut reached: impl AsyncFnMut() -> bool) {
     patience::until(what, async || reached().await.then_some(())).await;
 }
 
 /// A training that ends at once.
-async fn a_job_ends(app: &App, seed: usize) -> String {
+pub(crate) async fn a_job_ends(app: &App, seed: usize) -> String {
     let mut small = specification(1);
     small["seed"] = json!(seed);
     let job = app.queue(&small).await;
