@@ -78,13 +78,9 @@ impl SessionRecord {
         self.dates.push(date);
     }
 
-    /// Returns each date with its returns, `None` before an asset's first one.
-    pub(in crate::service) fn dated(&self) -> impl Iterator<Item = (i64, Vec<Option<f64>>)> {
-        let row = |(number, (date, row)): (usize, (i64, &[f64]))| {
-            let own = row.iter().zip(&self.missing);
-            (date, own.map(|(value, missing)| (number >= *missing).then_some(*value)).collect())
-        };
-        self.dates.iter().copied().zip(self.values.chunks_exact(self.assets)).enumerate().map(row)
+    /// Returns each date with its returns, NaN before an asset's first one.
+    pub(in crate::service) fn dated(&self) -> impl Iterator<Item = (i64, Vec<f64>)> {
+        self.dates.iter().copied().zip(self.returns().as_given())
     }
 
     /// Returns the number of assets.
@@ -100,17 +96,11 @@ impl SessionRecord {
     /// Returns those of the last `window` dates, at most as many as a history may hold, NaN before an asset's first one.
     pub(in crate::service) fn last(&self, window: Option<usize>) -> Cow<'_, [f64]> {
         let longest = if self.assets > 1 { DATES } else { rules::HISTORY_LENGTH };
-        let most = window.unwrap_or(usize::MAX).min(*longest.end()) * self.assets;
-        let first = self.values.len().saturating_sub(most);
-        let values = &self.values[first..];
-        if self.missing.iter().all(|missing| *missing <= first / self.assets) {
-            return values.into();
+        let first = self.dates.len().saturating_sub(window.unwrap_or(usize::MAX).min(*longest.end()));
+        if self.missing.iter().all(|missing| *missing <= first) {
+            return self.values[first * self.assets..].into();
         }
-        let own = |(place, value): (usize, &f64)| {
-            let is_missing = (first + place) / self.assets < self.missing[place % self.assets];
-            if is_missing { f64::NAN } else { *value }
-        };
-        values.iter().enumerate().map(own).collect()
+        self.returns().as_given()[first..].concat().into()
     }
 
     /// Returns all returns of several assets.

@@ -98,7 +98,7 @@ impl AssetChange {
             // Dates are numbers of periods, and 0 or less for the history.
             let ago = usize::try_from(self.observed as i64 - date).unwrap_or(usize::MAX);
             let of = |column: &ReturnSource| match column {
-                ReturnSource::Kept(index) => row[*index],
+                ReturnSource::Kept(index) => Some(row[*index]).filter(|log_return| !log_return.is_nan()),
                 ReturnSource::Entering(values) => *values.get(values.len().checked_sub(ago.checked_add(1)?)?)?,
             };
             let joint: Option<Vec<f64>> = self.columns.iter().map(of).collect();
