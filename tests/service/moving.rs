@@ -129,6 +129,32 @@ async fn a_session_goes_on_elsewhere_bit_for_bit(mut app: App) {
     assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
 }
 
+/// A session whose records begin at different dates goes on elsewhere; one that says that they begin where they cannot is refused.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_of_unequal_records_moves_as_it_is() {
+    let (mut app, other) = (App::start().await, App::start().await);
+    app.train(&several_assets(4)).await;
+    let known = |month: usize, asset: usize| 0.01 + 0.03 * (1.7 * ((asset + 1) * month) as f64).sin();
+    let row = |month: usize| json!([known(month, 0), known(month, 1), (month >= 15).then(|| known(month, 2))]);
+    let history = json!((0..40).map(row).collect::<Vec<Value>>());
+    app.open_with(json!({ "history": history, "wealth": 500.0 })).await;
+    let document = exported(&app, &app.session).await;
+    import_policies(&app, &other, &document).await;
+    let plan: Value = serde_json::from_str(document["session"]["start"]["plan"].as_str().unwrap()).unwrap();
+    for missing in [json!([0, 1000, 0]), json!([0, 15]), json!([15, 15, 15])] {
+        let mut plan = plan.clone();
+        plan["assets"]["missing"] = missing.clone();
+        let forged = changed(&document, "/session/start/plan", json!(plan.to_string()));
+        let (status, problem) = import_sealed(&other, forged).await;
+        assert!(status == 422 && problem["field"].as_str().unwrap().starts_with("history"), "{missing}: {problem}");
+    }
+    let (status, answer) = other.post("/sessions/import", &document).await;
+    assert_eq!(status, 201, "{answer}");
+    assert_eq!(shown(&other, &app.session).await, shown(&app, &app.session).await);
+    let (_, kept) = other.get(&format!("/sessions/{}/history", app.session)).await;
+    assert_eq!(kept["history"], history);
+}
+
 /// Returns the document with the value at a pointer replaced, under its old hash.
 fn changed(document: &Value, pointer: &str, value: Value) -> Value {
     let mut changed = document.clone();

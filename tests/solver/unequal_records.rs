@@ -190,6 +190,9 @@ fn what_cannot_be_estimated_is_refused_by_name() {
         let found = refused(change);
         assert!(found.starts_with(expected), "{found}");
     }
+    let rows = AssetHistory::new(&drawn(9, 60, &[0, 20, 0])).to_vec();
+    let error = AssetHistory::filled(rows, vec![0, 1000, 0]).check("history", &[]).unwrap_err();
+    assert_eq!(error.value, "0 returns of asset 2", "{error:?}");
     let few = refused(&|of| {
         (20..52).for_each(|date| of["history"][date][1] = Value::Null);
     });

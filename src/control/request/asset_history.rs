@@ -106,7 +106,7 @@ impl AssetHistory {
             return Err(FieldError::new(format!("{named}[0]"), "null for every asset", rule));
         }
         for ((asset, missing), older) in self.missing.iter().enumerate().zip(longer_records(&self.missing)) {
-            let (own, least) = (dates - missing, least_returns(older));
+            let (own, least) = (dates.saturating_sub(*missing), least_returns(older));
             if *missing > 0 && own < least {
                 let name = names.get(asset).map_or_else(|| format!("asset {}", asset + 1), Clone::clone);
                 let rule = format!(
