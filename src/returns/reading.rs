@@ -130,13 +130,8 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
         kept.check_holes(&chosen, are_prices && order.frequency == Some(Frequency::Daily), choices)?;
         order = ordered(dates, sheet.times(), &kept.rows, choices)?;
     }
-    let count = returns.iter().map(|returns| returns.simple.len()).max().unwrap_or(0);
     alike(&chosen, (&returns, &kept), choices)?;
-    if count < FEWEST {
-        return Err(Stop::refused(
-            "Two prices give one return, but at least two returns are needed. Give another price.",
-        ));
-    }
+    let count = longest(&chosen, &returns)?;
     let used = choices.latest.unwrap_or(count).clamp(FEWEST, count);
     let mut remarks = Vec::new();
     let rate = bank.as_ref().map(|bank| bank.rates(used, returns[0].unit, choices)).transpose()?.and_then(|found| {
@@ -153,6 +148,24 @@ fn record(sheet: &Sheet, choices: &Choices) -> Result<Record, Stop> {
     let names = chosen.iter().map(|column| column.name.clone()).collect();
     let found = ColumnContents { names, order, returns, rate, used, remarks };
     Ok(found.record(sheet.found()))
+}
+
+/// Returns the number of returns of the longest column. Requires enough of each.
+fn longest(chosen: &[&Column], returns: &[ColumnReturns]) -> Result<usize, Stop> {
+    let lengths = || returns.iter().map(|returns| returns.simple.len());
+    let count = lengths().max().unwrap_or(0);
+    if count < FEWEST {
+        return Err(Stop::refused(
+            "Two prices give one return, but at least two returns are needed. Give another price.",
+        ));
+    }
+    match lengths().position(|length| length < FEWEST) {
+        None => Ok(count),
+        Some(at) => {
+            let name = &chosen[at].name;
+            Err(Stop::refused(format!("Column {name} needs at least two returns, or three prices.")))
+        }
+    }
 }
 
 /// Requires columns that are read together to be of one kind and in one unit.

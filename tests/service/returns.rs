@@ -454,6 +454,31 @@ fn ordinary_records_are_not_asked_about() {
     }
 }
 
+/// Every column needs a mean and a deviation of its own.
+#[test]
+fn a_column_of_a_single_return_is_refused_by_name() {
+    let old: Vec<String> = (0..24).map(|month| format!("{:.2}", 100.0 + f64::from(month % 5))).collect();
+    let rows = |from: usize| -> String {
+        let row = |(month, price): (usize, &String)| {
+            let young = if month < from { "" } else { "50.1" };
+            format!("{}-{:02}-28,{price},{young}\n", 2010 + month / 12, 1 + month % 12)
+        };
+        old.iter().enumerate().map(row).collect()
+    };
+    let choices = Choices {
+        columns: vec!["old".into(), "young".into()],
+        kind: Some(Kind::Price),
+        unequal: Some(true),
+        ..Choices::default()
+    };
+    for from in [22, 23] {
+        let Reading::Refused { sentence, .. } = read(&format!("date,old,young\n{}", rows(from)), &choices) else {
+            panic!("{from}")
+        };
+        assert_eq!(sentence, "Column young needs at least two returns, or three prices.");
+    }
+}
+
 /// An asset that begins twenty months later is asked about: the older rows are left out, or it keeps its own beginning. In
 /// either order of the rows, and as returns or as prices, the same returns are read.
 #[test]
